@@ -19,6 +19,7 @@ import pytest
 from click.testing import CliRunner
 
 from fbvm.cli.main import main
+from fbvm.cli.running.demo import modbus_server
 from fbvm.engine.native.engine import available
 from fbvm.machine.plc import Plc
 
@@ -180,6 +181,18 @@ def test_the_script_soak(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(script, "SOCKETS_S", 1)
     script.memory()
     script.sockets()
+
+
+def test_the_script_reconnecting_clients(load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    script = load("reconnecting_clients")
+    monkeypatch.setattr(script, "QUIET_S", 0)
+    monkeypatch.setattr(script, "RIGHT", script.RIGHT[:-2] + (2000).to_bytes(2, "big"))
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=lambda: time.sleep(0.5)))
+    with modbus_server() as port:
+        script.main(port, 1)
+    counts = json.loads(capsys.readouterr().out)
+    assert (counts["served at once"], counts.get("wrong", 0)) == (8, 0)
+    assert counts["right"] > 8
 
 
 def test_the_script_llvmlite_range(load: Load) -> None:

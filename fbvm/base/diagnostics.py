@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from fbvm.base.codes import CODES
+from fbvm.base.printable import one_line, printable
 
 
 def whole_lines(text: str) -> str:
@@ -118,15 +119,15 @@ class Diagnostic:
     def render(self) -> str:
         """The message as text: place, code, what is wrong, the line with a caret, the hint."""
         line, column = self.source.place(self.start)
-        lines = [f"{self.source.name}:{line}:{column}: {self.severity} {self.code}: {self.message}"]
+        lines = [f"{one_line(self.source.name)}:{line}:{column}: {self.severity} {self.code}: {one_line(self.message)}"]
         lines += caret_lines(self.source, self.start, self.end)
         if self.related:
             other, at, text = self.related
             other_line, other_column = other.place(at)
-            lines.append(f"  {other.name}:{other_line}:{other_column}: {text}")
+            lines.append(f"  {one_line(other.name)}:{other_line}:{other_column}: {one_line(text)}")
             lines += caret_lines(other, at, at + 1)
         if self.hint:
-            lines.append(f"  help: {self.hint}")
+            lines.append(f"  help: {printable(self.hint)}")
         return "\n".join(lines)
 
 

@@ -16,9 +16,11 @@ import click
 import fbvm
 from fbvm.base import cache
 from fbvm.base.files import reason
+from fbvm.base.printable import printable
 from fbvm.cli.shared import ending, status
 from fbvm.cli.shared.files import OutputError
 from fbvm.cli.shared.streams import give_up_output, prepare_streams
+from fbvm.cli.shared.terminal import named, say
 
 VERB_GROUPS = {
     "running": ("Run PLCs", {
@@ -71,8 +73,12 @@ class _Verbs(click.Group):
         refuses with 4 for a file that grows during a run, else with 2."""
         try:
             return super().invoke(ctx)
+        except click.UsageError as error:
+            if (said := error.format_message()).isprintable():
+                raise
+            raise click.UsageError(printable(said), error.ctx) from None
         except OutputError as error:
-            click.echo(str(error), err=True)
+            say(str(error), err=True)
             sys.exit(status.STOPPED)
         except BrokenPipeError:
             give_up_output()
@@ -85,14 +91,14 @@ class _Verbs(click.Group):
 
         Signals that ask for the end do what Ctrl-C does, with a sentence and a status of their own."""
         prepare_streams()
-        cache.warn_by(lambda sentence: click.echo(sentence, err=True))
+        cache.warn_by(lambda sentence: say(sentence, err=True))
         with ending.heard():
             try:
                 return self._run(*arguments, **options)
             except SystemExit as end:
                 if end.code != status.INTERRUPTED:
                     raise
-                click.echo(ending.sentence(), err=True)
+                say(ending.sentence(), err=True)
                 sys.exit(ending.exit_status())
 
     def _run(self, *arguments: Any, **options: Any) -> Any:
@@ -106,8 +112,8 @@ class _Verbs(click.Group):
             sys.exit(status.OUTPUT_CLOSED)
         except OSError as error:
             give_up_output()
-            said = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
-            click.echo(f"{said}: {reason(error)}", err=True)
+            said = f"{named(error.filename)} cannot be used" if error.filename else "the output cannot be written"
+            say(f"{said}: {reason(error)}", err=True)
             sys.exit(status.USAGE)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:

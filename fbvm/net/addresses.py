@@ -10,6 +10,9 @@ from ipaddress import IPv4Address
 
 from fbvm.wire.link import Peer
 
+FIRST_FREE_PORT = 1024
+"""Ports below belong to services of the host."""
+
 
 def fits(pattern: Peer, peer: Peer) -> bool:
     """True if `peer` is the pattern, where host 0.0.0.0 and port 0 of the pattern fit anything."""
@@ -35,16 +38,37 @@ def dotted(real: Peer) -> tuple[str, int]:
         raise OSError(errno.EADDRNOTAVAIL, real.host) from None
 
 
+def why_unusable(error: OSError) -> str:
+    """Why a port of the host cannot be listened on, in words."""
+    known = {
+        errno.EADDRINUSE: "somebody else listens there",
+        errno.EADDRNOTAVAIL: "it is not an address of this host",
+        errno.EACCES: "the system does not allow it; ports from 1024 on need no rights",
+        errno.EPERM: "the system does not allow it; ports from 1024 on need no rights",
+    }  # fmt: skip
+    return known.get(error.errno or 0) or (error.strerror or str(error)).lower()
+
+
+def is_reachable(host: str) -> bool:
+    """True if other computers can reach a port that is bound to this address of the host."""
+    try:
+        return not IPv4Address(host).is_loopback
+    except ValueError:
+        return host != "localhost"
+
+
 class AddressMap:
     """Maps endpoints of the program to endpoints of the host; an endpoint without a row is mapped to itself.
 
     `rows` are pairs of an endpoint of the program and one of the host.  A row for port 0 is for every port of its address.
     A row to port 0 keeps the port when connecting, and lets the system choose one when listening.  Units listen on the
-    host's address `bind` where no row says another."""
+    host's address `bind` where no row says another, but not on a port below 1024: those belong to the host.  `door` is where on
+    the host the first endpoint listens that has no row."""
 
-    def __init__(self, rows: Mapping[Peer, Peer], bind: str) -> None:
+    def __init__(self, rows: Mapping[Peer, Peer], bind: str, door: Peer | None = None) -> None:
         self._rows = dict(rows)
         self._bind = bind
+        self._door = door
         self._used: set[Peer] = set()
 
     @property
@@ -60,6 +84,15 @@ class AddressMap:
     def local(self, endpoint: Peer) -> Peer:
         """The endpoint of the host on which to listen for a unit's endpoint; port 0 lets the system choose one."""
         return self._row(endpoint) or Peer(self._bind, endpoint.port)
+
+    def is_mapped(self, endpoint: Peer) -> bool:
+        """True if a unit may listen at this endpoint: it has a row, gets the door now, or its port is none of the host's own."""
+        if self._row(endpoint):
+            return True
+        if self._door and endpoint.port:
+            self._rows[endpoint], self._door = self._door, None
+            return True
+        return not 0 < endpoint.port < FIRST_FREE_PORT
 
     def inward(self, caller: Peer, own: Container[str]) -> Peer:
         """The endpoint of the program for a caller from the host: by the first row to this very endpoint, else by the

@@ -96,7 +96,7 @@ class Kind:
 NAMED: dict[str, Kind] = {
     "slow": Kind("data take longer each way", Fault(latency_ns=80_000_000), ("latency_ns",)),
     "unsteady": Kind("data take longer by chance", Fault(jitter_ns=60_000_000), ("jitter_ns",)),
-    "cut": Kind("data arrive in pieces of 1 byte up to a size", Fault(segment_bytes=5, random_cut=True), ("segment_bytes",)),
+    "cut": Kind("data arrive in pieces of 1 byte up to a size", Fault(segment_bytes=5, random_cut=True)),
     "dripping": Kind("data arrive byte by byte", Fault(segment_bytes=1, gap_ns=12_000_000)),
     "joined": Kind("what is sent arrives together, at multiples of a time", Fault(join_ns=150_000_000), ("join_ns",)),
     "lossy": Kind("parts of the data are lost", Fault(lose_percent=10), ("lose_percent",)),

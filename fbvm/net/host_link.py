@@ -14,12 +14,14 @@ class Host(Protocol):
 
     links_pending: set[HostLink]
     """Links with events that `wait` has to return for."""
-    watched: int
-    """Sockets that are registered with the selector."""
 
     @property
     def driven(self) -> bool:
         """True if the caller of `serve` calls it for all links at once."""
+
+    @property
+    def is_idle(self) -> bool:
+        """True if no socket is registered with the selector, and no connection is under faults."""
 
     def serve(self, now_ns: int) -> Sequence[HostLink]:
         """Handle every socket that is ready; returns the links of these sockets."""
@@ -34,21 +36,28 @@ class HostLink(ChannelLink):
     def __init__(self, network: Host, address: str) -> None:
         super().__init__(address)
         self._network = network
+        self.refreshes = 0
+        """The I/O refreshes of the unit so far."""
         self.waiting: dict[Channel, None] = {}
         """Channels whose sockets may have data, in the order in which they became ready."""
 
     def events(self, now_ns: int) -> Sequence[Event]:
         if self.is_quiet:
+            self.refreshes += 1
             return ()
         driven = self._network.driven
         if not driven:
             self._network.serve(now_ns)
+        self.refreshes += 1
         if self.waiting:
             for there in list(self.waiting):
                 there.fetch(now_ns)
         events, self.pending = self.pending, []
-        self.is_quiet = not self.waiting and (driven or not self._network.watched)
+        self.is_quiet = not self.waiting and (driven or self._network.is_idle)
         return events
+
+    def pass_by(self, refreshes: int) -> None:
+        self.refreshes += refreshes
 
     def mark_pending(self) -> None:
         self.is_quiet = False

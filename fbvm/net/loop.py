@@ -176,7 +176,7 @@ class LoopLink(MemoryLink):
                 connection = self.channels[channel] = Connection(self, channel, there.port)
                 connection.granted = there.granted
                 end = End(self.network, caller.remote, caller.local, self.address, connection)
-                self.tell(end, TapKind.SYN, False)
+                self.network.tell(end, TapKind.SYN, False)
                 connection.answered(end, "", False, now_ns)
                 return end
         return None
@@ -190,9 +190,6 @@ class LoopLink(MemoryLink):
 
     def remember(self, end: End) -> None:
         self._ends[end.local.port, end.remote] = end
-
-    def tell(self, end: End, what: TapKind, out: bool) -> None:
-        self.network.tell(end, what, out)
 
     def send_datagram(self, port: int, receiver: Peer, data: bytes) -> None:
         self.network.send_datagram(Peer(self.address, port), receiver, data)

@@ -19,10 +19,6 @@ class MemoryLink(ChannelLink):
         """Keeps an end, so that its pair of endpoints is not used twice."""
 
     @abstractmethod
-    def tell(self, end: End, what: TapKind, out: bool) -> None:
-        """Reports an event at an end to the tap."""
-
-    @abstractmethod
     def send_datagram(self, port: int, receiver: Peer, data: bytes) -> None:
         """Sends a datagram from a local port."""
 
@@ -44,8 +40,8 @@ class Listener(_LocalChannel):
         self.remote = remote
 
 
-class Connection(_LocalChannel):
-    """A TCP connection; until it is open it has no end."""
+class WiredConnection(Channel):
+    """A TCP connection of a unit over wires; until it is open it has no end."""
 
     _end: End | None = None
     _closed = ""
@@ -61,15 +57,14 @@ class Connection(_LocalChannel):
     def answered(self, end: End, error: str, active: bool, now_ns: int) -> None:
         """Called with the answer to the SYN; without an `error` the connection is open."""
         if error:
-            self.link.tell(end, TapKind.RST, False)
+            end.carrier.tell(end, TapKind.RST, False, b"")
             self.refused(error, now_ns)
             return
-        self.link.tell(end, TapKind.OPEN, active)
+        end.carrier.tell(end, TapKind.OPEN, active, b"")
         if self._closed:
             (end.reset if self._closed == "rst" else end.leave)(now_ns)
             return
         self._end = end
-        self.link.remember(end)
         self.link.pending.append(Opened(self.channel, end.local.port, end.remote))
 
     def sent(self, size_bytes: int) -> None:
@@ -116,6 +111,15 @@ class Connection(_LocalChannel):
             self._break_told = True
             end.inbox.clear()
             told.append(Broken(self.channel, end.error))
+
+
+class Connection(_LocalChannel, WiredConnection):
+    """A TCP connection in memory."""
+
+    def answered(self, end: End, error: str, active: bool, now_ns: int) -> None:
+        super().answered(end, error, active, now_ns)
+        if self._end:
+            self.link.remember(end)
 
 
 class UdpPort(_LocalChannel):

@@ -197,6 +197,8 @@ class End:
 
     def _arrive(self, what: TapKind, data: bytes, now_ns: int) -> None:
         if self.error:
+            if self.error == "ETIMEDOUT" and what is not TapKind.RST:  # the other side has not noticed, and is told so
+                self._transmit(TapKind.RST, b"", now_ns)
             return
         self.carrier.tell(self, what, False, data)
         if what is TapKind.RST:

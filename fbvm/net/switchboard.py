@@ -10,11 +10,15 @@ import select
 import selectors
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from fbvm.base import host
 from fbvm.net.addresses import AddressMap
+from fbvm.net.faults import Fault
 from fbvm.net.host_link import HostLink
+from fbvm.net.notices import NoticeKind, Notices
+from fbvm.net.relays import Relays
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import Tap, TapEvent, TapKind
 
@@ -74,12 +78,16 @@ class Orphan(Protocol):
 
 
 class Switchboard(ABC):
-    """A selector for the sockets of all links, and the map of addresses."""
+    """A selector for the sockets of all links, and the map of addresses.  `seed` and `faults` as in the network in memory."""
 
-    def __init__(self, address_map: AddressMap) -> None:
+    def __init__(self, address_map: AddressMap, seed: int = 0, faults: Iterable[Fault] = ()) -> None:
         self.tap: Tap | None = None
         self.map = address_map
         self.links: dict[str, HostLink] = {}
+        self.relays = Relays(self.links, self.link_behind, self.tell, seed, faults)
+        """The connections that are under faults."""
+        self.notices = Notices()
+        """Set `notices.tell` to be told what no program is told."""
         self._selector = selectors.DefaultSelector()
         self._number = host.selector_number(self._selector)
         self.watched = 0
@@ -88,6 +96,7 @@ class Switchboard(ABC):
         """The sockets that were ready in the last `wait`."""
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
+        self._calls: deque[tuple[int, Callable[[], None]]] = deque()
         self.links_pending: set[HostLink] = set()
         """Links that may have pending events although none of their sockets is ready."""
         self.closed = False
@@ -96,6 +105,48 @@ class Switchboard(ABC):
     @abstractmethod
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """The endpoint of the host for a unit's own endpoint."""
+
+    def listening_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
+        """The endpoint of the host for a unit that wants to listen.  Raises OSError if it may not."""
+        if not self.map.is_mapped(endpoint):
+            self.notices.note(NoticeKind.NOT_MAPPED, endpoint, self.map.local(endpoint))
+            raise OSError(errno.EACCES, "not mapped")
+        return self.host_endpoint(endpoint, transport)
+
+    def try_doors(self, endpoints: Iterable[Peer]) -> dict[Peer, Peer]:
+        """Tries whether units will be able to listen on their endpoints; returns where on the host each is.
+
+        Raises OSError with a message that names endpoint and port: for an endpoint of no unit, for two on one port, and for a
+        port that the host does not give."""
+        found: dict[Peer, Peer] = {}
+        for endpoint in endpoints:
+            if endpoint.host not in self.links:
+                there = ", ".join(sorted(self.links)) or "none"
+                raise OSError(f"{endpoint} cannot be used: no unit has the address {endpoint.host}; units: {there}")
+            self.try_door(self.map.local(endpoint))
+            real = self.host_endpoint(endpoint)
+            for other, its in found.items():
+                if its.port == real.port and ("0.0.0.0" in (its.host, real.host) or its.host == real.host):
+                    raise OSError(f"{real} cannot be used for {endpoint}: it is the door of {other}")
+            found[endpoint] = real
+        return found
+
+    @abstractmethod
+    def try_door(self, real: Peer) -> None:
+        """Tries whether a unit will be able to listen at an endpoint of the host.  Raises OSError that names it."""
+
+    @abstractmethod
+    def link_behind(self, address: str) -> HostLink:
+        """A link for connections of the host behind those of a unit; the unit does not see its events."""
+
+    @property
+    def faults(self) -> list[Fault]:
+        """The rows of `net.faults`, which may be changed at any time."""
+        return self.relays.faults
+
+    @faults.setter
+    def faults(self, rows: Iterable[Fault]) -> None:
+        self.relays.faults[:] = rows
 
     @property
     def driven(self) -> bool:
@@ -108,6 +159,11 @@ class Switchboard(ABC):
         for link in self.links.values():
             link.is_quiet = False
 
+    @property
+    def is_idle(self) -> bool:
+        """True if no socket is registered with the selector, and no connection is under faults."""
+        return not self.watched and not self.relays.carried
+
     def wait(self, timeout_s: float) -> bool:
         """Sleeps until a socket is ready or `timeout_s` seconds are over; True if there are events to fetch."""
         if self.closed:
@@ -117,6 +173,11 @@ class Switchboard(ABC):
                 return True
         self.links_pending.clear()
         timeout_s = max(timeout_s, 0.0)
+        if self.relays.carried and (due_s := self.relays.until_due_s()) is not None and due_s < timeout_s:
+            return self._wait(due_s) or True
+        return self._wait(timeout_s)
+
+    def _wait(self, timeout_s: float) -> bool:
         coarse_s = timeout_s if self._number is None else timeout_s // COARSE_S * COARSE_S
         if coarse_s or self._number is None:
             self._found = host.select(self._selector, coarse_s)
@@ -129,6 +190,9 @@ class Switchboard(ABC):
         if self.closed:
             return []
         woken: list[HostLink] = []
+        under_faults = self.relays.faults or self.relays.carried
+        if under_faults:
+            self.relays.meet(now_ns)
         found, self._found = self._found, []
         if not found and self.watched:
             found = self._selector.select(0)
@@ -142,11 +206,25 @@ class Switchboard(ABC):
             woken.append(link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
+        while self._calls and self._calls[0][0] <= now_ns:
+            self._calls.popleft()[1]()
+        if under_faults:
+            woken += self._serve_relays(now_ns)
+        return woken
+
+    def _serve_relays(self, now_ns: int) -> list[HostLink]:
+        """Serves the connections under faults; returns the links that have events then."""
+        self.relays.meet(now_ns)
+        woken = self.relays.serve(now_ns)
+        for link in woken:
+            link.is_quiet = False
+            if link.pending:
+                link.mark_pending()
         return woken
 
     def close(self) -> None:
         """Closes all connections and sockets."""
-        for link in self.links.values():
+        for link in (*self.links.values(), *self.relays.close()):
             while link.channels:
                 _, there = link.channels.popitem()
                 if isinstance(there, Watcher):
@@ -179,6 +257,10 @@ class Switchboard(ABC):
         self._orphans.append((now_ns + ORPHAN_LIMIT_NS, orphan))
         if len(self._orphans) > MAX_ORPHANS:
             self._orphans.popleft()[1].give_up(now_ns)
+
+    def call_at(self, due_ns: int, call: Callable[[], None]) -> None:
+        """Calls a function in the first `serve` at or after `due_ns`; calls have to be due in the order of their making."""
+        self._calls.append((due_ns, call))
 
     def own(self, transport: str, real: Peer, endpoint: Peer | None) -> None:
         """Notes which endpoint of a unit an endpoint of the host belongs to; None removes the note."""

@@ -7,46 +7,44 @@ from __future__ import annotations
 
 import errno
 import socket
-import struct
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 
-from fbvm.base.host import keeps_ports, linger_format
-from fbvm.net.addresses import AddressMap, dotted, fits, impossible
+from fbvm.net.addresses import AddressMap, dotted, fits, impossible, why_unusable
 from fbvm.net.channels import SEND_BUFFER_BYTES
+from fbvm.net.faults import Fault
+from fbvm.net.host_link import HostLink
+from fbvm.net.notices import NoticeKind
+from fbvm.net.relays import Relays
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, WRITE, Switchboard, errno_name
-from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, share_port
+from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, has_left, reserve, reset_on_close, try_to_listen
+from fbvm.net.waiting import MAX_HELD, WaitingCallers
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import DATA, TapKind
-
-MAX_HELD = 128
-"""Callers that are held for a unit's endpoint; further ones are reset."""
-_RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
 
 
 class TcpNetwork(Switchboard):
     """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
-    A unit without a row listens on the host's address `bind`, on the port of its request.  Host names of the map are
-    resolved here, once.  With `backlog` the host keeps a port open on which a unit has listened: who calls while none of the
-    unit's sockets waits is let in as soon as one does.  Without, such a caller is refused, as by the unit; only those wait that
-    the host has accepted in the same moment as the caller who took the last socket.
+    A unit without a row listens on the host's address `bind`, on the port of its request if that is 1024 or above; the first
+    one listens at `door`, if that is given.  Host names of the map are resolved here, once.
 
-    Raises OSError for a name that cannot be resolved."""
+    With `backlog` the host keeps a port open on which a unit has listened: who calls while none of the unit's sockets waits is
+    let in as soon as one does.  Without, such a caller is refused, as by the unit; only those wait that the host has accepted
+    in the same moment as the caller who took the last socket.  `faults` are rows of `net.faults`, `seed` starts their random
+    numbers.  Raises OSError for a name that cannot be resolved."""
 
     virtual_time = False
 
     def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *,
-                 backlog: bool = False) -> None:  # fmt: skip
+                 door: Peer | None = None, backlog: bool = False, seed: int = 0,
+                 faults: Iterable[Fault] = ()) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
-        super().__init__(AddressMap(rows, bind))
-        self.backlog = backlog
+        super().__init__(AddressMap(rows, bind, door), seed, faults)
+        self.waiting: WaitingCallers[socket.socket] = WaitingCallers(self, backlog)
+        """Callers for whom no socket of their unit is free."""
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
-        self._kept: dict[Peer, socket.socket] = {}
-        """With a backlog: sockets of the host on which callers of a unit's endpoint wait for its next listener."""
-        self.held: dict[Peer, list[tuple[socket.socket, Peer]]] = {}
-        """Callers of a unit's endpoint whom the host has accepted beside the one that took its last listener."""
 
     def attach(self, address: str) -> TcpLink:
         """The link of a new unit.  Raises ValueError if the address is in use."""
@@ -54,6 +52,9 @@ class TcpNetwork(Switchboard):
             raise ValueError(f"{address} is attached already")
         link = self.links[address] = TcpLink(self, address)
         return link
+
+    def link_behind(self, address: str) -> HostLink:
+        return _LinkBehind(self, address)
 
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """The endpoint of the host for a unit's own endpoint, also before the unit listens.
@@ -63,33 +64,16 @@ class TcpNetwork(Switchboard):
         if real.port:
             return real
         if (transport, endpoint) not in self._reserved:
-            keeper = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM)
-            share_port(keeper)
-            keeper.bind((real.host, 0))
-            keeps = keeps_ports() and transport == TCP
-            self._reserved[transport, endpoint] = Peer(*keeper.getsockname()), keeper if keeps else None
-            if not keeps:
-                keeper.close()
+            self._reserved[transport, endpoint] = reserve(real.host, transport)
         return self._reserved[transport, endpoint][0]
 
-    def keep(self, endpoint: Peer, sock: socket.socket) -> bool:
-        """Keeps the listening socket of a unit's endpoint until its next listener opens; False without a backlog."""
-        if self.backlog:
-            self._kept[endpoint] = sock
-        return self.backlog
-
-    def take_kept(self, endpoint: Peer) -> socket.socket | None:
-        """The listening socket that was kept for a unit's endpoint, if there is one."""
-        return self._kept.pop(endpoint, None)
+    def try_door(self, real: Peer) -> None:
+        try_to_listen(real)
 
     def close(self) -> None:
         """Closes all connections and sockets."""
         super().close()
-        while self._kept:
-            self._kept.popitem()[1].close()
-        while self.held:
-            for conn, _ in self.held.popitem()[1]:
-                conn.close()
+        self.waiting.close()
         for _, keeper in self._reserved.values():
             if keeper:
                 keeper.close()
@@ -102,6 +86,10 @@ class TcpLink(SocketLink):
     network: TcpNetwork
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
+        if isinstance(request, Connect) and self._is_under_faults(request):
+            self.network.relays.open(self, request, now_ns)
+            self.is_quiet = False
+            return
         channel = self.channels[request.channel] = _KINDS[type(request)](self, request)
         self.is_quiet = False
         try:
@@ -110,6 +98,22 @@ class TcpLink(SocketLink):
             channel.open(now_ns)
         except OSError as error:
             channel.failed(errno_name(error))
+
+    def _is_under_faults(self, request: Connect) -> bool:
+        relays, local = self.network.relays, Peer(self.address, request.local_port)
+        return bool(relays.faults) and self.is_seen and not self.network.closed and relays.concern(local, request.remote)
+
+
+class _LinkBehind(TcpLink):
+    """The link of connections of the host behind those of a unit, which the relays ask for events."""
+
+    is_seen = False
+
+    def events(self, now_ns: int) -> Sequence[Event]:
+        for there in list(self.waiting):
+            there.fetch(now_ns)
+        events, self.pending = self.pending, []
+        return events
 
 
 # --- channels ------------------------------------------------------------------------------------------------------
@@ -129,15 +133,26 @@ class _Listener(HostChannel):
 
     def open(self, now_ns: int) -> None:
         if not any(listener.sock for listener in self._listeners()):
-            self.sock = sock = self.link.network.take_kept(self.local)
+            self.sock = sock = self.link.network.waiting.take(self.local)
             if sock is None:
-                sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
-                sock.listen()
+                sock = self._listen()
             self.network.watch(sock, READ, self)
-        if waiting := self.link.network.held.pop(self.local, []):
+        if waiting := self.link.network.waiting.held.pop(self.local, []):
             while waiting and self._listeners():
                 self._let_in(*waiting.pop(0), now_ns, has_waited=True)
-            self.link.network.held[self.local] = waiting + self.link.network.held.get(self.local, [])
+            self.link.network.waiting.held[self.local] = waiting + self.link.network.waiting.held.get(self.local, [])
+
+    def _listen(self) -> socket.socket:
+        """The host's socket for this endpoint.  Raises OSError."""
+        real = self.network.listening_endpoint(self.local)
+        try:
+            sock = self.make(socket.SOCK_STREAM, real)
+            sock.listen()
+        except OSError as error:
+            self.network.notices.note(NoticeKind.UNUSABLE, self.local, real, why_unusable(error))
+            raise
+        self.network.notices.note(NoticeKind.LISTENING, self.local, real)
+        return sock
 
     def end(self) -> None:
         heir = next(iter(self._listeners()), None)
@@ -147,7 +162,7 @@ class _Listener(HostChannel):
         if sock and heir:
             heir.sock = sock
             self.network.watch(sock, READ, heir)
-        elif sock and not self.link.network.keep(self.local, sock):
+        elif sock and not self.link.network.waiting.keep(self.link, self.local, sock):
             if self._has_caller:
                 self._hold(sock)
             sock.close()
@@ -156,7 +171,7 @@ class _Listener(HostChannel):
     def _hold(self, sock: socket.socket) -> None:
         """Holds the callers that the host has accepted beside the one who takes the last listener; the others would be reset
         when the socket is closed, and this is the last moment before that."""
-        held = self.link.network.held.setdefault(self.local, [])
+        held = self.link.network.waiting.held.setdefault(self.local, [])
         with suppress(OSError):
             while len(held) < MAX_HELD:
                 conn, name = sock.accept()
@@ -172,16 +187,18 @@ class _Listener(HostChannel):
                 if not isinstance(error, BlockingIOError | ConnectionAbortedError):
                     self.failed(errno_name(error))
                 return
-            self._let_in(conn, Peer(*name), now_ns, has_waited=self.link.network.backlog)
+            self._let_in(conn, Peer(*name), now_ns, has_waited=self.link.network.waiting.keeps)
 
     def _let_in(self, conn: socket.socket, real: Peer, now_ns: int, has_waited: bool) -> None:
         """Gives a caller that the host has accepted to the first listener that it fits; resets a stranger.  Who `has_waited` may
         have left in the meantime."""
         network, listeners = self.link.network, self._listeners()
         remote = network.inward(TCP, real)
-        if has_waited and _has_left(conn):
+        if has_waited and has_left(conn):
             conn.close()
-        elif listener := next((listener for listener in listeners if fits(listener._request.remote, remote)), None):
+        elif (listener := next((listener for listener in listeners if fits(listener._request.remote, remote)), None)) and not (
+            network.relays.refuse(self.local, remote)
+        ):
             listener._has_caller = True
             del listener.link.channels[listener.channel]
             listener.end()
@@ -190,8 +207,28 @@ class _Listener(HostChannel):
             connection.granted = listener.granted
             connection.accept(conn, now_ns)
         else:
+            network.notices.note(NoticeKind.TURNED_AWAY, self.local, real)
             with suppress(OSError), conn:
-                conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+                reset_on_close(conn)
+
+    def meet_faults(self, relays: Relays, now_ns: int) -> None:
+        """A fault that refuses every caller shuts the host's socket; a silent one leaves callers waiting in the host."""
+        listeners = self._listeners()
+        if listeners[0] is not self:
+            return
+        fault = relays.door(self.local)
+        holder = next((listener for listener in listeners if listener.sock), None)
+        if fault.error and holder and holder.sock and not fault.silent:
+            self.network.watch(holder.sock, 0, holder)
+            holder.sock.close()
+            holder.sock = None
+        elif holder and holder.sock:
+            self.network.watch(holder.sock, 0 if fault.silent else READ, holder)
+        elif not fault.error:
+            try:
+                self.open(now_ns)
+            except OSError as error:
+                self.failed(errno_name(error))
 
     def _listeners(self) -> list[_Listener]:
         """The listeners on the same port, by number."""
@@ -199,23 +236,12 @@ class _Listener(HostChannel):
         return [listener for listener in there if isinstance(listener, _Listener) and listener.local == self.local]
 
 
-def _has_left(conn: socket.socket) -> bool:
-    """True if a caller has ended the connection before anybody took it, and has said nothing."""
-    conn.setblocking(False)
-    try:
-        return not conn.recv(1, socket.MSG_PEEK)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-
-
 class _Connection(HostChannel):
     """A TCP connection, open once it is `_connected`.
 
     An `_orphan` has been closed by its unit: it sends its data, then FIN, and waits for the peer's FIN."""
 
-    _connected = _orphan = _stalled = _fin_sent = _fin_seen = False
+    _connected = _active = _orphan = _stalled = _fin_sent = _fin_seen = False
     _taken = 0
 
     def __init__(self, link: SocketLink, request: Connect) -> None:
@@ -225,6 +251,7 @@ class _Connection(HostChannel):
         self._outbox: deque[bytes] = deque()
 
     def open(self, now_ns: int) -> None:
+        self._active = True
         error = impossible(self.local, self.remote)
         if error:
             raise OSError(getattr(errno, error), error)
@@ -256,6 +283,7 @@ class _Connection(HostChannel):
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, self._keep_alive)
 
     def _refused(self, code: int, now_ns: int) -> None:
+        self.network.notices.note(NoticeKind.UNREACHED, self.remote, self.network.outward(self.remote), errno_name(code))
         if code == errno.ECONNREFUSED:
             self._tap(now_ns, TapKind.RST, False)
         self.failed(errno_name(code))
@@ -333,8 +361,12 @@ class _Connection(HostChannel):
         if self.sock:
             self._tap(now_ns, TapKind.RST, True)
             with suppress(OSError):
-                self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+                reset_on_close(self.sock)
             self.end()
+
+    def meet_faults(self, relays: Relays, now_ns: int) -> None:
+        if self._connected and relays.concern(self.local, self.remote) and (self._active or not relays.is_unit(self.remote)):
+            relays.take_over(self, self.local, self.remote, len(self._outbox), self._fin_seen)
 
     def _receive(self, sock: socket.socket, now_ns: int) -> None:
         wanted = min(self.granted, BUFFER_BYTES)
@@ -412,8 +444,7 @@ class _Connection(HostChannel):
             self.link.pending.append(event)
 
     def _tap(self, now_ns: int, what: TapKind, out: bool, data: bytes = b"") -> None:
-        if self.network.tap:
-            self.network.tell(now_ns, what, self.local, self.remote, out, data)
+        self.tell(now_ns, what, self.remote, out, data)
 
 
 _KINDS: dict[type, Callable[..., HostChannel]] = {Connect: _Connection, Listen: _Listener, Bind: UdpPort}

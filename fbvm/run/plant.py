@@ -21,6 +21,7 @@ from fbvm.run.running import Running, TimedWrite
 from fbvm.run.toml_keys import Path, span
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, conform, parse_value
+from fbvm.wire.link import Peer
 from fbvm.wire.registers import server
 
 MANY = 10
@@ -57,7 +58,8 @@ class Plant:
 
     `net` ("loop" or "tcp") takes the place of the file's; `for_ns` and `scans`, if one is given, take the place of the file's
     bounds for PLCs that have no end of their own; `wanted` says which warnings are shown.  Mistakes of the project are in
-    `diagnostics`; if there is an error, the plant is closed.  Raises OSError if the host's network cannot be used."""
+    `diagnostics`; if there is an error, the plant is closed.  Raises OSError if the host's network cannot be used, or not by a
+    door."""
 
     def __init__(
         self, project: Project, *, net: str | None = None, for_ns: int | None = None, scans: int | None = None,
@@ -66,6 +68,8 @@ class Plant:
         self.project, self._wanted = project, wanted
         self.diagnostics: list[Diagnostic] = []
         self.kinds = [Kind(row) for row in project.plcs]
+        self.doors: dict[Peer, Peer] = {}
+        """With real connections: the endpoints of units that others reach, and where on the host each is."""
         self.network = _network(project, net or project.net)
         given = for_ns is not None or scans is not None
         self.for_ns = for_ns if given else project.for_ns
@@ -74,8 +78,16 @@ class Plant:
             image = self._image(kind.row)
             if image:
                 self._build(kind, image)
+        if (net or project.net) != project.net:
+            self.diagnostics += project.wrong_on(net or project.net)
         if errors(self.diagnostics):
             self.close()
+        elif isinstance(self.network, TcpNetwork):
+            try:
+                self.doors = self.network.try_doors([said for said, _ in project.doors])
+            except OSError:
+                self.close()
+                raise
 
     @property
     def runs(self) -> list[Running]:
@@ -181,7 +193,7 @@ def _value(where: Place | Span, written: object) -> object:
 def _network(project: Project, net: str) -> LoopNetwork | TcpNetwork:
     if net == "tcp":
         rows = {said: real for said, real in project.servers if real is not None} | dict(project.doors)
-        return TcpNetwork(rows)
+        return TcpNetwork(rows, seed=project.seed, faults=project.faults)
     network = LoopNetwork(project.seed, faults=project.faults)
     for said, _ in project.servers:
         network.place(said, ModbusPeer(server()))

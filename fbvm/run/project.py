@@ -21,7 +21,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,8 @@ from fbvm.base.host import foreign_path
 from fbvm.engine.choice.tiers import CHOICES
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
-from fbvm.net.faults import FOREVER, KINDS, NO_FAULT, Fault
+from fbvm.net.faults import Fault
+from fbvm.run.fault_rows import FAULT, check_faults, fault_of, impossible_on_the_host
 from fbvm.run.project_reader import (
     Key,
     Keys,
@@ -73,22 +74,8 @@ SERVER: Keys = {
 }
 DOOR: Keys = {
     "address": Key(endpoint, "The address of a unit, and a port at which its program waits."),
-    "host": Key(host, "Where on the host others reach it; port 0: one that the system chooses."),
-}
-FAULT: Keys = {
-    "kind": Key(one_of(tuple(KINDS)), "A named fault, of which the other keys change single values.", None),
-    "peer": Key(endpoint, "Only connections with this endpoint; 0.0.0.0 and port 0 fit any.", None),
-    "from": Key(moment_ns, "Since when after power-on.", 0),
-    "until": Key(time_ns, "Until when after power-on; without it to the end.", FOREVER),
-    "latency": Key(time_ns, "How long data take for one way.", None),
-    "jitter": Key(time_ns, "How much longer than that at most, by the seed.", None),
-    "segment_bytes": Key(whole(1, 65535), "Data arrive in pieces of so many bytes.", None),
-    "gap": Key(moment_ns, "The time between two pieces.", None),
-    "join": Key(time_ns, "What is sent arrives together at multiples of this time.", None),
-    "random_cut": Key(flag, "Pieces have 1 to `segment_bytes` bytes, by the seed.", None),
-    "silent": Key(flag, "Nothing passes: a dead host, a pulled cable.", None),
-    "reset": Key(flag, "What is open breaks.", None),
-    "error": Key(text, "Opening fails at once with this errno name, such as ECONNREFUSED.", None),
+    "bind": Key(host, "Address and port of this computer where others reach it; port 0: one that the system chooses.", None),
+    "host": Key(host, "The former name of `bind`.", None),
 }
 UNIT: Keys = {
     "type": Key(one_of(tuple(UNIT_KINDS)), "What kind of unit it is.", "ETN21"),
@@ -133,7 +120,7 @@ PROJECT: Keys = {
     "run": Key(RUN, "The run as a whole.", None),
     "server": Key(SERVER, "A Modbus TCP server that programs talk to.", (), many=True),
     "door": Key(DOOR, "Where others reach a unit with real connections.", (), many=True),
-    "fault": Key(FAULT, "What goes wrong on the network in memory; of several rows that fit the first counts.", (), many=True),
+    "fault": Key(FAULT, "What goes wrong on the network; of several rows that fit the first counts.", (), many=True),
     "plc": Key(PLC, "A PLC, or several equal ones, by name.", named=True),
 }
 
@@ -201,6 +188,14 @@ class Project:
     plcs: tuple[PlcRow, ...]
     """The PLCs, in the order of the file."""
 
+    def wrong_on(self, net: str) -> list[Diagnostic]:
+        """What the file says and cannot be done on this network, "loop" or "tcp"."""
+        reading = Reading(self.source)
+        if net == "tcp":
+            for number, message in impossible_on_the_host(self.faults, (endpoint for endpoint, _ in self.doors)):
+                reading.report("P0103", ("fault", number), message)
+        return reading.diagnostics
+
 
 def project_file(path: Path) -> Path | None:
     """The project file for a path: itself if it is a .toml file, `fbvm.toml` in a folder; None for any other."""
@@ -209,8 +204,10 @@ def project_file(path: Path) -> Path | None:
     return path if path.suffix == ".toml" and path.is_file() else None
 
 
-def read_project(path: Path) -> Project | list[Diagnostic]:
-    """Reads a project file.  Returns the project, or all diagnostics of the file; sources are not read yet."""
+def read_project(path: Path, *, allow_outside: bool = False) -> Project | list[Diagnostic]:
+    """Reads a project file.  Returns the project, or all diagnostics of the file; sources are not read yet.
+
+    Sources and libraries have to be in the folder of the file or below, unless `allow_outside`."""
     found = read(path, str(path), most_bytes=SETTINGS_BYTES)
     if isinstance(found, Diagnostic):
         return [found]
@@ -224,24 +221,49 @@ def read_project(path: Path) -> Project | list[Diagnostic]:
     if not errors(reading.diagnostics):
         _check_units(reading, table["plc"])
         _check_paths(reading, table["plc"], path.parent)
+        _check_endpoints(reading, table)
+        check_faults(reading, table["fault"])
+        if not allow_outside:
+            _check_inside(reading, table["plc"], path.parent)
     if errors(reading.diagnostics):
         return sorted(reading.diagnostics, key=Diagnostic.order)
     run = table["run"] or {name: key.default for name, key in RUN.items()}
-    return Project(
+    made = Project(
         found, run["net"], run["seed"], run["for"], run["scans"],
         tuple((row["address"], row["host"]) for row in table["server"]),
-        tuple((row["address"], row["host"]) for row in table["door"]),
-        tuple(_fault(row) for row in table["fault"]),
+        tuple((row["address"], row["bind"] or row["host"]) for row in table["door"]),
+        tuple(fault_of(row) for row in table["fault"]),
         tuple(_plc(name, row, path.parent) for name, row in table["plc"].items()),
     )  # fmt: skip
+    return made.wrong_on(made.net) or made
 
 
-def _fault(row: Mapping[str, Any]) -> Fault:
-    """The fault of that kind, with what is written besides."""
-    named = {"peer": "peer", "from": "from_ns", "until": "until_ns", "latency": "latency_ns", "jitter": "jitter_ns",
-             "gap": "gap_ns", "join": "join_ns"}  # fmt: skip
-    written = {named.get(key, key): value for key, value in row.items() if key != "kind" and value is not None}
-    return replace(KINDS[row["kind"]] if row["kind"] else NO_FAULT, **written)
+def _check_endpoints(reading: Reading, table: Mapping[str, Any]) -> None:
+    """Reports doors that say not, or twice, where they are, and endpoints with two rows."""
+    for number, row in enumerate(table["door"]):
+        if row["bind"] is None and row["host"] is None:
+            reading.report("P0104", ("door", number), f"door {number + 1}.bind is missing", DOOR["bind"].meaning)
+        if row["bind"] is not None and row["host"] is not None:
+            reading.report("P0103", ("door", number, "host"), f"door {number + 1} has bind and host, which are the same")
+    for name in ("server", "door"):
+        known: dict[Peer, int] = {}
+        for number, row in enumerate(table[name]):
+            first = known.setdefault(row["address"], number)
+            if first != number:
+                reading.report("P0103", (name, number), f"{name} {number + 1} has the address of {name} {first + 1}")
+
+
+def _check_inside(reading: Reading, plcs: Mapping[str, Any], folder: Path) -> None:
+    """Reports sources and libraries that lie outside of the project's folder, also by a link."""
+    root = folder.resolve()
+    for name, row in plcs.items():
+        for key in ("sources", "libraries"):
+            for written in row[key]:
+                found = (folder / written).resolve()
+                is_device = found.exists() and not found.is_file() and not found.is_dir()  # which the reader refuses
+                if not found.is_relative_to(root) and not is_device:
+                    reading.report("P0103", ("plc", name, key), f"plc.{name}.{key}: {written} is outside of the project",
+                                   "paths stay inside the folder of the project file; --allow-outside takes others, too")
 
 
 def _options(unit: Mapping[str, Any]) -> dict[str, Any]:

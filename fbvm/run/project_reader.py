@@ -203,6 +203,11 @@ def one_of(names: Sequence[str]) -> Kind:
     return Kind(" or ".join(f'"{name}"' for name in names), value_of)
 
 
+def kind_of_text(called: str, value: Callable[[object], str]) -> Kind:
+    """A text of which `value` says what is wrong by ValueError."""
+    return Kind(called, value)
+
+
 text = Kind("a text", _text)
 texts = Kind("a list of texts", _texts)
 flag = Kind("true or false", _flag)

@@ -29,10 +29,11 @@ class PlantRig:
 
     Times are text ("50ms") or integers of nanoseconds."""
 
-    def __init__(self, path: Path) -> None:
-        """Raises SubjectError with all that is wrong with the project or its programs."""
+    def __init__(self, path: Path, allow_outside: bool = False) -> None:
+        """With `allow_outside` sources may lie outside of the project's folder.  Raises SubjectError with all that is wrong
+        with the project or its programs."""
         __tracebackhide__ = True
-        project = read_project(path)
+        project = read_project(path, allow_outside=allow_outside)
         if not isinstance(project, Project):
             raise _wrong(project)
         self._plant = Plant(project, net="loop")

@@ -1,17 +1,24 @@
-"""A soak of the blocks and of scans: python tests/bench/soak.py [scans|memory|sockets|all].
+"""A soak of the blocks and of scans: python tests/bench/soak.py [scans|memory|sockets|reconnects|all] [SECONDS].
 
 `scans` is 10,000,000 scans in virtual time, in one piece and one by one, of a program with timers, counters and texts; at the end
 each timer has ended exactly as often as its time fits into the time that has passed.
 `memory` is one hour of the PLC's time in virtual time, over a network that cuts and joins as it likes; `sockets` is two
-minutes on real connections to a server in a process of its own.  All blocks are busy all the time.  Prints what was
-done and what the process holds as it goes; ends with an error if a command fails, a word is wrong, or anything grows.
+minutes on real connections to a server in a process of its own.  All blocks are busy all the time.
+`reconnects` is ten minutes (or SECONDS) of eight clients that come and go at a server program, while every kind of fault is
+switched at its door: at the end of each part all eight have to be served at once.  Prints what was done and what the process
+holds as it goes; ends with an error if a command fails, a word is wrong, or anything grows.
 """
 
 from __future__ import annotations
 
+import json
+import random
+import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 HOUSE = Path(__file__).resolve().parents[2]
@@ -21,8 +28,9 @@ from soak_plant import BLOCKS, SERVER, UNIT_ADDRESS, Usage, check, contents, pla
 
 from fbvm import Etn21, LoopNetwork, ModbusPeer, Plc, TcpNetwork, compile_text  # noqa: E402
 from fbvm.cli.running.demo import modbus_server  # noqa: E402
-from fbvm.net.faults import Fault  # noqa: E402
+from fbvm.net.faults import KINDS, Fault  # noqa: E402
 from fbvm.run import run  # noqa: E402
+from fbvm.wire.link import Peer  # noqa: E402
 
 SECOND_NS = 1_000_000_000
 MEMORY_S, SOCKETS_S = 3600, 120
@@ -130,9 +138,75 @@ def sockets() -> None:
             network.close()
 
 
+# --- reconnects ---------------------------------------------------------------------------------------------------------
+
+RECONNECTS_S, RECONNECT_PARTS, SWITCH_NS = 600, 10, SECOND_NS
+SERVER_PROGRAM = """
+PROGRAM Main
+VAR Level AT D1000 : UINT; Server : ETN_Modbus_Server := (Sockets := 8, Idle_Time := T#2s); END_VAR
+    Server();
+    Level := 77;
+END_PROGRAM
+"""
+SERVER_DOOR = Peer("192.168.250.21", 502)
+
+
+def switched(dice: random.Random, changes_bytes: bool) -> list[Fault]:
+    """No fault in one of three times, else one of the kinds; of those that change what is said only with `changes_bytes`."""
+    ms = 1_000_000
+    changed = {"slow": {"latency_ns": 5 * ms}, "unsteady": {"jitter_ns": 8 * ms}, "dripping": {"gap_ns": ms},
+               "joined": {"join_ns": 20 * ms}, "lossy": {"lose_percent": 20}, "doubled": {"duplicate_percent": 20},
+               "interrupted": {"reset_after_bytes": 20}}  # fmt: skip
+    kind = dice.choice([kind for kind in KINDS if changes_bytes or kind not in ("lossy", "doubled")])
+    return [] if dice.random() < 1 / 3 else [replace(KINDS[kind], peer=SERVER_DOOR, **changed.get(kind, {}))]
+
+
+def reconnects(seconds: int) -> None:
+    made = compile_text(SERVER_PROGRAM)
+    assert made.image is not None, [message.render() for message in made.diagnostics]
+    plc, network, dice = Plc(made.image, CYCLE_NS), TcpNetwork({SERVER_DOOR: ("127.0.0.1", 0)}, seed=1), random.Random(1)
+    plc.attach(Etn21(0, SERVER_DOOR.host), network)
+    port, first, total, lost = network.host_endpoint(SERVER_DOOR).port, None, Counter[str](), 0
+    run(plc, for_ns=SECOND_NS)
+    began_s = time.time()
+    try:
+        for part in range(RECONNECT_PARTS):
+            clients = subprocess.Popen(
+                [sys.executable, str(HOUSE / "tests" / "bench" / "reconnecting_clients.py"), str(port), str(part)],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)  # fmt: skip
+            for _ in range(seconds // RECONNECT_PARTS):
+                network.faults[:] = switched(dice, part % 2 == 1)
+                run(plc, for_ns=SWITCH_NS)
+            network.faults.clear()
+            assert clients.stdin and clients.stdout
+            clients.stdin.write("end\n")
+            clients.stdin.flush()
+            while clients.poll() is None:
+                run(plc, for_ns=SWITCH_NS // 4)
+            counts = Counter(json.loads(clients.stdout.read()))
+            clients.stdin.close()
+            clients.stdout.close()
+            lost += 8 - counts.pop("served at once", 0)
+            assert part % 2 == 1 or not counts["wrong"], "a reply is wrong although no fault changes what is said"
+            total += counts
+            run(plc, for_ns=4 * SECOND_NS)  # what was left open ends by its idle time
+            now = usage()
+            show(plc, total["right"], began_s, now)
+            first = first or now
+            assert now.handles == first.handles, "handles are not constant"
+            assert now.objects <= first.objects + GROWTH_OBJECTS, "objects grow"
+            assert now.resident_bytes <= first.resident_bytes + GROWTH_BYTES, "memory grows"
+            assert network.relays.carried == {}, "a connection is still led through wires"
+    finally:
+        network.close()
+    print(f"{dict(total)}\n{lost} slots lost; {plc.lateness}; {plc.lateness.missed} periods missed of {plc.scans:,}")
+    assert not lost, "not all of eight clients were served at once"
+
+
 if __name__ == "__main__":
     wanted = sys.argv[1] if len(sys.argv) > 1 else "all"
-    for name, work in (("scans", scans), ("memory", memory), ("sockets", sockets)):
+    for_s = int(sys.argv[2]) if len(sys.argv) > 2 else RECONNECTS_S
+    for name, work in (("scans", scans), ("memory", memory), ("sockets", sockets), ("reconnects", lambda: reconnects(for_s))):
         if wanted in (name, "all"):
             print(f"--- {name}")
             work()

@@ -38,7 +38,7 @@ address = "192.168.250.21"
 """
 PAIR = """
 [plc.station]
-sources = ["{server}"]
+sources = ["server.st"]
 [[plc.station.unit]]
 address = "192.168.250.2"
 [[door]]
@@ -71,8 +71,9 @@ def test_many_plcs_read_from_one_server(tmp_path: Path, net: str, make: str) -> 
 @pytest.mark.parametrize("net", ["loop", "tcp"])
 def test_plcs_talk_to_each_other(tmp_path: Path, net: str) -> None:
     example = Path(__file__).resolve().parents[2] / "examples" / "server.st"
+    (tmp_path / "server.st").write_bytes(example.read_bytes())
     (tmp_path / "client.st").write_text(CLIENT % 2, encoding="utf-8")
-    (tmp_path / "fbvm.toml").write_text(PAIR.format(server=example.as_posix()), encoding="utf-8")
+    (tmp_path / "fbvm.toml").write_text(PAIR, encoding="utf-8")
     project = read_project(tmp_path / "fbvm.toml")
     assert isinstance(project, Project)
     plant = Plant(project, net=net)

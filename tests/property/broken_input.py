@@ -43,6 +43,7 @@ address = "192.168.250.1:502"
 
 [[fault]]
 kind = "slow"
+latency = "5ms"
 
 [plc.One]
 sources = ["counter.st"]

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.machine.backplane import UNITS
-from fbvm.net.faults import FOREVER, KINDS, NO_FAULT
+from fbvm.net.faults import FOREVER, NAMED
 from fbvm.run import project
+from fbvm.run.fault_rows import key_of, settings
 from fbvm.run.project_reader import REQUIRED, Key, Keys, Kind
 from fbvm.watch.values import show_time
 from product_pages.markdown import code, fence, page, table
@@ -28,8 +29,9 @@ def pages() -> dict[str, str]:
     for name, key in project.PROJECT.items():
         parts += _table(name, key, name)
     parts += ["## Keys of a unit by its type", *_units(), "## Kinds of faults",
-              "`kind` of a `[[fault]]` names one of these; keys beside it change single values.",
-              table(("kind", "what it sets"), [(code(kind), _fault(kind)) for kind in KINDS])]  # fmt: skip
+              "`kind` of a `[[fault]]` names one of these; keys beside it set or change single values. `fbvm explain fault` "
+              "prints them.",
+              table(("kind", "what happens, and what it sets"), [(code(kind), _fault(kind)) for kind in NAMED])]  # fmt: skip
     return {NAME: page(*parts)}
 
 
@@ -79,13 +81,6 @@ def _shown(argument: str, value: object) -> str:
 
 
 def _fault(kind: str) -> str:
-    """What a kind of fault sets, in the keys of the file."""
-    named = {"from_ns": "from", "until_ns": "until", "latency_ns": "latency", "jitter_ns": "jitter", "gap_ns": "gap",
-             "join_ns": "join"}  # fmt: skip
-    fault = KINDS[kind]
-    written = []
-    for field in fault.__dataclass_fields__:
-        value = getattr(fault, field)
-        if value != getattr(NO_FAULT, field):
-            written.append(f"`{named.get(field, field)} = {_shown(field, value).strip('`')}`")
-    return ", ".join(written)
+    """What a kind of fault sets, in the keys of the file; `...` stands for what a row has to say itself."""
+    needed = [key_of(field) for field in NAMED[kind].needed]
+    return f"{NAMED[kind].meaning}: " + ", ".join(f"`{key} = {value}`" for key, value in settings(NAMED[kind].fault, needed))

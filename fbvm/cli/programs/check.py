@@ -14,7 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.lint.suppression import Wanted
 from fbvm.cli.shared import status
 from fbvm.cli.shared.paths import SourcePath
-from fbvm.cli.shared.project_arguments import check_project_options, project_argument
+from fbvm.cli.shared.project_arguments import allow_outside_option, check_project_options, project_argument, read_given_project
 from fbvm.cli.shared.sources import compile_options, report_diagnostics, source_options
 from fbvm.code.compiler import LONG, compile_files
 
@@ -28,6 +28,7 @@ PROJECT_OPTIONS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-
 @click.option("--no-warn", metavar="CODE", multiple=True,
               help="Do not warn of that, such as S0390, or of `all`; may be repeated, or a list with commas.")
 @click.option("--warnings-as-errors", is_flag=True, help="A warning counts as an error.")
+@allow_outside_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], no_warn: tuple[str, ...],
             warnings_as_errors: bool, as_json: bool) -> None:
@@ -67,9 +68,9 @@ def _progress(files: tuple[Path, ...]) -> AbstractContextManager[Callable[[str, 
 def _of_project(file: Path, wanted: Wanted) -> list[Diagnostic]:
     """The diagnostics of a project file and of the programs of its PLCs, without duplicates."""
     from fbvm.run.plant import Plant
-    from fbvm.run.project import Project, read_project
+    from fbvm.run.project import Project
 
-    project = read_project(file)
+    project = read_given_project(file)
     if not isinstance(project, Project):
         return project
     one_each = tuple(replace(row, count=row.count and 1) for row in project.plcs)

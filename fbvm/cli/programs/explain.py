@@ -8,6 +8,7 @@ from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
 from fbvm.check import block_pages, instructions
+from fbvm.cli.shared.terminal import say
 from fbvm.syntax.ladder.instructions.instruction_set import meant, spelling
 
 
@@ -19,27 +20,33 @@ def command(code: str | None) -> None:
     `fbvm explain MOV` says what an instruction of ladder does, with its operands and flags; `fbvm explain TON` what a block
     or function of the libraries does, with its pins.
 
-    `fbvm explain dialects` says what compilers disagree about, and which answers --dialect chooses."""
+    `fbvm explain dialects` says what compilers disagree about, and which answers --dialect chooses; `fbvm explain fault` which
+    kinds of faults a network has, and their keys."""
     if code is None:
         for row in CODES.values():
-            click.echo(f"{row.code}  {row.severity:<7}  {row.title}")
+            say(f"{row.code}  {row.severity:<7}  {row.title}")
         return
     if code.strip().lower() == "dialects":
-        click.echo(dialects.page())
+        say(dialects.page())
+        return
+    if code.strip().lower() in ("fault", "faults"):
+        from fbvm.run import fault_rows
+
+        say(fault_rows.page())
         return
     if (instruction := instructions.find(code)) is not None:
-        click.echo(instructions.page(instruction))
+        say(instructions.page(instruction))
         return
     if (block := block_pages.page(code)) is not None:
-        click.echo(block)
+        say(block)
         return
     try:
-        click.echo(page(code))
+        say(page(code))
     except UnknownCode as error:
         named = [found.mnemonic for name in meant(spelling(code)) if (found := instructions.find(name))]
         said = f"\nOr the instruction {' or '.join(named)}?" if named else ""
         raise click.UsageError(f"{error}{said}\n`fbvm explain` alone lists all.") from None
     code = code.strip().upper()
     if CODES[code].severity == "warning":
-        click.echo(f"\nSwitch it off in a text with {{warning disable {code}}} .. {{warning restore {code}}}, or for a whole "
+        say(f"\nSwitch it off in a text with {{warning disable {code}}} .. {{warning restore {code}}}, or for a whole "
                    f"check with\n`fbvm check --no-warn {code}`.")

@@ -19,6 +19,7 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.sources import show_diagnostic
+from fbvm.cli.shared.terminal import named, say, say_exactly
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.formatter.names import Outside
 from fbvm.syntax.parser import parse
@@ -54,7 +55,7 @@ def _found(paths: Iterable[Path]) -> list[Path]:
         inside = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".st" and file.is_file())
         found.update(dict.fromkeys(inside if path.is_dir() else [path]))
         if path.is_dir() and not inside:
-            click.echo(f"{path}: no file in this folder ends in .st", err=True)
+            say(f"{named(path)}: no file in this folder ends in .st", err=True)
     return list(found)
 
 
@@ -72,20 +73,22 @@ def _one(path: Path, check: bool, diff: bool) -> bool | None:
         return None
     changes = text != source.text
     if diff:
-        click.echo("".join(_difference(source, text)), nl=False)
+        say_exactly("".join(_difference(source, text)))
     elif check:
         if changes:
-            click.echo(source.name)
+            say(named(source.name))
+    elif path == STREAM and sys.stdout.isatty():
+        say_exactly(text)
     elif path == STREAM:
         sys.stdout.buffer.write(_encoded(source.text, text, data))
     elif changes:
         _replace(path, _encoded(source.text, text, data))
-        click.echo(str(path))
+        say(named(path))
     return changes
 
 
 def _left_alone(name: str, why: str) -> None:
-    click.secho(f"{name} is left as it is: {why}", bold=True, err=True)
+    say(f"{named(name)} is left as it is: {why}", bold=True, err=True)
 
 
 def _read(path: Path) -> tuple[Source | None, bytes]:
@@ -126,7 +129,7 @@ def _replace(path: Path, data: bytes) -> None:
 def _difference(source: Source, text: str) -> Iterator[str]:
     """The changes as a unified diff."""
     before, after = source.text.splitlines(keepends=True), text.splitlines(keepends=True)
-    for line in unified_diff(before, after, source.name, source.name):
+    for line in unified_diff(before, after, named(source.name), named(source.name)):
         yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
 
 

@@ -13,6 +13,7 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
+from fbvm.cli.shared.terminal import say
 from fbvm.interchange.plcopen.read.importing import import_xml
 
 
@@ -40,6 +41,6 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
                 (folder / name).unlink()  # the file goes into the folder, not where a link leads
             write_file(folder / name, text)
     for name in made.files if not as_json else ():
-        click.echo(str(folder / name))
+        say(str(folder / name))
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)

@@ -11,6 +11,7 @@ from fbvm.cli.shared.drawings import SVG_WIDTH, print_lines, rung_lines, symbol_
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.sources import compile_or_exit, source_arguments
+from fbvm.cli.shared.terminal import say
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.ladder_text import ladder_surface
 from fbvm.syntax.ladder.drawing.widths import Annotations
@@ -36,5 +37,5 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     for rung in image.rungs:
         if rung.body != body:
             body = rung.body
-            click.echo(f"{image.bodies[body].kind} {image.bodies[body].name}")
+            say(f"{image.bodies[body].kind} {image.bodies[body].name}")
         print_lines(rung_lines(image, rung, width or chart_width()))

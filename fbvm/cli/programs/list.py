@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from fbvm.cli.shared.sources import compile_or_exit, source_arguments
+from fbvm.cli.shared.terminal import say
 from fbvm.code.listing import listing
 from fbvm.engine.native.emit.module import translate
 
@@ -17,4 +18,4 @@ from fbvm.engine.native.emit.module import translate
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], as_native: bool) -> None:
     """Print what the files compile to: tasks, layout, symbols and the code of each POU."""
     image = compile_or_exit(files, program, libraries, runnable=False)
-    click.echo(translate(image).text if as_native else listing(image))
+    say(translate(image).text if as_native else listing(image))

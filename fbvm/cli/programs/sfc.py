@@ -11,6 +11,7 @@ from fbvm.cli.shared.drawings import SVG_WIDTH, print_lines
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.sources import compile_or_exit, source_arguments
+from fbvm.cli.shared.terminal import say
 from fbvm.code.image import Image, SfcPicture
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.sfc_text import LEAST, sfc_surface, sfc_text
@@ -32,7 +33,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
             write_file(svg, ladder_svg(drawn))
         return
     for chart in image.charts:
-        click.echo(_head(image, chart))
+        say(_head(image, chart))
         print_lines(sfc_text(chart, width or chart_width()))
 
 

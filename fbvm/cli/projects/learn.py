@@ -12,6 +12,7 @@ from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.paths import ExistingPath
+from fbvm.cli.shared.terminal import named, say
 
 FOLDER = "lessons"
 
@@ -47,18 +48,18 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
     if found is None:
         raise click.UsageError(f"there are lessons 1 to {len(lessons())}")
     if solved:
-        click.echo(found.solution())
+        say(found.solution())
         return
     with writing(folder):
         target = found.begin(folder)
     if not checked:
-        click.echo(found.text)
-        click.echo(f"Your files are in {target}.  When you are ready: fbvm learn {number} --check")
+        say(found.text)
+        say(f"Your files are in {named(target)}.  When you are ready: fbvm learn {number} --check")
         return
     if check(found, folder):
         sys.exit(status.FAILED)
     following = f"; the next one: fbvm learn {number + 1}" if number < len(lessons()) else "; that was the last one"
-    click.secho(f"lesson {number} is done{following}", fg="green")
+    say(f"lesson {number} is done{following}", fg="green")
 
 
 def _list(folder: Path) -> None:
@@ -66,8 +67,8 @@ def _list(folder: Path) -> None:
 
     for lesson in lessons():
         mark = "done" if is_done(lesson, folder) else "begun" if (folder / lesson.slug).is_dir() else ""
-        click.echo(f"{lesson.number:>4}  {lesson.title:<40}{mark}".rstrip())
-    click.echo("\nfbvm learn 1 begins with the first one")
+        say(f"{lesson.number:>4}  {lesson.title:<40}{mark}".rstrip())
+    say("\nfbvm learn 1 begins with the first one")
 
 
 def _class(learners: Path, out: Path) -> None:
@@ -75,13 +76,13 @@ def _class(learners: Path, out: Path) -> None:
     from fbvm.testing.lessons import check_class, lessons
 
     if out.resolve().is_relative_to(learners.resolve()):
-        raise click.UsageError(f"{out} lies among the learners of {learners}; choose another --report")
+        raise click.UsageError(f"{named(out)} lies among the learners of {named(learners)}; choose another --report")
     with writing(out):
         results = check_class(learners, out)
         page = out / "report.html"
         write_file(page, report(results, lessons(), out))
     if not results:
-        raise click.UsageError(f"{learners} holds no folders of learners")
+        raise click.UsageError(f"{named(learners)} holds no folders of learners")
     for line in summary(results, lessons()):
-        click.echo(line)
-    click.echo(f"written to {page}")
+        say(line)
+    say(f"written to {page}")

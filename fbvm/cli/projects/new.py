@@ -11,6 +11,7 @@ from fbvm.base.data import data_folder
 from fbvm.base.files import write_file
 from fbvm.base.host import portable
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.terminal import say
 
 EXAMPLE = "project"
 """The folder in `examples/` that is copied."""
@@ -47,7 +48,7 @@ def command(name: str) -> None:
             copy = target / path.relative_to(source)
             copy.parent.mkdir(parents=True, exist_ok=True)
             write_file(copy, path.read_text(encoding="utf-8").replace(TITLE, title))
-    click.echo(f"{name}/")
+    say(f"{name}/")
     for file, said in DESCRIPTIONS.items():
-        click.echo(f"  {file:<28}{said}")
-    click.echo(f"\ncd {name}\nfbvm test")
+        say(f"  {file:<28}{said}")
+    say(f"\ncd {name}\nfbvm test")

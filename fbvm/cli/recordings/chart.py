@@ -8,6 +8,7 @@ import click
 
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.run_result import chart_width
+from fbvm.cli.shared.terminal import say
 from fbvm.cli.shared.traces import open_trace, scans_option, trace_argument, waveforms_of
 from fbvm.record.draw.chart import draw
 
@@ -25,4 +26,4 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, width: int 
     with open_trace(path) as trace:
         chosen = [name for text in names for name in split_names(text)]
         made = waveforms_of(trace, chosen, scans)
-        click.echo(draw(made, width=width or chart_width(), ruler=True, compress=not whole), nl=False)
+        say(draw(made, width=width or chart_width(), ruler=True, compress=not whole), nl=False)

@@ -13,6 +13,7 @@ from fbvm.base.files import TABLE_BYTES, new_file, read_file, reason, write_file
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.paths import ExistingPath
+from fbvm.cli.shared.terminal import named
 from fbvm.cli.shared.traces import SUFFIX, open_trace, scans_option, waveforms_of
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
@@ -93,20 +94,20 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
             return
         write = FORMATS.get(target.suffix.lower())
         if write is None:
-            raise click.UsageError(f"{target}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
+            raise click.UsageError(f"{named(target)}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
         with open_trace(source) as trace:
             write(trace, [name for text in names for name in split_names(text)], scans, target)
 
 
 def _to_trace(source: Path, target: Path) -> None:
     if target.suffix.lower() != SUFFIX:
-        raise click.UsageError(f"{target}: a table becomes a trace; end it with {SUFFIX}")
+        raise click.UsageError(f"{named(target)}: a table becomes a trace; end it with {SUFFIX}")
     made = BytesIO()
     try:
         text = read_file(source, TABLE_BYTES).decode("utf-8-sig")
         read_csv(StringIO(text, newline=""), made)
     except OSError as error:
-        raise click.UsageError(f"{source} cannot be read: {reason(error)}") from None
+        raise click.UsageError(f"{named(source)} cannot be read: {reason(error)}") from None
     except (CsvError, UnicodeDecodeError) as error:
-        raise click.UsageError(f"{source}: {error}") from None
+        raise click.UsageError(f"{named(source)}: {error}") from None
     write_file(target, made.getvalue())

@@ -9,6 +9,7 @@ import click
 
 from fbvm.cli.shared import status
 from fbvm.cli.shared.options import split_names
+from fbvm.cli.shared.terminal import named, say
 from fbvm.cli.shared.traces import open_trace, scans_option, trace_argument
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.recorder import signals_at
@@ -26,13 +27,13 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool
     The trace must have been written with --depth writes or statements.  Status 1 if nothing changed."""
     with open_trace(path) as trace:
         if trace.depth is Depth.SCANS:
-            raise click.UsageError(f"{path} holds values at scan ends only; write it with --depth statements")
+            raise click.UsageError(f"{named(path)} holds values at scan ends only; write it with --depth statements")
         signals = [signal for text in names for name in split_names(text)
                    for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
         table = ScanTable(trace.sites, trace.names, signals, every)
         trace.follow(table, scans)
     bands = [band for band in table.bands if every or band.has_changes]
     if not bands:
-        click.echo("none of these changed", err=True)
+        say("none of these changed", err=True)
         sys.exit(status.FAILED)
-    click.echo(table.draw(bands))
+    say(table.draw(bands))

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from fbvm.cli.shared.paths import ExistingPath
+from fbvm.cli.shared.terminal import say
 from fbvm.cli.shared.traces import SUFFIX, open_trace
 from fbvm.record.draw.why import DEEPEST, cause_text, why
 from fbvm.record.trace.writer import Depth
@@ -32,7 +33,7 @@ def command(name: str, path: Path | None, scan: int | None, deep: int) -> None:
         if not trace.scans:
             raise click.UsageError("the trace has no scans yet")
         try:
-            click.echo(cause_text(trace, why(trace, place, trace.scans[-1] if scan is None else scan, deep)))
+            say(cause_text(trace, why(trace, place, trace.scans[-1] if scan is None else scan, deep)))
         except ValueError as error:
             raise click.UsageError(str(error)) from None
 

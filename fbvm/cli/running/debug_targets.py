@@ -10,6 +10,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import Mapping
+from fbvm.cli.shared.project_arguments import read_given_project
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.code.image import Image
 from fbvm.machine.backplane import usual_units
@@ -17,7 +18,7 @@ from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.run.plant import ENDLESS, Plant
-from fbvm.run.project import Project, read_project
+from fbvm.run.project import Project
 from fbvm.run.running import Running
 from fbvm.wire.tap import TapEvent
 
@@ -60,7 +61,7 @@ class ProjectTarget(DebugTarget):
 
     def __init__(self, file: Path, name: str | None) -> None:
         self.packets = []
-        project = read_project(file)
+        project = read_given_project(file)
         if not isinstance(project, Project):
             raise _refused(project)
         self._project = project

@@ -27,8 +27,8 @@ from rich.text import Text
 from fbvm.base.data import data_folder
 from fbvm.base.files import write_file
 from fbvm.base.host import can_end_others
-from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
+from fbvm.cli.shared.doors import LISTENING
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.code.compiler import compile_files
 from fbvm.machine.backplane import ETN21_ADDRESS

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import click
 
 from fbvm.base.areas import AREAS, Address, AddressError, parse_address
+from fbvm.cli.shared.terminal import say
 from fbvm.watch.paths import UnknownPlace, address_range
 
 
@@ -40,11 +41,11 @@ def command(ranges: tuple[str, ...]) -> None:
 
     `fbvm map D1000..D1002 'CIO 1.04'`; without an address the first and the last of each table."""
     addresses = [address for text in ranges for address in _range(text)] or list(_ends())
-    click.echo(FORMAT.format(*TITLES))
+    say(FORMAT.format(*TITLES))
     for address in addresses:
         rows = [row(table, address) for table in TABLES if _number(table, address) is not None]
         for line in rows or [(str(address), "not served", *[""] * 6)]:
-            click.echo(FORMAT.format(*line).rstrip())
+            say(FORMAT.format(*line).rstrip())
 
 
 def row(table: Table, address: Address) -> tuple[str, ...]:

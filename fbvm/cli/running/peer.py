@@ -5,22 +5,24 @@ from __future__ import annotations
 import asyncio
 import logging
 import sys
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
 from fbvm.base.host import ending_signals, handling
 from fbvm.cli.shared import status
+from fbvm.cli.shared.doors import LISTENING, unusable, warn_if_reachable
 from fbvm.cli.shared.ending import loading
+from fbvm.cli.shared.terminal import say
+from fbvm.net.tcp import TcpNetwork
 from fbvm.wire import registers
-
-LISTENING = "listening on "
-"""The beginning of the line with host and port."""
+from fbvm.wire.link import Peer
 
 
 @click.command("peer")
 @click.option("--port", type=click.IntRange(0, 65535), default=15020, show_default=True, help="0: any free port.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all.")
+@click.option("--bind", "--host", "host", default="127.0.0.1", show_default=True, metavar="ADDRESS",
+              help="Address of this computer to listen on; 0.0.0.0 is all.")
 @click.option("--trace", is_flag=True, help="Print the frames that come and go.")
 def command(port: int, host: str, trace: bool) -> None:
     """Serve Modbus TCP until Ctrl-C or SIGTERM, for every unit id.
@@ -32,13 +34,25 @@ def command(port: int, host: str, trace: bool) -> None:
             import pymodbus.server  # noqa: F401
     except ImportError:
         raise click.UsageError("pymodbus is missing: pip install 'fbvm[peer]'") from None
+    warn_if_reachable(Peer(host, port))
     try:
         asyncio.run(_serve(host, port, trace))
     except (KeyboardInterrupt, asyncio.CancelledError):
         sys.exit(status.GOOD)
+    except OSError:
+        _unusable(host, port)
+
+
+def _unusable(host: str, port: int) -> NoReturn:
+    """Says why the port cannot be used, which pymodbus does not tell, and ends the verb."""
+    network = TcpNetwork()
+    try:
+        network.try_door(Peer(host, port))
     except OSError as error:
-        click.echo(f"{host}:{port} cannot be used: {error}", err=True)
-        sys.exit(status.NETWORK)
+        unusable(error)
+    finally:
+        network.close()
+    unusable(OSError(f"{host}:{port} cannot be used"))
 
 
 async def _serve(host: str, port: int, trace: bool) -> None:
@@ -55,9 +69,9 @@ async def _listen(host: str, port: int, trace: bool) -> None:
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
     server: Any = ModbusTcpServer(device(), address=(host, port), trace_packet=_trace if trace else None)
     if not await server.listen():
-        raise OSError("somebody else listens there, or it is not an address of this host")
+        raise OSError("pymodbus says no more")
     _, bound_port = server.transport.sockets[0].getsockname()[:2]
-    click.echo(f"{LISTENING}{host}:{bound_port}")
+    say(f"{LISTENING}{host}:{bound_port}")
     sys.stdout.flush()
     try:
         await server.serving
@@ -78,6 +92,6 @@ def device() -> Any:
 
 def _trace(sending: bool, data: bytes) -> bytes:
     if data:
-        click.echo(f"{'->' if sending else '<-'} {data.hex(' ').upper()}")
+        say(f"{'->' if sending else '<-'} {data.hex(' ').upper()}")
         sys.stdout.flush()
     return data

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,13 +11,16 @@ from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
-from fbvm.cli.shared.project_arguments import check_project_options
+from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
+from fbvm.cli.shared.project_arguments import check_project_options, read_given_project
 from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, value_text
 from fbvm.cli.shared.sources import report_diagnostics, show_diagnostic
+from fbvm.cli.shared.terminal import say, say_json
 from fbvm.machine.scan_times import Lateness, ScanTimes
+from fbvm.net.tcp import TcpNetwork
 from fbvm.run import run_all
 from fbvm.run.plant import Kind, Plant
-from fbvm.run.project import Project, read_project
+from fbvm.run.project import Project
 from fbvm.run.running import Running
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
@@ -26,6 +28,7 @@ from fbvm.watch.values import Value, show_time
 
 OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json"}
 """The options that may be given with a project; all others are in its file."""
+HOW_TO_MAP = 'write [[door]] with address = "{endpoint}" and bind = "127.0.0.1:{port}"'
 
 
 def run_project(file: Path, context: click.Context) -> int:
@@ -35,19 +38,21 @@ def run_project(file: Path, context: click.Context) -> int:
     net = context.params["net"] if "net" in given else None
     for_ns, scans = context.params["for_ns"], context.params["scans"]
     as_json = context.params["as_json"]
-    project = read_project(file)
+    project = read_given_project(file)
     if not isinstance(project, Project):
         return _refuse(project, as_json)
     _check_end(project, net, for_ns, scans)
     try:
         plant = Plant(project, net=net, for_ns=for_ns, scans=scans)
     except OSError as error:
-        click.echo(f"the network cannot be used: {error.strerror or error}", err=True)
-        return status.NETWORK
+        unusable(error)
     if errors(plant.diagnostics):
         return _refuse(plant.diagnostics, as_json)
     for diagnostic in plant.diagnostics:
         show_diagnostic(diagnostic)
+    say_doors(plant.doors)
+    if isinstance(plant.network, TcpNetwork):
+        plant.network.notices.tell = notice_teller(HOW_TO_MAP, plant.doors)
     first = plant.runs[0].plc
     try:
         with RunProgress(None if as_json else first, plant.scans, plant.for_ns) as progress:
@@ -73,21 +78,21 @@ def _check_end(project: Project, net: str | None, for_ns: int | None, scans: int
 
 def _print(plant: Plant, as_json: bool, scan_time: bool) -> None:
     if as_json:
-        click.echo(json.dumps({"plcs": dict(_for_scripts(plant)), **(_measures(plant) if scan_time else {})}, allow_nan=False))
+        say_json({"plcs": dict(_for_scripts(plant)), **(_measures(plant) if scan_time else {})})
         return
     for kind in plant.kinds:
         for line in _lines(kind):
-            click.echo(line)
+            say(line)
         for name, run in zip(kind.names, kind.runs, strict=True):
             if run.plc.trap:
                 told = run.plc.trap.told(Names.of(run.plc.image, run.plc.memory.areas).instance)
-                click.secho(f"{name}: {told}", fg="red", err=True)
+                say(f"{name}: {told}", fg="red", err=True)
     if scan_time:
         for kind in plant.kinds:
             times, late = _measured(kind.runs, kind.row.cycle_ns)
-            click.echo(f"{kind.row.name}: {times}", err=True)
+            say(f"{kind.row.name}: {times}", err=True)
             if late.count:
-                click.echo(f"{kind.row.name}: {late}", err=True)
+                say(f"{kind.row.name}: {late}", err=True)
 
 
 def _lines(kind: Kind) -> Iterator[str]:

@@ -11,6 +11,7 @@ from fbvm.cli.shared import journals
 from fbvm.cli.shared.options import charted_names, show_option
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.run_result import RunResult
+from fbvm.cli.shared.terminal import say
 from fbvm.net.journal import JournalError
 from fbvm.record.trace.recorder import Recorder
 from fbvm.run.replay import Replay
@@ -47,9 +48,9 @@ def command(
     result = RunResult(replay.plc, _reason(replay, reason, until), places, recorder, as_json, until or "")
     result.print()
     if replay.differs is not None:
-        click.secho(f"after scan {replay.differs} the memory is not what the journal says", fg="red", err=True)
+        say(f"after scan {replay.differs} the memory is not what the journal says", fg="red", err=True)
     elif reason == "end" and not replay.complete:
-        click.secho(f"the journal was cut off after {replay.plc.scans} scans", fg="yellow", err=True)
+        say(f"the journal was cut off after {replay.plc.scans} scans", fg="yellow", err=True)
     sys.exit(result.status)
 
 

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from fbvm.cli.running.project import run_project
-from fbvm.cli.shared import status
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
+from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
 from fbvm.cli.shared.files import growing_file, writing
@@ -19,9 +20,13 @@ from fbvm.cli.shared.journals import start_journal
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import (
     CYCLE_NS,
+    Door,
     Mapping,
     Setting,
+    address,
+    bind_option,
     charted_names,
+    door,
     mapping,
     setting,
     show_option,
@@ -29,9 +34,10 @@ from fbvm.cli.shared.options import (
     watch_cycle_option,
 )
 from fbvm.cli.shared.paths import SourcePath
-from fbvm.cli.shared.project_arguments import project_argument
+from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
 from fbvm.cli.shared.run_result import RunProgress, RunResult
 from fbvm.cli.shared.sources import compile_or_exit, source_options
+from fbvm.cli.shared.terminal import say
 from fbvm.cli.shared.traces import statement_lines, write_page, write_trace
 from fbvm.code.image import Image
 from fbvm.engine.choice.tiers import CHOICES
@@ -46,6 +52,8 @@ from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.watch.places import parse_for
+
+HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 
 
 @click.command("run")
@@ -70,6 +78,10 @@ from fbvm.watch.places import parse_for
               help="loop: in memory, virtual time.  tcp: real connections, real time.")
 @click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
               help="Where an endpoint that the program names really is.")
+@click.option("--door", "doors", type=door, multiple=True, metavar="[IP:PORT=][HOST:]PORT",
+              help="Where others reach the program: its first port, or the one that is named.  Implies --net tcp.")
+@bind_option
+@allow_outside_option
 @click.option("--pace", type=click.Choice(PACES), default=PACES[0], show_default=True,
               help="With tcp: keep the cycle, or scan again at once when something arrived.")
 @watch_cycle_option
@@ -102,11 +114,15 @@ def command(
 
     Beside it is the unit of each mailbox that the program uses, such as the Ethernet module of MBP_MSTR in slot 7.
 
-    End by one of --scans, --for and --until; before that, --break, --watch and --break-if end it inside a scan.  Status 1
-    if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could not be used."""
+    End by one of --scans, --for and --until, or with --door by Ctrl-C; before that, --break, --watch and --break-if end it
+    inside a scan.  Status 1 if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could
+    not be used."""
     if project := project_argument(files):
         sys.exit(run_project(project, click.get_current_context()))
+    if options["doors"] and click.get_current_context().get_parameter_source("net") is ParameterSource.DEFAULT:
+        options["net"] = "tcp"
     _check_usage(**options)
+    _check_endpoints(**options)
     drawn = bool(options["rungs"]) and not options["journal"]  # a replay compiles as the journal says
     image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]
@@ -114,7 +130,7 @@ def command(
                       *options["conditions"], *options["lines"]])
     image = with_e_banks(image, banks)
     with ExitStack() as stack:
-        network = build_network(options["net"], options["mappings"], options["seed"])
+        network = build_network(options["net"], options["mappings"], options["seed"], options["bind"], options["doors"])
         stack.callback(network.close)
         path = options["journal"]
         said = {name: options[name] for name in ("net", "pace", "timing", "seed", "engine")}
@@ -125,7 +141,7 @@ def command(
             network.tap = _capture(stack, options["pcap"], network, plc).tap
         for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
-        _print_host_endpoints(plc, network, options["mappings"])
+        _try_doors(plc, network, options["mappings"], options["doors"])
         with write_trace(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
                 write_page(plc, options["html"], files, libraries) as page, \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
@@ -135,7 +151,7 @@ def command(
         _warn_unused_mappings(plc, network)
         if plc.halted and not as_json:
             for line in halt_lines(plc, plc.halted, statement_lines(image, files, libraries)):
-                click.secho(line, fg="yellow", err=True)
+                say(line, fg="yellow", err=True)
     sys.exit(result.status)
 
 
@@ -153,7 +169,8 @@ def _run(
 ) -> RunResult:  # fmt: skip
     """Runs to the end.  Raises UsageError for names, values and conditions that do not fit the program."""
     for warning in plc.warnings:
-        click.secho(warning, fg="yellow", err=True)
+        say(warning, fg="yellow", err=True)
+    bounded = scans is not None or for_ns is not None or until is not None
     try:
         writes = [_write(plc, given) for given in settings]
         places = {text: plc.find(text) for text in shown}
@@ -162,16 +179,21 @@ def _run(
         set_breakpoints(plc, lines, watched, conditions)
         with RunProgress(None if as_json else plc, scans, for_ns or max_ns) as progress:
             reason = loop.run(
-                plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace,
+                plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes, pace=pace,
                 progress=progress.update,
             )  # fmt: skip
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
     for write, given in zip(writes, settings, strict=True):
         if not plc.scans or write.at_ns > plc.now_ns:
-            click.secho(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
+            say(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
     wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
     return RunResult(plc, reason, places, recorder, as_json, until or "", wanted)
+
+
+def _never(plc: Plc) -> bool:
+    """The end of a run that only Ctrl-C ends."""
+    return False
 
 
 def _write(plc: Plc, given: Setting) -> TimedWrite:
@@ -180,18 +202,19 @@ def _write(plc: Plc, given: Setting) -> TimedWrite:
     return TimedWrite(found, parse_for(found, given.value), given.at_ns)
 
 
-def _print_host_endpoints(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:
-    """Prints the endpoint of the host for each row of --map that names a unit."""
+def _try_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...], doors: tuple[Door, ...]) -> None:
+    """Tries the endpoints of units that --map and --door name, and says where each is.  Ends with status 5 if one cannot be
+    used."""
     if isinstance(network, LoopNetwork):
         return
     own = {attached.unit.address for attached in plc.units}
+    named = [row.endpoint for row in mappings if row.endpoint.host in own and row.endpoint.port]
     try:
-        for row in mappings:
-            if row.endpoint.host in own and row.endpoint.port:
-                click.echo(f"{row.endpoint} is {network.host_endpoint(row.endpoint)}", err=True)
+        found = network.try_doors([*named, *(door.endpoint for door in doors if door.endpoint)])
     except OSError as error:
-        click.echo(f"the network cannot be used: {error}", err=True)
-        sys.exit(status.NETWORK)
+        unusable(error)
+    say_doors(found)
+    network.notices.tell = notice_teller(HOW_TO_MAP, found)
 
 
 def _warn_unused_mappings(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
@@ -200,7 +223,7 @@ def _warn_unused_mappings(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
         return
     units = ", ".join(f"{attached.unit.name} has {attached.unit.address}" for attached in plc.units)
     for said in network.map.unused:
-        click.secho(f"--map {said}: nobody used it; {units}", fg="yellow", err=True)
+        say(f"--map {said}: nobody used it; {units}", fg="yellow", err=True)
 
 
 def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, plc: Plc) -> Capture:
@@ -210,18 +233,29 @@ def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, pl
 
 
 def _check_usage(
-    *, net: str, mappings: tuple[Mapping, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
+    *, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
     max_ns: int | None, **_: Any,
 ) -> None:  # fmt: skip
     ends = sum(bound is not None for bound in (scans, for_ns, until))
-    if ends != 1:
+    if ends > 1 or not (ends or doors):
         raise click.UsageError(f"say when to end by one of --scans, --for and --until; {ends or 'none'} given")
     if max_ns is not None and until is None:
         raise click.UsageError("--max bounds --until, which is not given")
+    if pace == EVENT and net == "loop":
+        raise click.UsageError("--pace event is for real time: add --net tcp")
+
+
+def _check_endpoints(*, net: str, mappings: tuple[Mapping, ...], doors: tuple[Door, ...], bind: str, **_: Any) -> None:
+    address(bind)
+    if net == "loop" and (doors or bind != "127.0.0.1"):
+        raise click.UsageError(f"{'--door' if doors else '--bind'} leaves memory: add --net tcp")
+    named = [*(row.endpoint for row in mappings), *(door.endpoint for door in doors if door.endpoint)]
+    if twice := next((endpoint for endpoint in named if named.count(endpoint) > 1), None):
+        raise click.UsageError(f"{twice} is mapped twice")
+    if sum(not door.endpoint for door in doors) > 1:
+        raise click.UsageError("several doors: say of each which it is, --door IP:PORT=HOST:PORT")
     for row in mappings:
         if net == "loop" and row.host is not None:
             raise click.UsageError(f"--map {row.endpoint}={row.host}:{row.port} leaves memory: add --net tcp")
         if net == "tcp" and row.host is None:
             raise click.UsageError(f"--map {row.endpoint}=peer is in memory: leave out --net tcp, or use `fbvm peer`")
-    if pace == EVENT and net == "loop":
-        raise click.UsageError("--pace event is for real time: add --net tcp")

@@ -1,48 +1,54 @@
-"""`fbvm serve`: a PLC with the server program of `examples/server.st` as a service on real TCP."""
+"""`fbvm serve`: a PLC as a service on real TCP, with the server program of `examples/server.st` or a program of one's own."""
 
 from __future__ import annotations
 
-import ipaddress
 import signal
 import sys
 from contextlib import AbstractContextManager, ExitStack
 from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
-from typing import IO, NoReturn
+from typing import IO
 
 import click
+from click.core import ParameterSource
 
 from fbvm.base.data import data_folder
 from fbvm.base.files import reason
 from fbvm.base.host import ending_signals, handling, saving_signals
-from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
+from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
 from fbvm.cli.shared.files import OutputError, growing_file, writing
-from fbvm.cli.shared.options import time_ns, watch_cycle_option
+from fbvm.cli.shared.networks import mailbox_names
+from fbvm.cli.shared.options import address, bind_option, time_ns, watch_cycle_option
+from fbvm.cli.shared.sources import compile_or_exit, source_options
+from fbvm.cli.shared.terminal import named, say
 from fbvm.code.compiler import compile_files
-from fbvm.machine.backplane import ETN21_ADDRESS
+from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
+from fbvm.net.notices import Notice, NoticeKind
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.trace import memory_images
 from fbvm.record.trace.requests import RequestLog
 from fbvm.run import loop
 from fbvm.run.running import EVENT
-from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 CYCLE_NS = 10_000_000
 START_LIMIT_NS = 5_000_000_000
-SCANS_OF_AN_OPEN = 4
-"""The scans within which a unit reports that a port cannot be used."""
-ENDPOINT = Peer(ETN21_ADDRESS, 502)
 SERVED = {"CIO": 5801, "D": 32768}
 """Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
 
 
+OWN_SETTINGS = {"sockets": "Sockets", "read_only": "Read_Only", "fn0f": "Fn0F", "full_dm": "Full_DM", "idle_ns": "Idle_Time"}
+"""The options that set inputs of the shipped server program."""
+HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --map {endpoint}=127.0.0.1:{port}` has several"
+
+
 @click.command("serve")
-@click.option("--bind", default="127.0.0.1", show_default=True, metavar="ADDRESS",
-              help="Address of this computer to listen on; 0.0.0.0 is all.")
+@source_options
+@click.argument("files", nargs=-1, metavar="[FILE...]", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@bind_option
 @click.option("--port", type=click.IntRange(0, 65535), default=1502, show_default=True, help="0: any free port.")
 @click.option("--sockets", type=click.IntRange(1, 8), default=1, show_default=True, help="Clients at once.")
 @click.option("--backlog/--no-backlog", default=True, show_default=True,
@@ -53,30 +59,32 @@ SERVED = {"CIO": 5801, "D": 32768}
 @click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent so long (60s).")
 @watch_cycle_option
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.")
+              help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.  Words that it does not "
+                   "have begin with 0; words of units are not set.")
 @click.option("--log", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), metavar="FILE",
               help="Write who asked what, a JSON object a line; - is the terminal.")
 def command(
-    bind: str, port: int, sockets: int, backlog: bool, read_only: bool, fn0f: bool, full_dm: bool, idle_ns: int | None,
-    watch_ns: int, image: Path | None, log: Path | None,
+    files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], bind: str, port: int, image: Path | None,
+    log: Path | None, watch_ns: int, backlog: bool, **settings: int | None,
 ) -> None:  # fmt: skip
-    """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM.
+    """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
+    reach the first port at which it waits.
 
     Status 5 if the port cannot be used, 4 if a trap stopped the program, 2 if the memory could not be saved, else 0."""
-    settings = {"Sockets": sockets, "Read_Only": read_only, "Fn0F": fn0f, "Full_DM": full_dm}
-    if idle_ns is not None:
-        settings["Idle_Time"] = idle_ns
     signals = Signals()
     with ExitStack() as stack:
         stack.enter_context(signals.installed())
-        plc = _plc(settings, image)
+        plc = _own(files, program, libraries) if files else _shipped(settings)
         plc.watch_cycle.time_ns = watch_ns
+        if image:
+            _load(plc, image)
         network = _network(bind, port, backlog)
         stack.callback(network.close)
         if log:
             network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
-        plc.attach(Etn21(0, ETN21_ADDRESS), network)
-        reason, saved = _start(plc, network), True
+        for unit in usual_units(mailbox_names(plc.image)):
+            plc.attach(unit, network)
+        reason, saved = _start(plc, network, signals), True
         while reason != "trap" and not signals.end:
             try:
                 reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)
@@ -86,28 +94,46 @@ def command(
             signals.save = False
             saved = _save(plc, image)
     if plc.trap:
-        click.echo(str(plc.trap), err=True)
+        say(str(plc.trap), err=True)
     sys.exit(status.STOPPED if reason == "trap" else status.GOOD if saved else status.USAGE)
 
 
-def _plc(settings: dict[str, int], image: Path | None) -> Plc:
-    """A PLC with the server program, its settings written and its memory loaded."""
+def _shipped(settings: dict[str, int | None]) -> Plc:
+    """A PLC with the server program, its settings written."""
     program = compile_files([data_folder("examples") / "server.st"], runnable=True, lint=False).image
     assert program is not None, "the server's own program compiles"
     plc = Plc(program, CYCLE_NS)
     for name, value in settings.items():
-        plc.write(f"Main.Server.{name}", value)
-    if image:
-        with writing(image):
-            memory_images.check_writable(image)
-    if image and image.exists():
-        try:
-            memory_images.load(plc.memory, image)
-        except OSError as error:
-            raise click.UsageError(f"{image} cannot be read: {reason(error)}") from None
-        except memory_images.ImageError as error:
-            raise click.UsageError(str(error)) from None
+        if value is not None:
+            plc.write(f"Main.Server.{OWN_SETTINGS[name]}", value)
     return plc
+
+
+def _own(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...]) -> Plc:
+    """A PLC with a program of the user's own.  Raises UsageError for options of the shipped one."""
+    context = click.get_current_context()
+    given = [parameter.opts[0] for parameter in context.command.params if parameter.name in OWN_SETTINGS
+             and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT]  # fmt: skip
+    if given:
+        raise click.UsageError(f"{', '.join(given)}: said to the shipped server program; your own sets what it wants itself")
+    return Plc(compile_or_exit(files, program, libraries, runnable=True), CYCLE_NS)
+
+
+def _load(plc: Plc, image: Path) -> None:
+    """Loads the memory, and says which words the file does not set."""
+    with writing(image):
+        memory_images.check_writable(image)
+    if not image.exists():
+        return
+    try:
+        left = memory_images.load(plc.memory, image)
+    except OSError as error:
+        raise click.UsageError(f"{named(image)} cannot be read: {reason(error)}") from None
+    except memory_images.ImageError as error:
+        raise click.UsageError(str(error)) from None
+    for area, words in left.items():
+        said = f"{area} {words[0]} to {words[-1]}" if len(words) > 1 else f"{area} {words[0]}"
+        say(f"{named(image)}: {said}: not set, since these words belong to units", fg="yellow", err=True)
 
 
 def _opened(stack: ExitStack, log: Path) -> IO[str]:
@@ -118,36 +144,39 @@ def _opened(stack: ExitStack, log: Path) -> IO[str]:
 
 
 def _network(bind: str, port: int, backlog: bool) -> TcpNetwork:
+    """The network; its first door is at `bind` and `port`.  Ends with status 5 if that cannot be used."""
+    real = Peer(address(bind), port)
+    warn_if_reachable(real)
+    network = TcpNetwork(bind=real.host, door=real, backlog=backlog)
     try:
-        if not ipaddress.ip_address(bind).is_loopback:
-            click.echo(f"Other computers can reach {bind} and write this PLC's memory.", err=True)
-        network = TcpNetwork({ENDPOINT: (bind, port)}, backlog=backlog)
-        network.host_endpoint(ENDPOINT)
-    except ValueError:
-        raise click.UsageError(f"--bind {bind} is not an IP address") from None
+        network.try_door(real)
     except OSError as error:
-        _unusable(Peer(bind, port), str(error))
+        network.close()
+        unusable(error)
     return network
 
 
-def _start(plc: Plc, network: TcpNetwork) -> str:
-    """Runs until the unit listens, and prints the endpoint; returns the reason of the end."""
-    opening, failed = plc.find("CIO 1509.00"), plc.find("Main.Server.Error_Code")
-    reason = loop.run(plc, until=lambda _: bool(plc.read(opening)), max_ns=START_LIMIT_NS, pace=EVENT)
-    if reason == "until":
-        reason = loop.run(plc, scans=SCANS_OF_AN_OPEN, pace=EVENT)
-    real = network.host_endpoint(ENDPOINT)
-    if reason == "max" or plc.read(failed):
-        _unusable(real, f"response code {plc.read(failed):04X}")
-    if reason == "scans":
-        click.echo(f"{LISTENING}{real}")
+def _start(plc: Plc, network: TcpNetwork, signals: Signals) -> str:
+    """Runs until a unit listens, and prints where; returns the reason of the end."""
+    doors: list[Notice] = []
+    say_notice = notice_teller(HOW_TO_MAP)
+
+    def tell(notice: Notice) -> None:
+        if notice.kind in (NoticeKind.LISTENING, NoticeKind.UNUSABLE) and not doors:
+            doors.append(notice)
+        elif notice.kind is not NoticeKind.LISTENING or notice.endpoint != doors[0].endpoint:
+            say_notice(notice)
+
+    network.notices.tell = tell
+    reason = loop.run(plc, until=lambda _: bool(doors) or signals.end, max_ns=START_LIMIT_NS, pace=EVENT)
+    if reason == "max":
+        say("no unit waits for callers; the program runs all the same", fg="yellow", err=True)
+    elif doors and doors[0].kind is NoticeKind.UNUSABLE:
+        unusable(OSError(f"{doors[0].real} cannot be used: {doors[0].error}"))
+    elif doors:
+        say(f"{LISTENING}{doors[0].real}")
         sys.stdout.flush()
     return reason
-
-
-def _unusable(real: Peer, why: str) -> NoReturn:
-    click.echo(f"{real} cannot be used: {why}", err=True)
-    sys.exit(status.NETWORK)
 
 
 # --- signals and images -----------------------------------------------------------------------------------------------
@@ -179,6 +208,6 @@ def _save(plc: Plc, image: Path | None) -> bool:
         try:
             memory_images.save(plc.memory, image, SERVED)
         except OSError as error:
-            click.echo(f"{image} cannot be written: {reason(error)}", err=True)
+            say(f"{named(image)} cannot be written: {reason(error)}", err=True)
             return False
     return True

@@ -12,9 +12,10 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.shared.paths import SourcePath
-from fbvm.cli.shared.project_arguments import project_argument
+from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
 from fbvm.cli.shared.prompt import prompt_lines
 from fbvm.cli.shared.sources import compile_or_exit, source_options
+from fbvm.cli.shared.terminal import say
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
@@ -29,6 +30,7 @@ from fbvm.watch.places import parse_for
 @click.option("--plc", "name", metavar="NAME", help="Which PLC of a project; the others scan along.")
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")
+@allow_outside_option
 @click.option("--set", "settings", type=setting, multiple=True, metavar="NAME=VALUE", help="Write before the first scan.")
 @click.option("--watch", "watched", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST",
               help="Print this at each stop; with IF EXPRESSION behind it only where that holds.")
@@ -89,7 +91,7 @@ def _interact(commands: Commands) -> None:
             for said in commands.run(line):
                 _print(said)
         except CommandError as error:
-            click.secho(str(error), fg="red")
+            say(str(error), fg="red")
         if commands.ended:
             return
 
@@ -98,12 +100,12 @@ def _script(commands: Commands) -> None:
     for line in sys.stdin:
         if not line.strip() or line.lstrip().startswith("//"):
             continue
-        click.echo(f"> {line.strip()}")
+        say(f"> {line.strip()}")
         try:
             for said in commands.run(line):
-                click.echo(said)
+                say(said)
         except CommandError as error:
-            click.echo(str(error), err=True)
+            say(str(error), err=True)
             sys.exit(status.FAILED if isinstance(error, ExpectationError) else status.USAGE)
         if commands.ended:
             return
@@ -111,4 +113,4 @@ def _script(commands: Commands) -> None:
 
 def _print(line: str) -> None:
     """Prints a line; that of the next statement is bold on a terminal."""
-    click.secho(line, bold=line.startswith((" >", "scan ")) or None)
+    say(line, bold=line.startswith((" >", "scan ")) or None)

@@ -10,6 +10,7 @@ import click
 
 from fbvm.base.types import StructType, fold
 from fbvm.cli.shared.run_result import chart_width
+from fbvm.cli.shared.terminal import say
 from fbvm.code.image import Image, RungPicture
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_text import ladder_text
@@ -30,8 +31,8 @@ _SCANS = re.compile(r"([0-9]{1,18})(?:\.\.([0-9]{1,18}))?")
 def print_lines(lines: Iterable[str]) -> None:
     """Prints a drawing and an empty line behind it."""
     for line in lines:
-        click.echo(line)
-    click.echo()
+        say(line)
+    say()
 
 
 def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
@@ -87,7 +88,7 @@ def draw_executed_rungs(plc: Plc, scans: str | None) -> Iterator[None]:
     for made in power.executed:
         if before != (made.scan, made.base):
             before = made.scan, made.base
-            click.echo(f"scan {made.scan}, {names.instance(made.base)}")
+            say(f"scan {made.scan}, {names.instance(made.base)}")
         annotations = Annotations(made.states, symbol_addresses(plc.image, made.picture.body), values.of(made))
         print_lines(ladder_text(made.picture, chart_width(), annotations))
 
@@ -107,7 +108,7 @@ def draw_executed_charts(plc: Plc, scans: str | None) -> Iterator[None]:
         _warn_nothing_drawn(plc, f"--sfc {scans}", "chart", bool(plc.image.charts))
     names = Names.of(plc.image, plc.memory.areas)
     for called in seen.calls:
-        click.echo(f"scan {called.scan}, {names.instance(called.base)}")
+        say(f"scan {called.scan}, {names.instance(called.base)}")
         print_lines(sfc_text(called.picture, chart_width(), called.state))
 
 
@@ -115,4 +116,4 @@ def _warn_nothing_drawn(plc: Plc, option: str, part: str, declared: bool) -> Non
     """Says why an option drew nothing: the program has no such `part`, or none was executed in the scans of the option."""
     why = f"no {part} was executed in these scans; the run had scans 0 to {plc.scans - 1}" if declared and plc.scans else \
         f"no {part} was executed" if declared else f"there is no {part} in this program"  # fmt: skip
-    click.secho(f"{option}: {why}", fg="yellow", err=True)
+    say(f"{option}: {why}", fg="yellow", err=True)

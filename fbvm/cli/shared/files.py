@@ -11,6 +11,7 @@ from typing import BinaryIO
 import click
 
 from fbvm.base.files import reason
+from fbvm.cli.shared.terminal import named
 
 
 class OutputError(Exception):
@@ -38,7 +39,7 @@ class _GrowingFile(io.RawIOBase):
                 left = left[self._file.write(left) or 0 :]
             except OSError as error:
                 self._failed = True
-                raise OutputError(f"{self._path} cannot be written any further: {reason(error)}") from None
+                raise OutputError(f"{named(self._path)} cannot be written any further: {reason(error)}") from None
         return size
 
     def close(self) -> None:
@@ -60,4 +61,4 @@ def writing(target: Path | str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise click.UsageError(f"{target} cannot be written: {reason(error)}") from None
+        raise click.UsageError(f"{named(target)} cannot be written: {reason(error)}") from None

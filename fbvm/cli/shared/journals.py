@@ -20,6 +20,7 @@ from fbvm.cli.shared.e_banks import with_e_banks
 from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.sources import compile_options, report_diagnostics
+from fbvm.cli.shared.terminal import named
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.net.journal import Entry, Header, Journal, JournalError, open_journal
@@ -53,9 +54,9 @@ def open_journal_file(path: Path) -> Iterator[tuple[Header, Iterator[Entry]]]:
         with TextIOWrapper(open_file(path), encoding="utf-8", newline="\n") as file:
             yield open_journal(_text(file))
     except JournalError as error:
-        raise click.UsageError(f"{path}: {error}") from None
+        raise click.UsageError(f"{named(path)}: {error}") from None
     except OSError as error:
-        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
+        raise click.UsageError(f"{named(path)} cannot be read: {reason(error)}") from None
 
 
 def _text(file: TextIOWrapper) -> Iterator[str]:
@@ -83,7 +84,7 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
         raise JournalError("it holds no program; one that Python wrote is done again from Python") from None
     for folder in folders:
         if not folder.is_dir():
-            raise JournalError(f"the program needs the library folder {folder}; say where it is now with --library")
+            raise JournalError(f"the program needs the library folder {named(folder)}; say where it is now with --library")
     compilation = compile_sources(sources, program, folders, runnable=True, lint=False, resource=choice.get("resource"),
                                   dialect=choice.get("dialect", "standard"))
     if compilation.image is None:

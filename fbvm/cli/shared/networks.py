@@ -4,34 +4,48 @@ from __future__ import annotations
 
 import sys
 
-import click
-
 from fbvm.cli.shared import status
-from fbvm.cli.shared.options import Mapping
+from fbvm.cli.shared.doors import unusable
+from fbvm.cli.shared.options import Door, Mapping
+from fbvm.cli.shared.terminal import named, say
 from fbvm.code.image import Image
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
 from fbvm.wire import registers
+from fbvm.wire.link import Peer
 
 
-def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> LoopNetwork | TcpNetwork:
+def build_network(
+    net: str, mappings: tuple[Mapping, ...], seed: int = 0, bind: str = "127.0.0.1", doors: tuple[Door, ...] = ()
+) -> LoopNetwork | TcpNetwork:
     """A network in memory (`net` "loop", with a Modbus server at each mapped endpoint) or on the host's TCP ("tcp").
 
-    `seed` starts the random numbers of the network in memory.  Ends with status 5 if a host name has no address."""
+    `seed` starts the random numbers of the network in memory; units without a row listen on `bind`, and at `doors`.  Ends with
+    status 5 if a host name has no address or a door cannot be used."""
     if net == "loop":
         network = LoopNetwork(seed)
         for row in mappings:
             network.place(row.endpoint, ModbusPeer(registers.server()))
         return network
-    for row in mappings:
+    rows = {row.endpoint: (row.host or "", row.port) for row in mappings}
+    rows |= {door.endpoint: (door.host or bind, door.port) for door in doors if door.endpoint}
+    for said, (host, port) in rows.items():
         try:
-            TcpNetwork({row.endpoint: (row.host or "", row.port)}).close()
+            TcpNetwork({said: (host, port)}).close()
         except (OSError, UnicodeError) as error:  # a host without an address, or a name that cannot be one
             reason = getattr(error, "strerror", "no name of a host")
-            click.echo(f"the network cannot be used: {row.host}: {reason}", err=True)
+            say(f"the network cannot be used: {named(host)}: {reason}", err=True)
             sys.exit(status.NETWORK)
-    return TcpNetwork({row.endpoint: (row.host or "", row.port) for row in mappings})
+    first = next((Peer(door.host or bind, door.port) for door in doors if not door.endpoint), None)
+    real = TcpNetwork(rows, bind, door=first)
+    try:
+        if first:
+            real.try_door(first)
+    except OSError as error:
+        real.close()
+        unusable(error)
+    return real
 
 
 def mailbox_names(image: Image) -> list[str]:

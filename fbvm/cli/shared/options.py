@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 
 from click import BadParameter, Context, Parameter, option
 
@@ -39,6 +40,14 @@ def watch_cycle_ns(value: str | int) -> int:
 
 watch_cycle_option = option("--watch-cycle", "watch_ns", type=watch_cycle_ns, default=USUAL_NS, metavar="TIME", show_default="1s",
                             help="With real connections: the longest time that a scan may take, from 10ms to 40s.")
+
+
+def address(bind: str) -> str:
+    """The address of --bind.  Raises BadParameter if it is none."""
+    try:
+        return str(IPv4Address(bind))
+    except ValueError:
+        raise BadParameter(f"--bind {bind} is not an IPv4 address of this computer") from None
 
 
 @dataclass(frozen=True)
@@ -93,6 +102,28 @@ def mapping(value: str) -> Mapping:
     if real.strip() == "peer":
         return Mapping(Peer(ip, port), None, 0)
     return Mapping(Peer(ip, port), *_endpoint(real))
+
+
+@dataclass(frozen=True)
+class Door:
+    """[IP:PORT=][HOST:]PORT; `endpoint` None is the first at which the program waits, `host` None the address of --bind."""
+
+    endpoint: Peer | None
+    host: str | None
+    port: int
+
+
+def door(value: str) -> Door:
+    """`1502`, `0.0.0.0:1502`, or `192.168.250.21:502=127.0.0.1:1502`."""
+    said, sign, real = value.rpartition("=")
+    endpoint = mapping(f"{said}=peer").endpoint if sign else None
+    if real.strip().isdecimal():
+        return Door(endpoint, None, _endpoint(f"-:{real.strip()}")[1])
+    return Door(endpoint, *_endpoint(real))
+
+
+bind_option = option("--bind", default="127.0.0.1", show_default=True, metavar="ADDRESS",
+                     help="Address of this computer to listen on; 0.0.0.0 is all.")
 
 
 def _endpoint(text: str) -> tuple[str, int]:

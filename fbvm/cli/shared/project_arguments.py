@@ -4,9 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
+
+from fbvm.base.diagnostics import Diagnostic
+
+if TYPE_CHECKING:
+    from fbvm.run.project import Project
+
+
+def _keep_in_context(context: click.Context, parameter: click.Parameter, value: bool) -> None:
+    context.meta["fbvm.allow_outside"] = value
+
+
+allow_outside_option = click.option(
+    "--allow-outside", is_flag=True, expose_value=False, callback=_keep_in_context,
+    help="Of a project: take sources and libraries that are not in its folder, too.")  # fmt: skip
+
+
+def read_given_project(file: Path) -> Project | list[Diagnostic]:
+    """The project of a file, as `read_project` returns it, with what --allow-outside says."""
+    from fbvm.run.project import read_project
+
+    return read_project(file, allow_outside=bool(click.get_current_context().meta.get("fbvm.allow_outside")))
 
 
 def project_argument(files: tuple[Path, ...]) -> Path | None:

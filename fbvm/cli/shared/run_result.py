@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-import click
-
 from fbvm.cli.shared import status
+from fbvm.cli.shared.terminal import say, say_json
 from fbvm.engine.trap import Trap
 from fbvm.machine.breakpoints import Halt
 from fbvm.machine.plc import Plc
@@ -51,22 +49,22 @@ class RunResult:
     def print(self) -> None:
         """Prints values and charts on stdout, a trap on stderr."""
         if self.as_json:
-            click.echo(json.dumps(self._as_dict(), allow_nan=False))
+            say_json(self._as_dict())
             return
         if self.recorder:
-            click.echo(draw(self.recorder, width=chart_width(), ruler=True, compress=True), nl=False)
+            say(draw(self.recorder, width=chart_width(), ruler=True, compress=True), nl=False)
         names = Names.of(self.plc.image, self.plc.memory.areas)
         for text, place in self.places.items():
-            click.echo(f"{text} = {value_text(place, names.read(self.plc.read, place))}")
+            say(f"{text} = {value_text(place, names.read(self.plc.read, place))}")
         if self.scan_time:
-            click.echo(str(self.plc.scan_times), err=True)
+            say(str(self.plc.scan_times), err=True)
             if self.plc.lateness.count:
-                click.echo(str(self.plc.lateness), err=True)
+                say(str(self.plc.lateness), err=True)
         if self.plc.trap:
-            click.secho(self.plc.trap.told(names.instance), fg="red", err=True)
+            say(self.plc.trap.told(names.instance), fg="red", err=True)
         elif self.reason == "max":
             passed_ns = round(self.plc.elapsed_ns / MS_NS) * MS_NS
-            click.secho(f"{self.until} did not hold in {show_time(passed_ns)[2:]}", fg="yellow", err=True)
+            say(f"{self.until} did not hold in {show_time(passed_ns)[2:]}", fg="yellow", err=True)
 
     def _as_dict(self) -> dict[str, object]:
         plc, names = self.plc, Names.of(self.plc.image, self.plc.memory.areas)

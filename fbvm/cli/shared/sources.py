@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.cli.shared import status
 from fbvm.cli.shared.paths import ExistingPath, SourcePath
+from fbvm.cli.shared.terminal import say, say_json
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 
@@ -81,7 +81,7 @@ def compile_or_exit(
 def report_diagnostics(diagnostics: Sequence[Diagnostic], as_json: bool) -> None:
     """Prints diagnostics: as text with a summary on stderr, or, with `as_json`, as one object on stdout."""
     if as_json:
-        click.echo(json.dumps({"diagnostics": [diagnostic.as_dict() for diagnostic in diagnostics]}, indent=2))
+        say_json({"diagnostics": [diagnostic.as_dict() for diagnostic in diagnostics]}, indent=2)
         return
     for diagnostic in diagnostics:
         show_diagnostic(diagnostic)
@@ -89,12 +89,12 @@ def report_diagnostics(diagnostics: Sequence[Diagnostic], as_json: bool) -> None
     counts = [f"{count} {what}{'s' * (count > 1)}" for count, what in ((wrong, "error"), (len(diagnostics) - wrong, "warning"))
               if count]
     if counts:
-        click.secho(f"{' and '.join(counts)}; `fbvm explain CODE` says more about each", bold=True, err=True)
+        say(f"{' and '.join(counts)}; `fbvm explain CODE` says more about each", bold=True, err=True)
 
 
 def show_diagnostic(diagnostic: Diagnostic) -> None:
     """Prints one diagnostic on stderr, its first line in colour on a terminal."""
     first, _, rest = diagnostic.render().partition("\n")
-    click.secho(first, fg="red" if diagnostic.severity == "error" else "yellow", err=True)
+    say(first, fg="red" if diagnostic.severity == "error" else "yellow", err=True)
     if rest:
-        click.echo(rest, err=True)
+        say(rest, err=True)

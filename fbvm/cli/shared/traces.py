@@ -15,6 +15,7 @@ from fbvm.base.files import reason, write_file
 from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.paths import ExistingPath
+from fbvm.cli.shared.terminal import named, say
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.page.data import page_data
@@ -72,14 +73,14 @@ def open_trace(path: Path) -> Iterator[Trace]:
     try:
         trace = Trace.open(path)
     except OSError as error:
-        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
+        raise click.UsageError(f"{named(path)} cannot be read: {reason(error)}") from None
     except TraceError as error:
-        raise click.UsageError(f"{path}: {error}") from None
+        raise click.UsageError(f"{named(path)}: {error}") from None
     try:
         with trace:
             yield trace
     except TraceError as error:
-        raise click.UsageError(f"{path}: {error}") from None
+        raise click.UsageError(f"{named(path)}: {error}") from None
     except (UnknownPlace, TypeError) as error:
         raise click.UsageError(str(error)) from None
 
@@ -145,7 +146,7 @@ def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Se
     last = max(source.scans.start, source.scans.stop - INTERRUPTED_SCANS)
     scans = range(last, source.scans.stop) if wanted.only_last and last > source.scans.start else None
     if scans:
-        click.echo(f"{path} holds scans {last} to {scans[-1]} only: the run was interrupted", err=True)
+        say(f"{named(path)} holds scans {last} to {scans[-1]} only: the run was interrupted", err=True)
     with writing(path):
         write_file(path, page(page_data(source, scans=scans, title=path.stem)))
 

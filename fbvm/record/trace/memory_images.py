@@ -12,6 +12,7 @@ from pathlib import Path
 from fbvm.base.files import IMAGE_BYTES, read_file
 from fbvm.base.host import replace
 from fbvm.base.memory import Memory
+from fbvm.base.printable import one_line
 
 OF_UNITS = {"CIO": range(1500, 1900), "D": range(30000, 31600)}  # 25 and 100 words a unit, W421 6-6-2 p111
 
@@ -54,31 +55,36 @@ def _beside(path: Path) -> Path:
     return path.with_name(path.name + ".new")
 
 
-def load(memory: Memory, path: Path) -> None:
+def load(memory: Memory, path: Path) -> dict[str, list[int]]:
     """Loads an image into a memory, wholly or not at all; words that the image does not have keep their values.
 
+    Returns the numbers of the words by area that have a value in the image and are not set, since they belong to units.
     Raises OSError, and ImageError for a file that is no image or has words that this memory lacks."""
     try:
         found = json.loads(read_file(path, IMAGE_BYTES).decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise ImageError(f"{path} is not JSON: {error}") from None
+        raise ImageError(f"{one_line(str(path))} is not JSON: {error}") from None
     spaces = found.get("spaces") if isinstance(found, dict) else None
     if not isinstance(spaces, dict):
-        raise ImageError(f'{path} has no "spaces"')
-    for view, number, word in list(_words(memory, path, spaces)):
-        view[number] = word
+        raise ImageError(f'{one_line(str(path))} has no "spaces"')
+    left: dict[str, list[int]] = {}
+    for name, number, word in list(_words(memory, path, spaces)):
+        if number not in OF_UNITS.get(name, ()):
+            memory.words(name)[number] = word
+        elif word:
+            left.setdefault(name, []).append(number)
+    return left
 
 
-def _words(memory: Memory, path: Path, spaces: dict[str, object]) -> Iterator[tuple[memoryview, int, int]]:
+def _words(memory: Memory, path: Path, spaces: dict[str, object]) -> Iterator[tuple[str, int, int]]:
     for name, words in spaces.items():
         try:
             view = memory.words(name)
         except KeyError:
-            raise ImageError(f"{path}: this PLC has no area {name}") from None
+            raise ImageError(f"{one_line(str(path))}: this PLC has no area {name}") from None
         if not isinstance(words, list) or len(words) > len(view):
-            raise ImageError(f"{path}: {name} is not a list of at most {len(view)} words")
+            raise ImageError(f"{one_line(str(path))}: {name} is not a list of at most {len(view)} words")
         for number, word in enumerate(words):
             if not isinstance(word, int) or isinstance(word, bool) or not 0 <= word <= 0xFFFF:
-                raise ImageError(f"{path}: {name} {number} is {word!r}, no word from 0 to 65535")
-            if number not in OF_UNITS.get(name, ()):
-                yield view, number, word
+                raise ImageError(f"{one_line(str(path))}: {name} {number} is {word!r}, no word from 0 to 65535")
+            yield name, number, word

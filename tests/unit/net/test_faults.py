@@ -157,6 +157,20 @@ def test_a_connection_breaks_in_the_middle_of_a_reply() -> None:
         line.scan()
 
 
+def test_a_side_that_has_not_noticed_is_told_when_it_speaks() -> None:
+    line, peer = Line(), ScriptedPeer(greeting=[Say(b"late", 100_000 * MS)])
+    line.network.place(SERVER, peer)
+    line.scan(Connect(1, SERVER), Grant(1, 99))
+    line.scan()
+    line.network.faults.append(Fault(silent=True))
+    line.link.submit([Send(1, REQUEST)], line.network.now_ns)
+    assert line.link.events(80_000 * MS)[-1] == Broken(1, "ETIMEDOUT")
+    line.network.faults.clear()
+    assert peer.log == []
+    line.link.events(110_000 * MS)
+    assert peer.log == ["ECONNRESET"]
+
+
 def test_a_kind_needs_what_it_is_about() -> None:
     assert fault("slow", latency_ns=MS) == Fault(latency_ns=MS)
     assert fault("silent", until_scan=3) == Fault(silent=True, until_scan=3)

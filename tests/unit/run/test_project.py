@@ -9,7 +9,7 @@ from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.engine.native import engine as native
-from fbvm.net.faults import KINDS
+from fbvm.net.faults import KINDS, Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.run import run_all
 from fbvm.run.plant import MANY, Plant
@@ -331,3 +331,91 @@ def test_errors_of_programs_are_told_as_always(folder: Path) -> None:
     (folder / "bad.st").write_text("PROGRAM Main\n    x := 1;\nEND_PROGRAM\n", encoding="utf-8")
     built = Plant(project(folder, '[plc.a]\nsources = ["bad.st"]\n[plc.b]\nsources = ["none.st"]\n'))
     assert [found.code for found in errors(built.diagnostics)] == ["S0201", "S0107"]
+
+
+# --- faults, doors and paths --------------------------------------------------------------------------------------------
+
+ONE = "[plc.a]\nsources = ['counter.st']\n"
+
+
+@pytest.mark.parametrize(("text", "messages"), [
+    ("[[fault]]\nkind = 'slow'", [("P0104", 3, "fault 1.latency is missing: kind slow")]),
+    ("[[fault]]\nkind = 'unsteady'", [("P0104", 3, "fault 1.jitter is missing: kind unsteady")]),
+    ("[[fault]]\nkind = 'joined'", [("P0104", 3, "fault 1.join is missing: kind joined")]),
+    ("[[fault]]\nkind = 'lossy'\n[[fault]]\nkind = 'interrupted'", [
+        ("P0104", 3, "fault 1.lose_percent is missing: kind lossy"),
+        ("P0104", 5, "fault 2.reset_after_bytes is missing: kind interrupted")]),
+    ("[[fault]]\nkind = 'doubled'\nduplicate_percent = 101", [
+        ("P0103", 5, "fault 1.duplicate_percent: 101 is no whole number from 1 to 100")]),
+    ("[[fault]]\ngap = '5ms'", [("P0103", 4, "fault 1.gap does nothing without segment_bytes")]),
+    ("[[fault]]\nrandom_cut = true", [("P0103", 4, "fault 1.random_cut does nothing without segment_bytes")]),
+    ("[[fault]]\nsilent = true\nfrom = '2s'\nuntil = '1s'", [
+        ("P0103", 3, "fault 1 ends before it begins: until is not after from")]),
+    ("[[fault]]\nsilent = true\nfrom_scan = 5\nuntil_scan = 5", [
+        ("P0103", 3, "fault 1 ends before it begins: until_scan is not after from_scan")]),
+    ("[[fault]]\nerror = 'ECONREFUSED'", [
+        ("P0103", 4, "fault 1.error: 'ECONREFUSED' is no errno name such as ECONNREFUSED or EHOSTUNREACH")]),
+    ("[[door]]\naddress = '1.2.3.4:502'", [("P0104", 3, "door 1.bind is missing")]),
+    ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\nhost = '127.0.0.1:0'", [
+        ("P0103", 6, "door 1 has bind and host, which are the same")]),
+    ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\n[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:1'", [
+        ("P0103", 6, "door 2 has the address of door 1")]),
+    ("[[server]]\naddress = '1.2.3.4:502'\n[[server]]\naddress = '1.2.3.4:502'", [
+        ("P0103", 5, "server 2 has the address of server 1")]),
+])  # fmt: skip
+def test_what_says_nothing_or_too_much_is_refused(folder: Path, text: str, messages: list[tuple[str, int, str]]) -> None:
+    found = read(folder, ONE + text)
+    assert isinstance(found, list)
+    assert said(found) == messages
+
+
+def test_faults_by_scan_and_by_kind(folder: Path) -> None:
+    rows = "[[fault]]\nkind = 'slow'\nlatency = '5ms'\nfrom_scan = 3\nuntil_scan = 9\n[[fault]]\nlose_percent = 30"
+    assert project(folder, ONE + rows).faults == (Fault(latency_ns=5 * MS, from_scan=3, until_scan=9), Fault(lose_percent=30))
+
+
+DOORED = ONE + """
+[[plc.a.unit]]
+address = "1.2.3.4"
+[[door]]
+address = "1.2.3.4:502"
+bind = "127.0.0.1:0"
+[[fault]]
+peer = "1.2.3.4:502"
+"""
+
+
+def test_what_cannot_be_done_with_real_connections_is_refused(folder: Path) -> None:
+    message = ("P0103", 9, "fault 1: callers of the door 1.2.3.4:502 cannot be given ENETUNREACH with real connections, "
+               "only ECONNREFUSED, or silent = true")  # fmt: skip
+    in_memory = project(folder, DOORED + "error = 'ENETUNREACH'")
+    assert said(errors(Plant(in_memory, net="tcp").diagnostics)) == [message]
+    Plant(in_memory).close()
+    found = read(folder, "run = {net = 'tcp'}\n" + DOORED + "error = 'ENETUNREACH'")
+    assert isinstance(found, list)
+    assert said(found) == [(message[0], 10, message[2])]
+    for good in ("error = 'ECONNREFUSED'", "kind = 'unreachable'", "kind = 'refused'"):
+        assert project(folder, "run = {net = 'tcp'}\n" + DOORED + good)
+
+
+def test_real_connections_have_the_faults_of_the_file(folder: Path) -> None:
+    built = Plant(project(folder, "run = {net = 'tcp', seed = 4}\n" + DOORED + "silent = true"))
+    assert built.network.faults == [Fault(Peer("1.2.3.4", 502), silent=True)]
+    assert list(built.doors) == [Peer("1.2.3.4", 502)]
+    built.close()
+
+
+def test_paths_stay_inside_the_project(folder: Path) -> None:
+    inside = folder / "project"
+    (inside / "own").mkdir(parents=True)
+    (inside / "link.st").symlink_to(folder / "counter.st")
+    (inside / "here.st").write_text(COUNTER, encoding="utf-8")
+    for written in ("../counter.st", str(folder / "counter.st"), "own/../../counter.st", "link.st", "/etc/passwd"):
+        found = read(inside, f"[plc.a]\nsources = ['here.st', '{written}']\n")
+        assert isinstance(found, list)
+        assert said(found) == [("P0103", 2, f"plc.a.sources: {written} is outside of the project")]
+        assert isinstance(read_project(inside / "fbvm.toml", allow_outside=True), Project)
+    found = read(inside, "[plc.a]\nsources = ['here.st']\nlibraries = ['..']\n")
+    assert isinstance(found, list)
+    assert said(found) == [("P0103", 3, "plc.a.libraries: .. is outside of the project")]
+    assert project(inside, f"[plc.a]\nsources = ['{inside / 'here.st'}', 'own/../here.st']\nlibraries = ['own']\n")
