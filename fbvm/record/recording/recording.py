@@ -108,13 +108,14 @@ class PlcRecording:
         self._budget = 0
         self._cost_ns = 0
         self._networks: list[Network] = []
-        self._is_open = True
+        """Those that are tapped, for the units with these addresses."""
+        self._addresses: set[str] = set()
         self.wants_plain_scans = False
         plc.record_inputs(self)
 
     def close(self) -> None:
         """Ends the recording; what was recorded stays."""
-        self._is_open = False
+        self._addresses = set()
         self._plc.record_inputs(None)
 
     # --- what was recorded --------------------------------------------------------------------------------------------
@@ -312,6 +313,7 @@ class PlcRecording:
 
     def _listen(self) -> None:
         """Taps the networks of units that are new."""
+        self._addresses = {attached.unit.address for attached in self._plc.units}
         for network in {id(attached.network): attached.network for attached in self._plc.units}.values():
             if network not in self._networks:
                 self._networks.append(network)
@@ -319,7 +321,7 @@ class PlcRecording:
 
     def _passed(self, now_ns: int, unit: str, event: TapEvent) -> None:
         """Records an event of the network at a unit of this PLC."""
-        if self._is_open and any(attached.unit.address == unit for attached in self._plc.units):
+        if unit in self._addresses:
             self._pending.traffic.append((now_ns, unit, event))
 
     # --- the ring -----------------------------------------------------------------------------------------------------
