@@ -30,11 +30,13 @@ def killed(command: list[str], grown: Path, size: int) -> int:
     """Runs a command until a file has so many bytes, and kills it.  Returns the bytes that the file had then."""
     with subprocess.Popen([sys.executable, "-m", "fbvm", *command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
         until_s = time.monotonic() + WITHIN_S
-        while not grown.exists() or grown.stat().st_size < size:
-            assert process.poll() is None, process.stderr and process.stderr.read()
-            assert time.monotonic() < until_s, f"{grown} does not grow"
-            time.sleep(0.001)
-        process.kill()
+        try:
+            while not grown.exists() or grown.stat().st_size < size:
+                assert process.poll() is None, process.stderr and process.stderr.read()
+                assert time.monotonic() < until_s, f"{grown} does not grow"
+                time.sleep(0.001)
+        finally:
+            process.kill()
         process.wait(WITHIN_S)
     assert process.returncode == -signal.SIGKILL
     return grown.stat().st_size
@@ -69,12 +71,14 @@ def test_a_server_that_saves_its_memory(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)
     with subprocess.Popen([sys.executable, "-m", "fbvm", "serve", "--port", "0", "--image", str(image)],
                           stdout=subprocess.PIPE, text=True) as process:  # fmt: skip
-        assert process.stdout
-        process.stdout.readline()
-        for _ in range(chance.randrange(1, 20)):
-            process.send_signal(signal.SIGUSR1)
-            time.sleep(chance.random() / 100)
-        process.kill()
+        try:
+            assert process.stdout
+            process.stdout.readline()
+            for _ in range(chance.randrange(1, 20)):
+                process.send_signal(signal.SIGUSR1)
+                time.sleep(chance.random() / 100)
+        finally:
+            process.kill()
         process.wait(WITHIN_S)
     words = json.loads(image.read_text(encoding="utf-8"))["spaces"]["D"]
     assert words[:CLIENTS_WORDS] == [7] * CLIENTS_WORDS
