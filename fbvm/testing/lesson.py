@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -9,7 +10,9 @@ FILE = "answers.toml"
 
 
 def predicted(test_file: str, name: str) -> object:
-    """The answer of that name beside a test.  Raises AssertionError if there is none yet."""
+    """The answer of that name beside a test; a number or a truth value also if it stands in quotes.
+
+    Raises AssertionError if there is none yet."""
     __tracebackhide__ = True
     path = Path(test_file).parent / FILE
     try:
@@ -19,4 +22,8 @@ def predicted(test_file: str, name: str) -> object:
     if answers.get(name, "") == "":
         raise AssertionError(f"{FILE}: {name} is still empty; predict first, then look")
     value: object = answers[name]
+    if isinstance(value, str):
+        if re.fullmatch(r"\s*[+-]?[0-9]{1,9}\s*", value):
+            return int(value)
+        return {"true": True, "false": False}.get(value.strip().lower(), value)
     return value

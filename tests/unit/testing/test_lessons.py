@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 from click.testing import CliRunner
+from rows import each_of
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
@@ -147,3 +148,10 @@ def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code, output = called("1", "--check")
     assert code == 0 and "lesson 1 is done; the next one: fbvm learn 2" in output
     assert re.search(r"one scan late +done\n", called()[1])
+
+
+@each_of(("written", "value"), [
+    ('"4"', 4), ('" -7 "', -7), ('"true"', True), ('"False"', False), ('"00 01"', "00 01"), ("2.5", 2.5)])  # fmt: skip
+def test_a_number_in_quotes_is_a_number(written: str, value: object, tmp_path: Path) -> None:
+    (tmp_path / "answers.toml").write_text(f"x = {written}\n", encoding="utf-8")
+    assert predicted(str(tmp_path / "test_lesson.py"), "x") == value
