@@ -36,6 +36,10 @@ from fbvm.watch.paths import UnknownPlace
 
 MOST_ROWS = 200_000
 """Rows of statements and phases that are kept, the latest ones; earlier scans have values only."""
+MOST_IN_SCAN = 20_000
+"""Rows up to which a scan is followed statement by statement; a loop of two million statements would take half a minute."""
+FIRST_IN_SCAN = 1000
+"""Rows that are kept of a scan with more: enough to see what is done again and again."""
 MOST_PICTURES = 5000
 """Drawings of rungs and charts; executions with the same states share one."""
 RUNG_WIDTH = 90
@@ -44,6 +48,10 @@ FEW_SIGNALS = 60
 POWER = -1
 """In place of a signal: whether an element of a rung conducts."""
 VERSION = 1
+
+
+class TooManyRows(Exception):
+    """A scan has more rows than a page holds; its number is the value."""
 
 
 class Collector:
@@ -145,7 +153,12 @@ class Collector:
         return self.instances.setdefault(self._trace.names.instance(frame.base), len(self.instances))
 
     def _add(self, scan: int, row: list[Any]) -> None:
-        self.rows.setdefault(scan, []).append(row)
+        rows = self.rows.setdefault(scan, [])
+        if len(rows) >= MOST_IN_SCAN:
+            self._count -= len(rows) - FIRST_IN_SCAN
+            del rows[FIRST_IN_SCAN:]
+            raise TooManyRows(scan)
+        rows.append(row)
         self._count += 1
         while self._count > MOST_ROWS and len(self.rows) > 1:
             gone, rows = self.rows.popitem(last=False)
@@ -225,11 +238,24 @@ def page_data(trace: ScanSource, names: Sequence[str] = (), scans: range | None 
     signals += [signal for name in pinned if name not in known
                 for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
     made = Collector(trace, signals)
-    trace.follow(made, scans)
+    _follow(trace, made, trace.scans if scans is None else scans)
     every = bool(names) or len(made.signals) <= FEW_SIGNALS
     made.changes = [changes if every or len(changes) > 2 or signal.place.name in pinned else []
                     for signal, changes in zip(made.signals, made.changes, strict=True)]  # fmt: skip
     return {"title": title, "pinned": [name.removeprefix(prefix) for name in pinned], **_as_data(trace, made, prefix)}
+
+
+def _follow(trace: ScanSource, made: Collector, scans: range) -> None:
+    """Follows scans; of one with too many rows the first ones, and then its end."""
+    while scans:
+        try:
+            trace.follow(made, scans)
+            return
+        except TooManyRows as long:
+            scan = long.args[0]
+        for moment in trace.moments(range(scan, scan + 1)):
+            made.phase(moment, Phase.REFRESH)
+        scans = range(scan + 1, scans.stop)
 
 
 def _in_order(trace: ScanSource) -> list[Signal]:

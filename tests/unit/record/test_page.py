@@ -18,6 +18,8 @@ from fbvm.record.draw.svg import SvgChart
 from fbvm.record.page import data as module
 from fbvm.record.page.data import page_data
 from fbvm.record.page.page import page
+from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Signal
@@ -170,3 +172,21 @@ def test_frames_are_arrows() -> None:
 def test_a_long_run_stays_a_picture() -> None:
     svg = drawn(traced(3000), "CIO 0.00")
     assert float(svg.get("width", 0)) < 2000
+
+
+def test_a_scan_with_very_many_statements_is_shown_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scan 2 of 5 passes its loop a hundred times; its first rows are there, its end, and all of the other scans."""
+    monkeypatch.setattr(module, "MOST_IN_SCAN", 60)
+    monkeypatch.setattr(module, "FIRST_IN_SCAN", 20)
+    compiled = image("PROGRAM Main\nVAR n, i, last, sum : INT; END_VAR\nn := n + 1;\nlast := SEL(n = 3, 2, 100);\n"
+                     "FOR i := 1 TO last DO sum := sum + i; END_FOR;\nEND_PROGRAM\n")  # fmt: skip
+    plc = Plc(compiled, engine="python")
+    recorded = Recording().add("main", plc)
+    plc.run(scans=5)
+    data = page_data(RecordedScans(recorded, {}))
+    rows = {int(scan): len(found) for scan, found in data["rows"].items()}
+    assert rows[2] <= 21
+    assert {scan for scan, count in rows.items() if count > 1} == {0, 1, 2, 3, 4}
+    changes = next(signal["changes"] for signal in data["signals"] if signal["name"] == "Main.sum")
+    assert value_in(changes, 2) == "5056"
+    assert value_in(changes, 4) == "5062"
