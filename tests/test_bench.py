@@ -155,9 +155,9 @@ def test_the_script_native(load: Load, small: Path, monkeypatch: pytest.MonkeyPa
 
 def test_the_script_recorder(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
     script = load("recorder")
-    monkeypatch.setattr(script, "MINUTES_10", 50)
-    monkeypatch.setattr(script, "SCANS_OF_A_PAGE", 20)
-    monkeypatch.setattr(script, "PROGRAMS", {"demo": script.PROGRAMS["demo"]})
+    for name, scans in (("NATIVE_SCANS", 20), ("PYTHON_SCANS", 5), ("OBSERVED_SCANS", 2), ("TIMES", 1), ("LEAST_SCANS", 10),
+                        ("WARM", 2)):  # fmt: skip
+        monkeypatch.setattr(script, name, scans)
     monkeypatch.setattr(script.shutil, "which", lambda name: None)
     monkeypatch.setattr(sys, "argv", ["recorder.py", "20"])
     script.main()

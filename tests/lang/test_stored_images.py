@@ -22,7 +22,8 @@ def test_programs_come_back_as_they_were() -> None:
         if image is not None:
             back = decode(encode(image))
             assert replace(back, bodies=()) == replace(image, bodies=()), program
-            assert [body.code for body in back.bodies] == [body.code for body in image.bodies], program
+            for one, other in zip(back.bodies, image.bodies, strict=True):  # by their text: NaN is not equal to NaN
+                assert repr(one.code) == repr(other.code), program
             assert encode(back) == encode(image), program
             compared += 1
     assert compared > 50
