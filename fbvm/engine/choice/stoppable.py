@@ -77,6 +77,7 @@ class StoppableEngine:
         Returns the trap that ended them, if any.  Raises what the test of a breakpoint raises."""
         if self._native is None and self._code and self._code.ready:
             self._native = native.NativeEngine(self._image, self._memory, 2, self._stops)
+            self._native.allowance = self._python.allowance
         if self._native is None:
             return self._observe(task_index)
         seen = self._keep()
