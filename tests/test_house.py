@@ -115,6 +115,15 @@ SYSTEM_NAMES = {
                "pthread_sigmask"},
 }  # fmt: skip
 """Names of Python's library that only some systems have, or that mean something else on each."""
+MENTIONED = re.compile(
+    "|".join(
+        [
+            r"\b(?:hasattr|getattr)\(",
+            *(rf"\b{module}\.(?:{'|'.join(names)})\b|\bfrom {module} " for module, names in SYSTEM_NAMES.items()),
+        ]
+    )
+)
+"""What stands in the text of a module that may use one of these names: a search is quicker than a walk through the tree."""
 HOST = "base/host.py"
 SYSTEM_ELSEWHERE = {
     "run/interrupts.py": {"signal.signal"},  # delays Ctrl-C, which every system has, in the loop that it belongs to
@@ -268,7 +277,7 @@ def of_systems(path: Path) -> list[str]:
     if name_of(path) == HOST:
         return []
     found = [name for name in imports(path) if name.split(".")[0] in SYSTEM_MODULES]
-    for node in ast.walk(tree(path)):
+    for node in ast.walk(tree(path)) if MENTIONED.search(text_of(path)) else ():
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
             if node.attr in SYSTEM_NAMES.get(node.value.id, ()):
                 found.append(f"{node.value.id}.{node.attr}")
@@ -287,7 +296,8 @@ def test_what_differs_by_operating_system_stands_in_one_module() -> None:
 
 def written_in_place(path: Path) -> list[str]:
     """The calls with which a module writes into a file that is there under its name before it is whole."""
-    if name_of(path) in ("base/files.py", "record/trace/memory_images.py"):
+    places = ("base/files.py", "record/trace/memory_images.py")
+    if name_of(path) in places or not re.search(r"\bwrite_(text|bytes)\b", text_of(path)):
         return []
     return [node.func.attr for node in ast.walk(tree(path)) if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
             and node.func.attr in ("write_text", "write_bytes")]  # fmt: skip

@@ -100,6 +100,7 @@ def test_a_room_has_files_and_tests() -> None:
         m.files_of("nowhere")
 
 
+@pytest.mark.slow
 def test_every_room_has_tests() -> None:
     rooms = [path for path in sorted((HOUSE / "fbvm").iterdir()) if (path / "__init__.py").is_file()]
     assert len(rooms) > 10

@@ -17,6 +17,7 @@ from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Plc
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "table", [pytest.param(list(inside), id=stem) for stem, inside in groupby(programs(HERE), lambda p: p.path.stem)])
 def test_features(table: list[Program]) -> None:

@@ -83,6 +83,7 @@ QUANTITIES = {"Fn01": "Coil_Qty", "Fn02": "Coil_Qty", "Fn03": "Register_Qty", "F
               "Fn0F": "Coil_Qty", "Fn10": "Register_Qty"}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", first_quick(QUANTITIES))
 def test_each_client_block_on_a_network(fb: Fb, network: LoopNetwork, name: str) -> None:
     """The block beside MTCP_ETN_Connect, as its library's README has them: one command, one good reply."""

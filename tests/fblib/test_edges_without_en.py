@@ -67,12 +67,14 @@ def plc_of(text: str, unit: Unit) -> tuple[Plc, ModbusPeer]:
     return plc, peer
 
 
+@pytest.mark.slow
 def test_the_client_program_of_the_etn21() -> None:
     for steps, expected in ((RISES_AND_STAYS, [0, 0, 1]), (RISES_AND_FALLS, [0] * 4), (FALLS_AND_RISES, [1] * 5)):
         plc, peer = plc_of(ETN_CLIENT, Etn21(0, "192.168.250.1"))
         assert requests(plc, peer, "En", "Command", steps) == expected
 
 
+@pytest.mark.slow
 def test_mbp_mstr_with_edges() -> None:
     for steps, expected in ((RISES_AND_STAYS, [0, 0, 1]), (RISES_AND_FALLS, [0] * 4), (FALLS_AND_RISES, [1] * 5)):
         plc, peer = plc_of(MSTR.format(edge="TRUE"), Noc(7, "192.168.250.1"))

@@ -413,6 +413,7 @@ def plc_of(source: str | Path, network: LoopNetwork, address: str, timing: str, 
     return plc
 
 
+@pytest.mark.slow
 @TIMINGS
 def test_the_two_programs_of_the_project(timing: str) -> None:
     network = LoopNetwork()
@@ -457,6 +458,7 @@ END_PROGRAM
 """
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize("cut", first_quick([0, 7]))
 @pytest.mark.parametrize("fn0f", first_quick([False, True]))

@@ -147,6 +147,7 @@ def test_a_client_that_vanishes_is_left_after_the_idle_time(timing: str) -> None
     assert second.ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 def test_a_client_that_asks_now_and_then_is_not_left() -> None:
     rig = Rig("Idle_Time := T#2s")
     client = rig.client()
@@ -250,6 +251,7 @@ def test_the_unit_tells_who_is_connected() -> None:
 # --- several at once --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize("sockets", [2, 8])
 def test_several_clients_at_once(timing: str, sockets: int) -> None:

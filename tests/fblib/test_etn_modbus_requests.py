@@ -110,6 +110,7 @@ def test_10_at_its_limits(address: int, quantity: int, full_dm: bool) -> None:
         assert reply == pdu[:5], "only where it begins is limited"
 
 
+@pytest.mark.slow
 @each_of("address", [0, 1, 15, 16, 0x22, 5119, 5120, 65520, 65535])
 @each_of("value", [0xFF00, 0x0000, 0x0001, 0xFFFF, 0xFE00, 0x00FF])
 def test_05_at_its_limits(address: int, value: int) -> None:
@@ -120,6 +121,7 @@ def test_05_at_its_limits(address: int, value: int) -> None:
     assert model.agrees(rig)
 
 
+@pytest.mark.slow
 @each_of("address", [0, 1, 32767, 32768, 65535])
 @each_of("value", [0, 1, 0x8000, 0xFFFF])
 def test_06_at_its_limits(address: int, value: int) -> None:

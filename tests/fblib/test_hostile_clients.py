@@ -205,6 +205,7 @@ def rig_of(kind: str, engine: str) -> ServerRig:
     return ServerRig(kind, engine=engine)
 
 
+@pytest.mark.slow
 @servers
 @engines
 def test_what_is_not_valid_gets_its_exception(kind: str, engine: str) -> None:
@@ -227,6 +228,7 @@ def test_what_is_not_valid_gets_its_exception(kind: str, engine: str) -> None:
     assert (rig.registers(), client.end) == (before, "")
 
 
+@pytest.mark.slow
 @servers
 @engines
 def test_what_is_no_modbus_is_closed(kind: str, engine: str) -> None:

@@ -126,6 +126,7 @@ def test_sums_and_differences(a: int, b: int, carry: bool) -> None:
         assert (after.get(2, 0), flags) == (result, wanted), sign
 
 
+@pytest.mark.slow
 @settings(max_examples=times(60), deadline=None)
 @given(WORD, WORD)
 def test_products_and_quotients(a: int, b: int) -> None:
@@ -135,6 +136,7 @@ def test_products_and_quotients(a: int, b: int) -> None:
     assert (after.get(2, 0), after.get(3, 0)) == (divmod(a, b) if b else (0, 0)) and ("ER" in flags) == (not b)
 
 
+@pytest.mark.slow
 @settings(max_examples=times(60), deadline=None)
 @given(st.integers(0, 9999), st.integers(0, 9999))
 def test_bcd(a: int, b: int) -> None:

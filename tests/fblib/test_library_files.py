@@ -58,6 +58,7 @@ def test_no_block_gives_a_message(path: Path) -> None:
     assert [d for d in made.diagnostics if d.source.library] == []
 
 
+@pytest.mark.slow
 def test_the_program_and_the_charts_in_the_readme() -> None:
     readme = (MTCP / "README.md").read_text(encoding="utf-8")
     text = re.search(r"```\n(PROGRAM.*?)```", readme, re.S)

@@ -338,6 +338,7 @@ def test_areas_that_overlap(passed: dict[str, str], overlaps: bool) -> None:
     assert told == (["8389 ERROR"] * 4 if overlaps else ["7002"] * 4)
 
 
+@pytest.mark.slow
 def test_located_areas_that_overlap() -> None:
     text = """
     PROGRAM Main
@@ -441,6 +442,7 @@ def several(count: int) -> str:
     """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "at_most"), first_quick([("T3", 8), ("T4", 32)]))
 def test_as_many_instances_as_the_controller_has_connections(model: str, at_most: int) -> None:
     """Each on its own port; one more waits for ever."""
@@ -463,6 +465,7 @@ def test_clients_one_after_the_other_and_no_second_one() -> None:
     assert second.connect().ask("03 0000 0001") == "03 02 00 00"
 
 
+@pytest.mark.slow
 def test_the_same_on_both_engines() -> None:
     pytest.importorskip("llvmlite")
     plcs = []

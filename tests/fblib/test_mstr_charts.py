@@ -246,6 +246,7 @@ def test_a_waiting_block_may_be_aborted_or_give_up() -> None:
     assert (rig.outputs(1), rig.status(1), rig.outputs(2)) == ("E", "1001", "")
 
 
+@pytest.mark.slow
 def test_a_module_that_restarts_gives_all_paths_back() -> None:
     rig = many(17)
     rig.scan(2)
@@ -259,6 +260,7 @@ def test_a_module_that_restarts_gives_all_paths_back() -> None:
 # --- the README ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_program_and_the_charts_of_the_readme() -> None:
     readme = (data_folder("fblib") / "schneider" / "mbp_mstr" / "README.md").read_text(encoding="utf-8")
     text = re.findall(r"```\n(PROGRAM.*?)```", readme, re.S)[0]

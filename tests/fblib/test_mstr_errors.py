@@ -66,6 +66,7 @@ def test_2003_a_write_from_a_buffer_that_is_too_short() -> None:
     assert Rig(databuf="ARRAY[0..2] OF WORD").operate(*WRITE) == "0000"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", [READ, changed(BOTH, w3=1), changed(LOCAL, w3=3), changed(REMOTE, w3=3)])
 def test_200f_an_answer_that_does_not_fit(control: tuple[int, ...]) -> None:
     """Older libraries know 2003 only."""
@@ -118,6 +119,7 @@ def test_2011_octets_above_255_assumed(octet: int) -> None:
     assert refused(changed(READ, **{f"w{octet}": 256})) == "2011"
 
 
+@pytest.mark.slow
 @each_of("slot", [0, 6, 8, 16, 17, 100, 253, 254, 255])
 @each_of("control", [READ, LOCAL, (4, 0, 0, 0, 0), (10, 0, 0, 0, 0), (0xFFF0, 0, 1, 1, 0, 0, 0, 0, 0)])
 def test_6007_slots_without_a_module(slot: int, control: tuple[int, ...]) -> None:
@@ -274,6 +276,7 @@ def test_words_that_the_operation_does_not_have_may_change_and_so_may_the_result
 # --- what the server says -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("exception", [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 255])
 @each_of(("control", "function"), [(READ, 3), (WRITE, 16), (BOTH, 23), (REMOTE, 8), (CLEAR, 8)])
 def test_30ss_exceptions(exception: int, control: tuple[int, ...], function: int) -> None:
@@ -357,6 +360,7 @@ def test_503d_refused() -> None:
     assert Rig(refused=True).operate(*READ) == "503D"
 
 
+@pytest.mark.slow
 @each_of(("errno", "number"), [(name, number) for name, number in ERRNO.items()])
 def test_50xx_an_open_that_fails(errno: str, number: int) -> None:
     rig = Rig()
@@ -382,6 +386,7 @@ def test_5036_in_the_middle_of_a_reply() -> None:
     assert rig.operate(*READ) == "5036"
 
 
+@pytest.mark.slow
 def test_503c_nobody_answers_the_call() -> None:
     class Deaf(Station):
         deaf = True

@@ -157,6 +157,7 @@ def test_the_lines_are_used_again_when_all_are_taken() -> None:
 # --- arrays -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", first_quick(["INT", "UINT", "WORD"]))
 @pytest.mark.parametrize("bounds", first_quick(["1..11", "0..10", "-5..5", "100..200"]))
 def test_control_and_databuf_of_any_type_and_base(kind: str, bounds: str) -> None:

@@ -89,6 +89,7 @@ REFUSED = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @each_of("request_pdu", REFUSED)
 def test_what_is_refused_changes_nothing(request_pdu: str) -> None:
     station = Station()

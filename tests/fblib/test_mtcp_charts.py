@@ -40,6 +40,7 @@ def test_exact(block: str) -> None:
     )
 
 
+@pytest.mark.slow
 @each_of("block", BLOCKS)
 def test_real(block: str) -> None:
     """Switches and flags are out of step: the reply waits before the Sending flag has fallen."""

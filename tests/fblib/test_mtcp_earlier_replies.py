@@ -46,6 +46,7 @@ class LateRig(Rig):
         return self.code(name) or "ok"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late", ["one", "three", "wr"])
 @pytest.mark.parametrize("asked", ["one", "three", "wr"])
 @pytest.mark.parametrize("surplus", [-3, 0, 4])

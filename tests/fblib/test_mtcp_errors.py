@@ -180,6 +180,7 @@ def test_half_a_reply_and_nothing_more(size: int) -> None:
 # --- the connection ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("size", [0, 3, 6, 8, 14])
 @each_of(("end", "expected"), [(Fin(), "0081"), (Leave(), "0081"), (Reset(), "004B")])
 def test_the_server_closes_in_mid_reply(size: int, end: Action, expected: str) -> None:
@@ -205,6 +206,7 @@ def test_the_server_closed_between_two_commands() -> None:
     next_command_is_good(rig)
 
 
+@pytest.mark.slow
 @each_of("wired", [True, False])
 @each_of("after", range(1, 10))
 def test_connect_falls_in_mid_request(after: int, wired: bool) -> None:
@@ -256,6 +258,7 @@ TOO_MUCH |= {
 """Data in the words in which the exchange takes place, or where the unit keeps its parameters, would be wrong data."""
 
 
+@pytest.mark.slow
 @each_of("block", TOO_MUCH)
 def test_what_cannot_be_sent_fails_at_once(block: str) -> None:
     rig = Rig(rd=block).connect()
@@ -358,6 +361,7 @@ def test_error_and_code_hold_until_the_next_command() -> None:
 UNIT_CODES = ["0302", "1100", "1103", "220F", "2211", "2606", "2607", "0020", "003E", "0045", "004E", "0051", "0053"]
 
 
+@pytest.mark.slow
 @each_of("service", [Switch.SEND, Switch.RECEIVE])
 @each_of("expected", UNIT_CODES)
 def test_a_code_of_the_unit_is_passed_through(service: Switch, expected: str) -> None:
@@ -371,6 +375,7 @@ def test_a_code_of_the_unit_is_passed_through(service: Switch, expected: str) ->
     next_command_is_good(rig)
 
 
+@pytest.mark.slow
 @each_of("word", [0, 2, 9, 0x0101, 0xFFFF])
 @each_of("after", [0, 1, 2, 3, 4])
 def test_somebody_overwrites_the_parameter_area(word: int, after: int) -> None:

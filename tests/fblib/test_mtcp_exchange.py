@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from mtcp_rig import Rig, answering
 from rows import each_of
 
@@ -196,6 +197,7 @@ def test_transaction_numbers_differ() -> None:
     assert len(set(numbers)) == 4
 
 
+@pytest.mark.slow
 @each_of(("slave", "sent"), [(0, 0xFF), (1, 1), (247, 247), (255, 255)])
 def test_the_slave_id(slave: int, sent: int) -> None:
     rig = Rig(rd=READ.replace(")", f", SlaveID := {slave})")).connect()

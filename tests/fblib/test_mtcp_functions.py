@@ -44,6 +44,7 @@ def test_bits_read(code: str, quantity: int) -> None:
     assert rig.all_words() == expected
 
 
+@pytest.mark.slow
 @each_of("quantity", [*REGISTERS, 125])
 @each_of("code", ["03", "04"])
 def test_registers_read(code: str, quantity: int) -> None:

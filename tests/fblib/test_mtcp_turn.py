@@ -56,6 +56,7 @@ def test_two_commands_in_one_scan() -> None:
     assert both_are_right(rig)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("connect_last", [False, True])
 @pytest.mark.parametrize("order", [1, -1])
 def test_any_order_of_calls(order: int, connect_last: bool) -> None:
@@ -186,6 +187,7 @@ END_CONFIGURATION
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slow", first_quick([10, 20, 50, 100, 150]))
 def test_blocks_in_tasks_of_different_intervals(slow: int) -> None:
     """A block that is called seldom keeps its turn, and gets it although another always wants it."""

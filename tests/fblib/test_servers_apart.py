@@ -107,6 +107,7 @@ def test_any_mixture_of_clients(kind: str, seed: int, engine: str) -> None:
     next_client_is_served(rig, callers[0])
 
 
+@pytest.mark.slow
 @every_kind
 def test_what_comes_with_the_connection_is_served(kind: str) -> None:
     """Whatever is no valid request has its exception; nobody is closed who said frames."""

@@ -46,6 +46,7 @@ each_kind = pytest.mark.parametrize(
     "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind not in QUICK)) for kind in (*INTEGERS, *BITS)])
 
 
+@pytest.mark.slow
 @each_kind
 def test_operators(kind: str) -> None:
     operators = ("+", "-", "*", "/", "MOD") if kind in INTEGERS else ("AND", "OR", "XOR")
@@ -66,6 +67,7 @@ def test_conversions(source: str, target: str) -> None:
     assert as_variables(f"a : {source}; r : {target};", f"{function}(a)", rows) == want
 
 
+@pytest.mark.slow
 @each_kind
 def test_unary_and_shifts(kind: str) -> None:
     values, rows = edges(WIDTHS[kind]), [{"a": a} for a in literals(kind)]

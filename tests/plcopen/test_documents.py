@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 
 from fbvm.base.diagnostics import Source
@@ -56,6 +57,7 @@ def test_importing_again_gives_the_same_to_the_letter() -> None:
     assert [d.render() for d in first.diagnostics] == [d.render() for d in second.diagnostics]
 
 
+@pytest.mark.slow
 def test_files_that_are_there_stay_without_force(tmp_path: Path) -> None:
     (tmp_path / "Pump.st").write_text("mine", encoding="utf-8")
     command = ["import", str(DOCUMENTS / "beremiz.xml"), "-o", str(tmp_path)]

@@ -200,6 +200,7 @@ END_PROGRAM
 """
 
 
+@pytest.mark.slow
 def test_rungs_and_statements_between_them_mean_the_same_for_all_inputs() -> None:
     back = there_and_back(RUNGS)
     assert "RUNG 1 Nested blocks" in back.files["Main.st"]

@@ -183,6 +183,7 @@ def test_durations(kind: str) -> None:
 DAY_NS = 86_400_000_000_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("clock", "duration"), [("TOD", "TIME"), ("LTOD", "LTIME")])
 def test_times_of_day(clock: str, duration: str) -> None:
     declared = f"a, c, later, sooner : {clock}; d, apart : {duration};"
@@ -210,6 +211,7 @@ def test_conversions_between_integers_and_bits(source: str) -> None:
     check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", first_quick(UNSIGNED))
 def test_decimal_digits_in_nibbles(kind: str) -> None:
     word = {8: "BYTE", 16: "WORD", 32: "DWORD", 64: "LWORD"}[UNSIGNED[kind]]

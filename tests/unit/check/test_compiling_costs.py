@@ -36,6 +36,7 @@ def test_functions_that_call_the_next_twice_are_looked_at_once() -> None:
     assert [d.code for d in compile_text(text).diagnostics] == ["S0491"], "2 ** 60 ways through them"
 
 
+@pytest.mark.slow
 def test_what_a_compilation_leaves_does_not_wait_for_the_collector() -> None:
     gc.collect()
     gc.freeze()  # what other tests have left is not looked through again and again
@@ -97,6 +98,7 @@ def test_instances_in_instances_are_looked_through_once_a_type() -> None:
     assert _calls("\n".join([*blocks, "PROGRAM Main VAR s : S16; END_VAR s(); END_PROGRAM"])) < 60_000
 
 
+@pytest.mark.slow
 def test_labels_are_compared_with_their_neighbours() -> None:
     def calls(labels: int) -> int:
         branches = "".join(f"{7 * n % labels * 3}, {7 * n % labels * 3 + 1}: n := {n};\n" for n in range(labels))

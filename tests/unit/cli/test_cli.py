@@ -150,6 +150,7 @@ def test_a_chart_is_drawn(counter: str) -> None:
     """
 
 
+@pytest.mark.slow
 def test_quiet_in_a_pipe(counter: str) -> None:
     assert run("--scans", "5000").output == ""
 
@@ -232,6 +233,7 @@ def test_which_of_several_programs(counter: str) -> None:
 # --- run: networks ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_example_runs_against_a_peer_in_memory(tmp_path: Path) -> None:
     capture = tmp_path / "demo.pcapng"
     result = fbvm("run", DEMO, "--until", "Main.Done", "--max", "5s", "--map", "192.168.250.1:502=peer", "--json",
@@ -252,6 +254,7 @@ def test_without_a_server_the_example_goes_on_trying() -> None:
 # --- check, list, explain ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_check_is_silent_when_nothing_is_wrong() -> None:
     result = fbvm("check", DEMO)
     assert (result.exit_code, result.output) == (0, "")

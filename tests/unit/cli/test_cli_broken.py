@@ -70,6 +70,7 @@ def test_numbers_of_many_digits_in_declarations(fbvm: Fbvm, declared: str) -> No
     assert fbvm("check", "wrong.st").exit_code == 3
 
 
+@pytest.mark.slow
 @each_of("step", [
     "LD N0.0", "LD DN0", "TIM N0 #5", "TIM TN0 #5", "MOV &N0 D0", "MOV ,IRN0 D0",
     "MOV +N0,IR0 D0", "OUT TRN0", "JMP N0", "FAL N0 #0", "CNR TN0 T1", "MOV(N0) D0 D1",
@@ -120,6 +121,7 @@ WRONG_TOML = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @each_of("line", [*WRONG_TOML, "cycle = N0", 'cycle = "N0ms"', f'program = {"[" * 200}{"]" * 200}'])
 def test_a_project_that_python_does_not_read(fbvm: Fbvm, line: str) -> None:
     Path("fbvm.toml").write_text(f"{PLC}{long(line)}\n", encoding="utf-8")

@@ -90,6 +90,7 @@ def test_the_peer_speaks_like_the_others(busy: int) -> None:
     assert (done.returncode, done.stderr) == (5, f"127.0.0.1:{busy} cannot be used: somebody else listens there\n")
 
 
+@pytest.mark.slow
 def test_an_address_of_another_host(fbvm: Fbvm) -> None:
     project((f"{UNIT[:-1]}:502", "192.0.2.1:1502"))
     for arguments in (("serve", "--bind", "192.0.2.1"), ("run", "."),
@@ -121,6 +122,7 @@ def test_a_door_to_a_unit_that_is_not_there(fbvm: Fbvm) -> None:
     assert result.stderr == f"10.0.0.1:502 cannot be used: no unit has the address 10.0.0.1; units: {UNIT}\n"
 
 
+@pytest.mark.slow
 def test_a_server_without_a_map_is_told_what_to_write(fbvm: Fbvm) -> None:
     result = fbvm("run", "server.st", "--net", "tcp", "--scans", "30")
     assert result.exit_code == 0
@@ -134,6 +136,7 @@ def test_a_server_without_a_map_is_told_what_to_write(fbvm: Fbvm) -> None:
     assert 'write [[door]] with address = "192.168.250.2:502" and bind = "127.0.0.1:1502"' in result.stderr
 
 
+@pytest.mark.slow
 def test_a_map_to_a_dead_port_says_so(fbvm: Fbvm) -> None:
     with socket.create_server(("127.0.0.1", 0)) as sock:
         port = sock.getsockname()[1]
@@ -149,6 +152,7 @@ def test_a_map_to_a_dead_port_says_so(fbvm: Fbvm) -> None:
 # --- where doors are, and who can reach them ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("key", ["bind", "host"])
 def test_where_a_door_is_is_printed_at_the_start(fbvm: Fbvm, key: str) -> None:
     project(("192.168.250.2:502", "127.0.0.1:0"), key=key)
@@ -158,6 +162,7 @@ def test_where_a_door_is_is_printed_at_the_start(fbvm: Fbvm, key: str) -> None:
     assert "Other computers" not in result.stderr
 
 
+@pytest.mark.slow
 def test_every_way_that_others_can_reach_warns_in_one_voice(fbvm: Fbvm) -> None:
     project(("192.168.250.2:502", "0.0.0.0:0"))
     for arguments in (
@@ -236,6 +241,7 @@ def test_settings_of_the_shipped_program_are_refused_for_ones_own(fbvm: Fbvm) ->
     assert fbvm("serve", "wrong.st").exit_code == 3
 
 
+@pytest.mark.slow
 def test_the_image_says_which_words_it_does_not_set(fbvm: Fbvm, busy: int) -> None:
     words = {"CIO": [7] * 1500, "D": [0] * 30010 + [1, 2, 0, 3]}
     Path("some.json").write_text(json.dumps({"spaces": words}), encoding="utf-8")

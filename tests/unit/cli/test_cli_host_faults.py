@@ -122,6 +122,7 @@ def test_streams_that_are_closed(tmp_path: Path) -> None:
         assert b"Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("encoding", "verb"), first_quick([
     ("cp1252", ("ladder", "ladder.st")), ("ascii", ("ladder", "ladder.st")), ("ascii", ("sfc", "sfc.st")),
     ("cp437", ("sfc", "sfc.st")), ("cp850", ("ladder", "ladder.st")), ("cp850", ("sfc", "sfc.st")), ("cp1252", ("sfc", "sfc.st")),

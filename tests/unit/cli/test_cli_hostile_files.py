@@ -37,6 +37,7 @@ def fbvm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fbvm:
     return lambda *arguments: CliRunner().invoke(main, arguments, catch_exceptions=False)
 
 
+@pytest.mark.slow
 @needs_devices
 @each_of(("verb", "status"), [
     (("check", "{}"), 3), (("fmt", "{}"), 3), (("list", "{}"), 3), (("export", "{}", "-o", "out.xml"), 3),
@@ -78,6 +79,7 @@ def test_what_is_no_file_in_a_project_or_a_library(fbvm: Fbvm, what: str) -> Non
     assert "it is no file" in fbvm("check", "counter.st", "--library", "own").output
 
 
+@pytest.mark.slow
 def test_a_file_that_is_too_large(fbvm: Fbvm) -> None:
     with Path("large.st").open("wb") as file:
         file.truncate(files.SOURCE_BYTES + 1)

@@ -53,6 +53,7 @@ def test_the_same_seed_is_the_same_run(here: Path) -> None:
     assert a == b != c
 
 
+@pytest.mark.slow
 def test_a_replay_shows_what_was_not_asked_for(here: Path) -> None:
     fbvm("run", DEMO, *PEER, "--until", "Main.Done", "--journal", "run.journal")
     result = fbvm("replay", "run.journal", "--until", "Main.Read.Rcv_Counter = 1", "--show", "Main.Step",

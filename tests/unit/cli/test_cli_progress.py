@@ -6,6 +6,7 @@ import io
 from collections.abc import Iterator
 from itertools import groupby
 
+import pytest
 from rich.console import Console
 
 from fbvm import Source, compile_sources
@@ -32,6 +33,7 @@ def test_what_takes_long_says_what_it_does() -> None:
     assert "checking long.st: read 25 %" in said(True, QUICK_S)
 
 
+@pytest.mark.slow
 def test_a_compilation_tells_how_far_it_is() -> None:
     text = "".join(f"FUNCTION F{n} : INT F{n} := {n}; END_FUNCTION\n" for n in range(800)) + "PROGRAM Main END_PROGRAM\n"
     told: list[tuple[str, int, int]] = []

@@ -64,6 +64,7 @@ def test_a_text_in_which_control_characters_are_shown() -> None:
     assert one_line("a\nb\tc\udcff") == "a\\nb\\tc\\udcff"
 
 
+@pytest.mark.slow
 def test_what_a_program_says_wrong(fbvm: Fbvm) -> None:
     for verb in ("check", "run", "list", "ladder", "sfc", "fmt", "step", "export"):
         extra = {"run": ("--scans", "2"), "export": ("-o", "out.xml"), "fmt": ("--check",)}.get(verb, ())
@@ -75,6 +76,7 @@ def test_what_a_program_says_wrong(fbvm: Fbvm) -> None:
     fbvm("fmt", NAME)
 
 
+@pytest.mark.slow
 @each_of("name", TOML)
 def test_what_a_project_says(fbvm: Fbvm, name: str) -> None:
     folder = Path(f"p{EVIL}")
@@ -87,6 +89,7 @@ def test_what_a_project_says(fbvm: Fbvm, name: str) -> None:
     fbvm("run", str(folder))
 
 
+@pytest.mark.slow
 def test_options_and_arguments(fbvm: Fbvm) -> None:
     for arguments in (
         ("explain", EVIL), (f"no{EVIL}",), (f"--no{EVIL}",), ("run", "counter.st", f"--no{EVIL}"), ("map", f"D{EVIL}"),
@@ -102,6 +105,7 @@ def test_options_and_arguments(fbvm: Fbvm) -> None:
         fbvm(*arguments)
 
 
+@pytest.mark.slow
 def test_recordings_and_journals(fbvm: Fbvm) -> None:
     fbvm("run", NAME, "--scans", "3", "--trace", f"t{EVIL}.trace", "--depth", "statements", "--journal", f"j{EVIL}.jsonl")
     for verb in ("chart", "table", "why", "convert", "replay"):
@@ -117,6 +121,7 @@ def test_recordings_and_journals(fbvm: Fbvm) -> None:
             fbvm("replay", "evil.jsonl")
 
 
+@pytest.mark.slow
 def test_images_and_documents(fbvm: Fbvm) -> None:
     for text in ('{"spaces": {"\x1b": []}}', json.dumps({"spaces": {EVIL: []}}), json.dumps({"spaces": {"D": [EVIL]}})):
         Path(f"i{EVIL}.json").write_text(text, encoding="utf-8")
@@ -132,6 +137,7 @@ def test_every_verb_is_tried() -> None:
     assert set(GROUP_OF) - tried == {"demo", "peer"}
 
 
+@pytest.mark.slow
 def test_nothing_prints_past_the_terminal_module() -> None:
     """Only `terminal.say` prints: click's own functions and `print` know nothing of control characters."""
     for path in FOLDER.rglob("*.py"):

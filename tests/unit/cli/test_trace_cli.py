@@ -45,6 +45,7 @@ def test_a_long_chart_is_wrapped_and_cut(fbvm: Fbvm) -> None:
     assert fbvm("chart", "run.fbtrace", "Main.Pump", "--whole", "--width", "40").output.count("Main.Pump") == 3
 
 
+@pytest.mark.slow
 def test_a_page_and_a_picture_of_a_trace(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "statements")
     assert fbvm("convert", "run.fbtrace", "run.html").exit_code == 0
@@ -56,6 +57,7 @@ def test_a_page_and_a_picture_of_a_trace(fbvm: Fbvm) -> None:
         assert fbvm("convert", "run.fbtrace", target, "--scans", "900..").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_capture_of_a_trace(fbvm: Fbvm, tmp_path: Path) -> None:
     demo = str(Path(__file__).parents[3] / "examples" / "demo.st")
     assert fbvm("run", demo, "--until", "Main.Done", "--map", "192.168.250.1:502=peer", "--trace", "demo.fbtrace",
@@ -65,6 +67,7 @@ def test_a_capture_of_a_trace(fbvm: Fbvm, tmp_path: Path) -> None:
     assert fbvm("convert", "demo.fbtrace", "trace.pcapng", "Main.Done").exit_code == 2
 
 
+@pytest.mark.slow
 def test_states_of_sockets_have_names(fbvm: Fbvm) -> None:
     demo = str(Path(__file__).parents[3] / "examples" / "demo.st")
     assert fbvm("run", demo, "--until", "Main.Done", "--map", "192.168.250.1:502=peer", "--trace", "demo.fbtrace").exit_code == 0
@@ -103,6 +106,7 @@ def test_every_statement(fbvm: Fbvm) -> None:
     assert "pump.st:16" in fbvm("table", "run.fbtrace", "D200", "--scans", "8", "--every").output
 
 
+@pytest.mark.slow
 def test_why(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "statements")
     result = fbvm("why", "D200", "--scan", "41")
@@ -134,6 +138,7 @@ def test_what_cannot_be_converted_leaves_files_as_they_were(fbvm: Fbvm) -> None:
         assert [path.read_text() for path in Path().glob(target)] == ["old"] * ("old" in target), target
 
 
+@pytest.mark.slow
 def test_out_as_vcd(fbvm: Fbvm) -> None:
     pytest.importorskip("vcd")
     record(fbvm)
@@ -141,6 +146,7 @@ def test_out_as_vcd(fbvm: Fbvm) -> None:
     assert "$scope module Delay $end" in Path("run.vcd").read_text()
 
 
+@pytest.mark.slow
 def test_vcd_without_its_package(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "vcd", None)
     record(fbvm)
@@ -155,6 +161,7 @@ def test_only_what_is_selected(fbvm: Fbvm) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "said"), [
     ("chart pump.st", "this is no trace"),
     ("chart run.fbtrace Foo", "there is no Foo"),
@@ -189,6 +196,7 @@ def test_why_wants_one_trace_and_one_place(fbvm: Fbvm) -> None:
     assert "scan 99 is not in the trace" in fbvm("why", "D200", "b.fbtrace", "--scan", "99").output
 
 
+@pytest.mark.slow
 def test_what_the_guide_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     guide = (Path(__file__).parents[3] / "docs" / "howto" / "recording.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```(\w+)\n(.*?)^```", guide, re.M | re.S)

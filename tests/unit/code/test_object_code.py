@@ -135,6 +135,7 @@ def test_references_into_a_linked_block_and_a_block_that_programs_complete() -> 
         assert [whole(compile_text(text)) for _ in range(4)] == [alone] * 4
 
 
+@pytest.mark.slow
 def test_what_is_kept_leads_to_no_program() -> None:
     for text in (with_blocks(["MBP_MSTR", "TON"]), (EXAMPLES / "client.st").read_text(encoding="utf-8")):
         for _ in range(2):
@@ -150,6 +151,7 @@ def test_what_is_kept_leads_to_no_program() -> None:
             left += gc.get_referents(item)
 
 
+@pytest.mark.slow
 def test_what_is_kept_has_an_end() -> None:
     sizes = []
     for number in range(3):

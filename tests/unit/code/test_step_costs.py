@@ -104,6 +104,7 @@ END_FUNCTION
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ENDLESS)
 def test_every_engine_ends_an_endless_loop_after_the_same_work(what: str) -> None:
     declarations, statement = ENDLESS[what]

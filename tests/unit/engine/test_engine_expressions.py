@@ -6,6 +6,7 @@ import math
 import struct
 from typing import Any
 
+import pytest
 from expression_rows import NUMBERS, RUNS, STRINGS
 from hand_image import at, behind, const, execute, load, operations_in, store, yields
 from rows import each_of
@@ -124,6 +125,7 @@ def test_two_operands(name: str, machine: str, a: Any, b: Any, wanted: Any) -> N
             assert same(yields(machine, (name, machine, x, y, *sited(name)), before | more), wanted), (x, y)
 
 
+@pytest.mark.slow
 @each_of(("name", "machine", "a", "b", "wanted"), COMPARISONS)
 def test_comparison(name: str, machine: str, a: Any, b: Any, wanted: bool) -> None:
     (left, before), (right, more) = slot(machine, a), slot(machine, b, second=True)
@@ -139,6 +141,7 @@ def test_one_operand(name: str, machine: str, a: Any, wanted: Any) -> None:
         assert same(yields(machine, (name, machine, x), before), wanted)
 
 
+@pytest.mark.slow
 @each_of(("name", "machine", "a", "n", "wanted"), SHIFTS)
 def test_shift(name: str, machine: str, a: int, n: int, wanted: Any) -> None:
     (operand, before), (by, more) = slot(machine, a), slot("i64", n, second=True)
@@ -147,6 +150,7 @@ def test_shift(name: str, machine: str, a: int, n: int, wanted: Any) -> None:
             assert yields(machine, (name, machine, x, y, 7), before | more) == wanted
 
 
+@pytest.mark.slow
 @each_of(("name", "machine", "source", "a", "wanted"), CONVERSIONS)
 def test_conversion(name: str, machine: str, source: str, a: Any, wanted: Any) -> None:
     operand, before = slot(source, a)
@@ -156,6 +160,7 @@ def test_conversion(name: str, machine: str, source: str, a: Any, wanted: Any) -
         assert same(yields(machine, (name, machine, source, x, *sited(name)), before), wanted)
 
 
+@pytest.mark.slow
 @each_of(("function", "a", "wanted"), MATH)
 def test_math(function: str, a: float, wanted: float) -> None:
     operand, before = slot("f64", a)
@@ -171,6 +176,7 @@ def test_math(function: str, a: float, wanted: float) -> None:
 
 
 
+@pytest.mark.slow
 @each_of(("machine", "expression", "before", "wanted"), RUNS)
 def test_expression(machine: str, expression: Node, before: dict[int, bytes], wanted: Any) -> None:
     assert same(yields(machine, expression, before), wanted)

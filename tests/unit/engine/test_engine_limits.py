@@ -39,6 +39,7 @@ def nested_loops(depth: int, inner: Block, times: int = 2) -> Block:
     return inner
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [10, 59, 60, 61, 99, 250])
 def test_blocks_nest(depth: int) -> None:
     rig = execute((*nested_ifs(depth, (add(0, ONE), ("let", 1, "i16", load("i16", 0)))),
@@ -55,6 +56,7 @@ def test_loops_nest(depth: int) -> None:
     assert rig.slot("i16", 0) == 1
 
 
+@pytest.mark.slow
 @each_of("depth", [3, 58, 61, 70, 130])
 @each_of(("leave", "counted", "after"), [("exit", 4, 1), ("next", 9, 1), ("return", 4, 0)])
 def test_leaving_a_loop_from_deep_inside(depth: int, leave: str, counted: int, after: int) -> None:
@@ -104,6 +106,7 @@ def test_expressions_nest_to_both_sides(name: str) -> None:
     assert (rig.slot("i16", 0), rig.slot("i16", 2)) == (number, wanted)
 
 
+@pytest.mark.slow
 def test_deep_conditions_and_addresses_read_temporaries_and_instance() -> None:
     condition: Node = ("eq", "b", "i16", ("tmp", "i16", 1), ("load", "i16", own(4)))
     index: Node = ("convert", "i64", "i16", ("tmp", "i16", 1))

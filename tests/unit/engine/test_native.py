@@ -148,6 +148,7 @@ def test_fast_code_follows_quick_code(tmp_path: Path, monkeypatch: pytest.Monkey
     assert again.optimised and len(asked) == 1, "the cache has it"
 
 
+@pytest.mark.slow
 def test_the_helper_process_optimises() -> None:
     helper = type(worker)()  # whom nobody else asks meanwhile
     try:
@@ -271,6 +272,7 @@ def test_crc_bit_by_bit(level: int) -> None:
     assert (slot(e, "u16", 104), slot(e, "i16", 100), slot(e, "i16", 102)) == (crc, 64, 8)
 
 
+@pytest.mark.slow
 @each_of("level", LEVELS)
 @each_of("machine", ["u8", "u16", "u32", "u64"])
 @each_of("operation", ["truncate", "nearest"])

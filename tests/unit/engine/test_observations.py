@@ -124,6 +124,7 @@ def endless() -> PythonEngine:
     return engine_of((("loop", (), (("charge", 1, 7), ("observe", "statement", 7, None)), ()),))
 
 
+@pytest.mark.slow
 def test_a_run_that_does_not_end_is_told_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is done again by the build that stands still, because its list would take too much memory."""
     monkeypatch.setattr(python, "MOST_ENTRIES", 200)
@@ -132,6 +133,7 @@ def test_a_run_that_does_not_end_is_told_as_well(monkeypatch: pytest.MonkeyPatch
     assert len(expected) == 100_001 and list(endless().observations(0)) == expected
 
 
+@pytest.mark.slow
 def test_nothing_is_kept_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fbvm.engine.python.logged.MOST_ENTRIES", 100)
     engine = endless()

@@ -57,6 +57,7 @@ def test_each_classic_has_its_twin() -> None:
     assert {path.stem for path in FOLDER.glob("*.st")} == {form for name in ACTIVE for form in (name, f"{name}_ladder")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", first_quick(NAMES))
 def test_twins_have_equal_memory_after_each_scan(name: str) -> None:
     ladder, text = Plc(image(f"{name}_ladder")), Plc(image(name))

@@ -40,6 +40,7 @@ def test_the_program_alone_scan_by_scan(cycle_ns: int) -> None:
 CASES = [((0,), 0, True), ((0,), 0, False), ((MS, 0), 300_000, True), ((7000, 0), 10_000, False), ((MS,), 5000, False)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("delays_ns", "latency_ns", "is_inside"), first_quick(CASES, 2))
 def test_a_burst_is_its_scans_one_by_one(delays_ns: tuple[int, ...], latency_ns: int, is_inside: bool) -> None:
     """The plain PLC does what was left out of the last burst when the next one begins: it has waited before the refresh."""

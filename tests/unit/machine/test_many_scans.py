@@ -235,6 +235,7 @@ def with_unit(engine: str, wanted: int, timing: str = "exact") -> Plc:
     return plc
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing", first_quick(["exact", "real"]))
 @pytest.mark.parametrize("wanted", first_quick([2, 3, 40, 4000]))
 def test_a_unit_with_nothing_to_do_does_not_hinder_them(wanted: int, timing: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
@@ -56,6 +57,7 @@ def test_a_cold_start_begins_anew() -> None:
     assert (active(plc, "plain"), active(plc, "kept")) == ("a", "a")
 
 
+@pytest.mark.slow
 def test_from_program_to_run_begins_anew() -> None:
     plc = made(TWO)
     plc.run(scans=6)

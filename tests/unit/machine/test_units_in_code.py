@@ -147,6 +147,7 @@ def test_scan_by_scan(program: tuple[Any, ...], delays_ns: tuple[int, ...], late
     assert rigs[0].toys[0].refreshes < rigs[1].toys[0].refreshes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("program", "delays_ns", "latency_ns"), first_quick(SHAPES, 2))
 def test_many_at_once(program: tuple[Any, ...], delays_ns: tuple[int, ...], latency_ns: int) -> None:
     rigs = four(image(*program), delays_ns, latency_ns)
@@ -164,6 +165,7 @@ def test_a_trap_of_the_program_ends_a_run_and_a_restart_begins_anew() -> None:
     assert rigs[0].plc.scans == 87 and not rigs[0].plc.trap
 
 
+@pytest.mark.slow
 def test_a_trap_of_a_units_program_is_a_fault_of_ours() -> None:
     for rig in four(image(every=50), (0, 0)):
         rig.plc.run(scans=10)
@@ -189,6 +191,7 @@ def test_what_is_written_from_outside_is_seen() -> None:
     assert rigs[0].plc.read("CIO1502") == runs + 3  # type: ignore[operator]
 
 
+@pytest.mark.slow
 def test_its_time_comes_in_the_middle_of_many_scans() -> None:
     rigs = four(image(every=10_000, slow=False), (700 * MS,))
     agree(rigs, lambda plc: plc.run(scans=20))
@@ -295,6 +298,7 @@ def bursts(rig: Rig, count: int, most: int, pause_ns: int, stop: int = 0) -> lis
 CASES = [((0,), 0, 16), ((MS,), 300_000, 16), ((0, 50_000), 10_000, 3), ((0,), 0, 1), ((7000, 0, MS), 0, 16)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", first_quick([(2,), ((3, "INTERVAL := T#1ms, "),), ((2, "", 150),)]))
 @pytest.mark.parametrize(("delays_ns", "latency_ns", "most"), first_quick(CASES))
 @pytest.mark.parametrize("virtual_time", [False, True])
@@ -325,6 +329,7 @@ def test_machine_code_that_reads_the_clock_comes_back_less_often() -> None:
     assert calls[1] < calls[0] * 2 // 3
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_a_burst_loses_nothing() -> None:
     for stop in range(3, 40):
         inside, beside = (Rig(image(2), (0,), is_inside=is_inside, virtual_time=False) for is_inside in (True, False))

@@ -168,6 +168,7 @@ def test_nothing_passes_while_it_is_silent(host: Host) -> None:
     assert arrived(device) == b"ask"
 
 
+@pytest.mark.slow
 def test_a_connection_dies_in_long_silence(host: Host) -> None:
     device = host.open()
     host.network.faults.append(fault("silent"))

@@ -236,6 +236,7 @@ def test_a_replay_stops_where_one_wants_to_look() -> None:
     assert (replay.run(), replay.plc.scans, replay.complete) == ("end", 60, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", first_quick([{"observed": True}, {"engine": "python"}, {"engine": "native"}]), ids=str)
 def test_any_engine_replays(options: dict[str, Any]) -> None:
     if options.get("engine") == "native":

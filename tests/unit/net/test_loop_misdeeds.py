@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from rows import each_of
 
 from fbvm.net.loop import LoopNetwork
@@ -177,6 +178,7 @@ AFTER_A_RUDE_PEER = [
 ]
 
 
+@pytest.mark.slow
 @each_of(("name", "words"), AFTER_A_RUDE_PEER)
 def test_a_rude_peer(name: str, words: list[str]) -> None:
     seen = conversation(name, 3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 
+import pytest
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
@@ -92,6 +93,7 @@ class Noted:
             self.rows.append((moment.scans, event.now_ns, str(event.tap_event)))
 
 
+@pytest.mark.slow
 def test_a_trace_keeps_what_passed() -> None:
     image = compile_text(PROGRAM).image
     assert image is not None

@@ -113,6 +113,7 @@ def test_names_and_scans_choose() -> None:
         page_data(traced(3), ["Main.Nobody"])
 
 
+@pytest.mark.slow
 def test_of_too_much_the_latest_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_ROWS", 100)
     rows = page_data(traced(60, Depth.STATEMENTS))["rows"]

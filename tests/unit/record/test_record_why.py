@@ -57,6 +57,7 @@ def test_each_scan_has_its_own_answer(trace: Trace) -> None:
     assert "FALSE since scan 150" in cause_text(trace, ask(trace, "Main.Pump", 299))
 
 
+@pytest.mark.slow
 def test_only_so_deep(trace: Trace) -> None:
     assert len(cause_text(trace, ask(trace, "Main.Pump", 41, 0)).splitlines()) == 1
     assert len(cause_text(trace, ask(trace, "Main.Pump", 41, 1)).splitlines()) == 2
@@ -238,6 +239,7 @@ def recorded_from(first: int, scans: int) -> Trace:
     return Trace(io.BytesIO(file.getvalue()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [0, 20])
 @pytest.mark.parametrize("asked", [0, 1, 98, 99, 100, 101])
 def test_a_cause_in_the_first_recorded_scan(first: int, asked: int) -> None:
@@ -251,6 +253,7 @@ def test_a_cause_in_the_first_recorded_scan(first: int, asked: int) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_cause_before_all_windows_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fbvm.record.draw.why.WINDOWS", (2, 4))
     trace = recorded_from(20, 12)
@@ -260,6 +263,7 @@ def test_a_cause_before_all_windows_is_found(monkeypatch: pytest.MonkeyPatch) ->
             "└ if Main.Seen = 0 since before scan 20, the first of the trace"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [0, 20])
 def test_a_cause_from_outside_in_the_third_scan_and_none_before_the_first(first: int) -> None:
     """What was written before the first recorded scan is there when the trace begins."""

@@ -340,6 +340,7 @@ def test_python_in_place_of_a_block_is_called_once_and_its_results_are_played_ba
 # --- the ring ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_oldest_scans_give_way(image: Image, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "AGAIN_NS", 300_000)
     plc, other = Plc(image), Plc(image)

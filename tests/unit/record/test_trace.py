@@ -200,6 +200,7 @@ def test_a_pattern_that_fits_nothing() -> None:
         TraceWriter(plc, io.BytesIO(), selected=["Main.Foo"])
 
 
+@pytest.mark.slow
 def test_only_what_is_selected_is_kept() -> None:
     trace = traced(200, Depth.STATEMENTS, ["Main.Delay", "D200"])
     moment = trace.at(41)
@@ -321,6 +322,7 @@ def good() -> bytes:
 # --- numbers and symbols ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 1 << 70)))
 def test_numbers_come_back(numbers: list[int]) -> None:
     out = bytearray()
@@ -330,6 +332,7 @@ def test_numbers_come_back(numbers: list[int]) -> None:
     assert not cursor.more
 
 
+@pytest.mark.slow
 @given(st.binary(min_size=1), st.data())
 def test_xor_undoes_itself(a: bytes, data: st.DataObject) -> None:
     b = data.draw(st.binary(min_size=len(a), max_size=len(a)))

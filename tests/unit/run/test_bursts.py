@@ -158,6 +158,7 @@ def test_more_events_than_a_unit_takes_at_once_reach_it_in_the_same_burst(image:
     assert plc.read("D30001") == 300
 
 
+@pytest.mark.slow
 def test_a_burst_ends_so_that_others_have_their_turn(clock: Clock) -> None:
     """A program that asks its unit for something in each scan."""
     compilation = compile_text("""PROGRAM Main

@@ -169,6 +169,7 @@ def network() -> Iterator[TcpNetwork]:
     made.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_scan_without_end_is_ended_in_real_time_and_again_as_recorded(engine: str, network: TcpNetwork) -> None:
     image, file = image_of(ENDLESS), io.StringIO()

@@ -114,6 +114,7 @@ def test_a_place_is_the_same_however_one_got_there(moves: list[str], button: int
     assert bytes(session.plc.memory.u8) == memory
 
 
+@pytest.mark.slow
 @each_of("room", [64 << 20, 100_000])
 def test_any_scan_is_there_however_long_ago(room: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_module, "Recording", lambda: Recording(limit_bytes=room))
@@ -201,6 +202,7 @@ def test_a_condition_stops_run_where_it_becomes_true() -> None:
     assert commands.session.here == Position(102, 0)
 
 
+@pytest.mark.slow
 @each_of("text, scan, line", [
     ("text.st:14 IF Main.N > 3", 3, 14), ("14 if Main.N > 3", 3, 14), ("Twice IF Main.N = 3", 2, 4),
     ("Main.N > 3", 3, 14), ("text.st : 14", 0, 14), ("Main . N = 2", 1, 14), ("Main.N > 3 IF Main.N > 5", 5, 14),
@@ -260,6 +262,7 @@ def test_mode_and_power_between_scans_only() -> None:
     assert commands.session.read("Main.N") == 1
 
 
+@pytest.mark.slow
 @each_of("line", [
     "nonsense", "print", "print Nobody", "run 33", "run x.st:1", "step -1", "goto x", "write Main.N", "Main.N = 99999",
     "unbreak 3", "mode x", "power x", "table", "why Main.T", "run", "expect Main.N", "help x", "run Main.N", "D0..D1 = 1",
@@ -325,6 +328,7 @@ def test_where_power_flows_in_rungs() -> None:
     assert not [row for row in said(commands, "goto 1", "list 10").splitlines() if row.endswith(("ON", "off"))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("instruction", "lines"), [
     ("OUT     Motor", 1), ("SET     Motor", 1), ("MOV(021) #5 D200", 1), ("TIM     0 #10", 1), ("DIFU(013) 100.05", 1),
     ("CNT 1 #3", 1), ("@+(400) D1 D2 D3", 1), ("OUT     Motor", 2), ("MOV(021) #5 *D200", 1), ("KEEP(011) Motor", 1),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from textwrap import dedent
 from xml.etree import ElementTree
 
+import pytest
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
@@ -108,6 +109,7 @@ def test_what_has_no_drawing_is_shown_as_instructions() -> None:
     assert drawn("LD a\nOUT b\nOR c\nOUT d").split("\n") == ["    LD a", "    OUT b", "    OR c", "    OUT d"]
 
 
+@pytest.mark.slow
 @each_of("width", range(24, 200, 7))
 def test_no_line_is_wider_than_asked(width: int) -> None:
     rungs = "LD a\nOR b\n" + "\n".join(f"AND {name}" for name in "cdefab") + "\nOUT a\nAND c\n@MOV #1 D0"

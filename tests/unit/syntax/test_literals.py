@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import date, datetime, timedelta
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_of
@@ -107,6 +108,7 @@ def test_dates_agree_with_the_calendar(day: date) -> None:
     assert literals.typed("D", day.isoformat())[1] == (day - date(1970, 1, 1)).days * DAY
 
 
+@pytest.mark.slow
 @given(st.datetimes(datetime(1678, 1, 1), datetime(2262, 4, 10)))
 def test_moments_agree_with_the_calendar(moment: datetime) -> None:
     since = (moment - datetime(1970, 1, 1)) // timedelta(microseconds=1) * 1000
@@ -127,6 +129,7 @@ def test_based_numbers_agree_with_python(value: int, form: tuple[int, str]) -> N
     assert literals.number(f"{form[0]}#{value:{form[1]}}") == ("int", value, None)
 
 
+@pytest.mark.slow
 @given(st.floats(allow_nan=False, allow_infinity=False, min_value=0))
 def test_reals_are_read_to_the_nearest(value: float) -> None:
     text = repr(value) if "." in repr(value) or "e" in repr(value) else repr(value) + ".0"

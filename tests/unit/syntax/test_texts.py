@@ -73,6 +73,7 @@ def test_other_text_is_refused(data_type: str, text: str, code: str) -> None:
     assert (caught.value.code, caught.value.values) == (code, (text.encode("latin-1"), data_type))
 
 
+@pytest.mark.slow
 @given(data_type=st.sampled_from(WRITTEN), data=st.data())
 def test_every_value_reads_back(data_type: str, data: st.DataObject) -> None:
     kind = ELEMENTARY[data_type]
@@ -89,6 +90,7 @@ def test_every_value_reads_back(data_type: str, data: st.DataObject) -> None:
     assert repr(from_text(data_type, to_text(data_type, value))) in (repr(value), repr(bool(value)))
 
 
+@pytest.mark.slow
 @given(data_type=st.sampled_from(WRITTEN), text=st.binary(max_size=30))
 def test_any_text_is_a_value_or_undefined(data_type: str, text: bytes) -> None:
     try:

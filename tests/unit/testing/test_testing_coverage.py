@@ -227,6 +227,7 @@ def project_of(pytester: pytest.Pytester) -> None:
     pytester.makefile(".st", test_choose="PROGRAM Test VAR c : Choose; END_VAR\nc(Which := 3);\nASSERT(c.Out = 3);\nEND_PROGRAM")
 
 
+@pytest.mark.slow
 def test_a_report_at_the_end(pytester: pytest.Pytester) -> None:
     project_of(pytester)
     result = run(pytester, "--fbvm-cov", "--fbvm-cov-html=pages", "--fbvm-cov-xml=cov.xml")
@@ -256,11 +257,13 @@ def test_with_xdist(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["src/Choose.st*9*1*6*1*87%*16->18, 18"])
 
 
+@pytest.mark.slow
 def test_without_the_option_nothing_is_counted(pytester: pytest.Pytester) -> None:
     project_of(pytester)
     run(pytester).stdout.no_fnmatch_line("*coverage of PLC code*")
 
 
+@pytest.mark.slow
 def test_nothing_to_count(pytester: pytest.Pytester) -> None:
     pytester.makepyfile("def test_it(): assert True")
     run(pytester, "--fbvm-cov").stdout.fnmatch_lines(["nothing was executed"])

@@ -74,6 +74,7 @@ def test_one_block_on_a_rig(project: pytest.Pytester) -> None:
     run(project).assert_outcomes(passed=2)
 
 
+@pytest.mark.slow
 def test_a_failure_explains_itself(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_wrong(fb):
@@ -98,6 +99,7 @@ def test_a_failure_explains_itself(project: pytest.Pytester) -> None:
     result.stdout.no_fnmatch_line("Delay.IN is*")
 
 
+@pytest.mark.slow
 def test_a_failure_says_where_its_page_is(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_wrong(fb):
@@ -138,6 +140,7 @@ def test_a_mistake_of_the_test_ends_in_the_test(project: pytest.Pytester) -> Non
     assert "rig.py:" in run(project, "--full-trace", "-k", "test_value").stdout.str()
 
 
+@pytest.mark.slow
 def test_what_a_function_of_the_test_asked_for_counts(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def check(pump):
@@ -175,6 +178,7 @@ def test_forces_left_behind_fail(project: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["left forced: Delay.Q; end a force with unforce()*"])
 
 
+@pytest.mark.slow
 def test_a_program_with_stubs_on_a_network(project: pytest.Pytester) -> None:
     project.makepyfile(test_net="""
         from fbvm import ModbusPeer, Peer
@@ -212,6 +216,7 @@ def test_what_cannot_be_had_says_why(project: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["E*FileNotFoundError: src/fan.st is neither in*", "E*there is no Fan; there is Pump"])
 
 
+@pytest.mark.slow
 def test_libraries_of_the_project(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\nfbvm_libraries = blocks\n")
     (project.mkdir("blocks") / "Twice.st").write_text(
@@ -270,6 +275,7 @@ def test_with_xdist(project: pytest.Pytester) -> None:
 # --- tests in ST ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_programs_are_tests(project: pytest.Pytester) -> None:
     project.makefile(".st", test_pump="""\
 PROGRAM Test_starts_late
@@ -338,6 +344,7 @@ PROGRAM Helper VAR n : INT; END_VAR ASSERT(n = 0); END_PROGRAM
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "said"), first_quick([
     ("ASSERT(m);", "test_it.st:2:* error S0201: m is not declared"),
     ("ASSERT(n = ); ASSERT(TRUE);", "test_it.st:2:* error S0101: *"),
@@ -395,6 +402,7 @@ END_PROGRAM
         page.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "said"), first_quick([
     ("PROGRAM Test_nothing VAR n : INT; END_VAR n := 1; END_PROGRAM", "Test_nothing ended without one ASSERT"),
     ("PROGRAM Test_late VAR Done : BOOL; END_VAR ASSERT(TRUE); END_PROGRAM", "Done is still FALSE after 1m"),
@@ -430,6 +438,7 @@ def in_guide(language: str, part: str) -> str:
     return next(str(block) for block in blocks if part in block)
 
 
+@pytest.mark.slow
 def test_the_tests_of_the_guide_pass(project: pytest.Pytester) -> None:
     project.makepyfile(in_guide("python", "def test_the_pump_waits_50_ms"))
     project.makefile(".st", test_pump=in_guide("iecst", "PROGRAM Test_the_pump_waits"))
@@ -438,6 +447,7 @@ def test_the_tests_of_the_guide_pass(project: pytest.Pytester) -> None:
     result.stdout.no_fnmatch_line("*warning S*")
 
 
+@pytest.mark.slow
 def test_the_failure_of_the_guide_looks_like_that(project: pytest.Pytester) -> None:
     project.mkdir("tests").joinpath("test_pump.py").write_text(
         in_guide("python", "def test_starts"), encoding="utf-8")
@@ -472,6 +482,7 @@ def test_a_golden_trace_is_written_kept_and_told_apart(project: pytest.Pytester)
     result.stdout.fnmatch_lines(["E*Running", "E*- scan 7      70ms      TRUE", "E*+ scan 8      80ms      TRUE"])
 
 
+@pytest.mark.slow
 def test_the_block_that_was_read_shows_its_pins(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_wrong(fb):
@@ -481,6 +492,7 @@ def test_the_block_that_was_read_shows_its_pins(project: pytest.Pytester) -> Non
     run(project).stdout.fnmatch_lines(["Delay: TON with IN = TRUE, PT = 50ms, Q = FALSE, ET = 20ms"])
 
 
+@pytest.mark.slow
 def test_a_project_within_another_folder_finds_its_files(project: pytest.Pytester) -> None:
     inner = project.mkdir("inner")
     (project.path / "src").rename(inner / "src")
@@ -509,6 +521,7 @@ def slack(project: pytest.Pytester) -> pytest.Pytester:
     return project
 
 
+@pytest.mark.slow
 def test_warnings_are_shown_once_at_the_end(slack: pytest.Pytester) -> None:
     result = run(slack)
     result.assert_outcomes(passed=2)
@@ -650,6 +663,7 @@ def test_a_plc_hears_what_another_one_answers(project: pytest.Pytester) -> None:
     ])  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_dialect_of_a_rig_and_of_a_session(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\nfbvm_dialect = codesys\n")
     block = "FUNCTION_BLOCK Last VAR_INPUT w : WORD; END_VAR VAR_OUTPUT n : WORD; END_VAR n := w + 1; END_FUNCTION_BLOCK"

@@ -380,6 +380,7 @@ def test_what_nobody_wrote_is_said() -> None:
     assert "Range.Low is 0 since power-on; no statement wrote it" in pump.explain()
 
 
+@pytest.mark.slow
 def test_what_was_written_before_the_kept_scans_is_not_said_to_be_written_by_nobody() -> None:
     once = rig("Once", "PROGRAM Once VAR Started : BOOL; END_VAR IF NOT Started THEN Started := TRUE; END_IF END_PROGRAM")
     once.run(scans=LOOKED_BACK + 50)

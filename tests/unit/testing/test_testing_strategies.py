@@ -20,6 +20,7 @@ def pump() -> Rig:
     return Rig.of("Pump", text=PUMP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [
     BOOL, INT, REAL, LREAL, TIME, string(5), array(((1, 3),), INT), SubrangeType("INT(0..9)", 2, 2, INT, 0, 9),
 ], ids=str)  # fmt: skip

@@ -120,6 +120,7 @@ def outcome(situation: str, switch: Switch, timing: str, seed: int) -> str:
     return "ok" if rig.is_on(switch) else rig.code()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("timing", "seed"), [("exact", 0), ("real", 1), ("real", 2)])
 def test_every_switch_in_every_situation_assumed(timing: str, seed: int) -> None:
     """What the manual leaves open is assumed: services of other areas, the order of the checks."""

@@ -142,6 +142,7 @@ def act(plc: Plc, dice: Random) -> None:
     plc.run(scans=dice.choice([1, 2, 30, 200]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", first_quick(range(times(16))))
 @pytest.mark.parametrize("address", ADDRESSES)
 def test_all_ways_are_the_same(seed: int, address: str, monkeypatch: pytest.MonkeyPatch) -> None:

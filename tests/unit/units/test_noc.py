@@ -381,6 +381,7 @@ def test_a_restart_breaks_connections_and_restores_the_configuration() -> None:
     assert Noc().configuration["restart_ns"] == RESTART_NS
 
 
+@pytest.mark.slow
 @settings(max_examples=times(40), deadline=None)
 @given(st.lists(st.integers(0, 0xFFFF), min_size=16, max_size=16),
        st.lists(st.sampled_from([*vars(COMMAND).values()]), max_size=8))  # fmt: skip
