@@ -81,6 +81,7 @@ def test_mbp_mstr_with_edges() -> None:
         assert requests(plc, peer, "En", "Command", steps) == expected
 
 
+@pytest.mark.slow
 def test_mbp_mstr_by_level() -> None:
     """Whatever happens while EN is FALSE, an operation follows the other as long as ENABLE and EN are TRUE."""
     plc, peer = plc_of(MSTR.format(edge="FALSE"), Noc(7, "192.168.250.1"))

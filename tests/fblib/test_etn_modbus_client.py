@@ -127,6 +127,7 @@ def test_a_request_scan_by_scan() -> None:
     """  # fmt: skip
 
 
+@pytest.mark.slow
 @each_of("size", [1, 2, 3, 4, 5, 6, 100, 251, 252, 253])
 def test_requests_and_replies_of_any_size(size: int) -> None:
     rig = Rig(answering(lambda frame: [Say(heard())])).connect()
@@ -198,6 +199,7 @@ def test_nobody_there() -> None:
     assert rig.connect().ask("08 00 00 00 01") == "08 00 00 00 01"
 
 
+@pytest.mark.slow
 def test_a_silent_network() -> None:
     rig = Rig(ModbusPeer())
     rig.network.faults.append(Fault(silent=True))

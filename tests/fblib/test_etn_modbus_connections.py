@@ -46,6 +46,7 @@ def test_the_program_in_the_readme() -> None:
     assert charts and all(one in tests for one in charts), "its charts are those of the tests"
 
 
+@pytest.mark.slow
 def test_the_port_may_be_set_by_a_declaration() -> None:
     text = "PROGRAM Main VAR Server : ETN_Modbus_Server := (Local_Port := 1502); END_VAR Server(); END_PROGRAM"
     plc = Plc(image_of(text))
@@ -164,6 +165,7 @@ def test_the_idle_time_may_be_without_end() -> None:
     assert client.ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pins", ["", "Sockets := 2"])
 def test_dripping_bytes_is_not_asking(pins: str) -> None:
     """A client that never ends its frame cannot hold the server."""
@@ -214,6 +216,7 @@ def test_the_beginning_of_a_frame_dies_with_its_client(said: bytes, reset: bool,
 CHOSEN = "IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 9"
 
 
+@pytest.mark.slow
 def test_a_configured_client_is_the_only_one() -> None:
     rig = Rig(CHOSEN)
     stranger = rig.client("192.168.250.8", connected=False)
@@ -225,6 +228,7 @@ def test_a_configured_client_is_the_only_one() -> None:
     assert chosen.connect()
 
 
+@pytest.mark.slow
 def test_a_configured_port_is_the_only_one() -> None:
     """The sheet's own way: local and remote port 502."""
     rig = Rig("Client_Port := 502")
@@ -409,6 +413,7 @@ def test_any_response_code_of_the_unit(code: int, count: int) -> None:
         assert client.ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 def test_an_open_that_fails_is_told_and_tried_again_each_second() -> None:
     rig = Rig()
     rig.unit.faults += [UnitFault(0x0049)] * 5

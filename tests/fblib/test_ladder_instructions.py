@@ -70,6 +70,7 @@ def test_results_and_flags(table: Path) -> None:
     assert wrong == []
 
 
+@pytest.mark.slow
 def test_nothing_is_done_with_the_condition_off() -> None:
     plc = plc_of("LD P_Off\nMOV #1 D0\n++ D1\n+ D0 D1 D2")
     plc.scan()

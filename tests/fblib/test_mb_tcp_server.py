@@ -44,6 +44,7 @@ RUNG = (Path(__file__).resolve().parents[2] / "examples" / "mb_tcp_server.st").r
 """The same call as a rung."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [SHEET, RUNG], ids=["text", "rung"])
 def test_the_call_of_the_sheet(text: str) -> None:
     rig = Rig(text=text)
@@ -315,6 +316,7 @@ def test_a_real_a_structure_and_an_odd_number_of_bytes() -> None:
     assert rig.get("c") is True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", first_quick(["WORD", "INT", "ARRAY[0..1] OF BYTE", "ARRAY[0..0] OF UINT"]))
 def test_bits_of_what_is_not_bool_are_packed(kind: str) -> None:
     rig = Rig(coils=kind)

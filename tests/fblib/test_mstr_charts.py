@@ -98,6 +98,7 @@ def test_held_errors() -> None:
     """
 
 
+@pytest.mark.slow
 def test_an_operation_of_the_module_itself_ends_in_its_scan() -> None:
     """By level it is done again in every scan."""
     assert begun(Rig(), (3, 0, 38, 0, 0x0700)).chart(4, *PINS[2:]) == """
@@ -166,6 +167,7 @@ def test_the_result_stays_while_enable_is_false() -> None:
     assert (rig.status(), rig.outputs()) == ("503D", "")
 
 
+@pytest.mark.slow
 def test_a_block_that_is_not_executed_keeps_its_outputs() -> None:
     text = """
     PROGRAM Main
@@ -209,6 +211,7 @@ def test_sixteen_blocks_at_once() -> None:
     assert [rig.databuf(1, number)[0] for number in range(1, 18)] == list(range(1, 18))
 
 
+@pytest.mark.slow
 def test_four_paths_as_in_older_modules() -> None:
     """The fifth shows nothing until a path is free, here in the scan in which the first ones end."""
     rig = many(5, "Max_Paths := 4")
@@ -223,6 +226,7 @@ def test_four_paths_as_in_older_modules() -> None:
     """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("operation", "waits"), [(1, True), (2, True), (8, True), (23, True), (3, False), (4, False),
                                                   (7, False), (10, False), (0xFFF0, False)])  # fmt: skip
 def test_which_operations_need_a_path(operation: int, waits: bool) -> None:
@@ -236,6 +240,7 @@ def test_which_operations_need_a_path(operation: int, waits: bool) -> None:
     assert (rig.outputs(2) == "") == waits
 
 
+@pytest.mark.slow
 def test_a_waiting_block_may_be_aborted_or_give_up() -> None:
     rig = many(2, "Max_Paths := 0")
     rig.scan(3)

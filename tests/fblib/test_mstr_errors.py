@@ -52,6 +52,7 @@ def test_2003_lengths(control: tuple[int, ...]) -> None:
     assert refused(control) == "2003"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", [changed(READ, w3=101), changed(WRITE, w3=101), changed(BOTH, w3=101),
                                      changed(BOTH, w10=101)])  # fmt: skip
 def test_2003_where_a_library_takes_100_words(control: tuple[int, ...]) -> None:
@@ -91,6 +92,7 @@ def test_2009_the_module_itself(control: tuple[int, ...]) -> None:
     assert refused(changed(control, w9=22)) == "2009"
 
 
+@pytest.mark.slow
 def test_200e_what_is_no_array_assumed() -> None:
     rig = Rig(databuf="UINT")
     rig.control(4, 0, 0, 0, 0x0700)
@@ -99,6 +101,7 @@ def test_200e_what_is_no_array_assumed() -> None:
     assert (rig.outputs(), rig.status()) == ("E", "200E")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("length", "control"), first_quick([(8, READ), (8, LOCAL), (2, CLEAR), (10, BOTH), (9, BOTH)]))
 def test_2010_a_control_array_that_is_too_short(length: int, control: tuple[int, ...]) -> None:
     rig = Rig(control=f"ARRAY[1..{length}] OF INT")
@@ -141,6 +144,7 @@ def test_f002_a_module_without_configuration_assumed(control: tuple[int, ...]) -
     assert rig.operate(*control) == "F002"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", [READ, LOCAL, (10, 0, 0, 0, 0x0700)])
 def test_f001_while_the_module_restarts(control: tuple[int, ...]) -> None:
     rig = Rig(blocks=2)
@@ -335,6 +339,7 @@ WRONG_ANSWERS: list[tuple[tuple[int, ...], Callable[[bytes], bytes]]] = [
 ]
 
 
+@pytest.mark.slow
 @each_of("number", range(len(WRONG_ANSWERS)))
 def test_4001_answers_that_are_inconsistent(number: int) -> None:
     control, change = WRONG_ANSWERS[number]
@@ -402,6 +407,7 @@ def test_503c_no_reply() -> None:
     assert 0.3 <= rig.plc.now_ns / 1e9 < 0.4
 
 
+@pytest.mark.slow
 def test_a_reply_that_is_late_is_not_taken_for_another_one() -> None:
     late = [300_000_000]
     rig = Rig(ModbusPeer(None, lambda frame: [Say(frame, late.pop() if late else 0)]), options="Reply_Time := T#200ms")

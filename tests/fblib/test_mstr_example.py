@@ -34,6 +34,7 @@ def test_without_a_server_it_says_so() -> None:
     assert json.loads(result.stdout)["values"] == {"Main.Result": 0x503D}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["NOC0", "NOC337", "MSTR_Modules[8].Rack_Slot"])
 def test_words_of_the_mailbox_are_shown(name: str) -> None:
     result = CliRunner().invoke(main, ["run", EXAMPLE, "--scans", "2", "--show", name, "--json"])

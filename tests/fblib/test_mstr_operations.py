@@ -142,6 +142,7 @@ def test_a_server_that_has_closed_is_called_again() -> None:
     assert len(rig.peer.received) == 3
 
 
+@pytest.mark.slow
 def test_the_lines_are_used_again_when_all_are_taken() -> None:
     """32 connections stay open; the next server takes over the first line."""
     rig = Rig(refused=True)
@@ -171,6 +172,7 @@ def test_control_and_databuf_of_any_type_and_base(kind: str, bounds: str) -> Non
     assert rig.operate(0xFFF0, 0, 1, 1, 0x0700, 2, 0, 0, 0) == "0000"
 
 
+@pytest.mark.slow
 def test_control_and_databuf_in_mw() -> None:
     """As in Control Expert, where both have to lie there."""
     located = """

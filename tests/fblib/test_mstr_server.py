@@ -152,6 +152,7 @@ def test_reads_and_writes_agree_with_a_model_however_they_are_cut(seed: int, cut
 # --- connections --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_clients_at_once_and_one_after_the_other() -> None:
     station = Station(pins="Sessions := 2")
     clients = [station.client(number).connect() for number in (50, 51)]
@@ -277,6 +278,7 @@ def test_the_cpu_does_not_know_statistics(unit: int) -> None:
     assert rig.operate(8, 0, 0, 0, 0x0700 | unit, *SERVER_IP) == "3001"
 
 
+@pytest.mark.slow
 def test_the_module_does_not_know_registers() -> None:
     rig, _ = pair()
     rig.scan(2)

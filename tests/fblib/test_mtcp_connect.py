@@ -114,6 +114,7 @@ def test_error_and_code_hold_until_the_next_success() -> None:
     assert (rig.code("conn"), rig.get("conn.Error_Code")) == ("", 0)
 
 
+@pytest.mark.slow
 def test_nobody_answers() -> None:
     """The unit ends the open with 0081 because it is closed; the block says 0053."""
     rig = Rig()
@@ -231,6 +232,7 @@ def test_a_socket_that_another_program_lets_wait(timing: str) -> None:
     assert rig.run_until("Main.conn.ENO", 12) < 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing", ["exact", "real"])
 def test_a_close_of_another_socket_that_is_under_way(timing: str) -> None:
     """Its answer, 2210, is taken for that of ours, and our socket goes on waiting for a caller: it is closed later."""

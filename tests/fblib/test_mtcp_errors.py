@@ -86,6 +86,7 @@ def test_a_reply_in_which_something_does_not_fit_is_no_answer(what: str) -> None
     next_command_is_good(rig)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("block", "echo"),
     [
@@ -285,6 +286,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.slow
 @each_of("block", REFUSED)
 def test_what_can_be_sent_is_left_to_the_server(block: str) -> None:
     rig = Rig(rd=block).connect()

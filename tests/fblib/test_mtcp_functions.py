@@ -57,6 +57,7 @@ def test_registers_read(code: str, quantity: int) -> None:
     assert rig.all_words() == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", BITS)
 def test_bits_written(quantity: int) -> None:
     rig = filled(quantity, wr=f"Fn0F(Coil_Address := 321, Coil_Qty := {quantity}, DataAddress_DM := 5000)")

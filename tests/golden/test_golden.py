@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -29,6 +30,7 @@ def test_tree_of_a_good_source(path: Path) -> None:
     check_golden(path.with_suffix(".tree"), dump(tree))
 
 
+@pytest.mark.slow
 @each_of("path", sorted((HERE / "errors").glob("*.st")), ids=lambda p: p.stem)
 def test_messages_of_a_wrong_source(path: Path) -> None:
     tree, diagnostics = parse(Source(path.name, path.read_text(encoding="utf-8")))

@@ -74,6 +74,7 @@ def test_too_many_elements_end_at_the_limit(monkeypatch: pytest.MonkeyPatch) -> 
     assert only(b"<a>" + b"<b/>" * 1_001 + b"</a>").code == "X0103"
 
 
+@pytest.mark.slow
 def test_a_huge_file_is_not_even_read(tmp_path: Path) -> None:
     path = tmp_path / "huge.xml"
     with path.open("wb") as file:

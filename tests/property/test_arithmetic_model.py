@@ -197,6 +197,7 @@ def test_times_of_day(clock: str, duration: str) -> None:
     check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", first_quick([*WIDTHS]))
 def test_conversions_between_integers_and_bits(source: str) -> None:
     targets = [target for target in WIDTHS if target != source]

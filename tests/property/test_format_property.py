@@ -138,6 +138,7 @@ def image(text: str) -> object:
     return replace(made, sites=sites, charts=(), bodies=empty), code, repr(made.charts).casefold()
 
 
+@pytest.mark.slow
 @each_file(("tests/golden", "examples/project", "examples/row", "examples/tank"))
 def test_every_program_is_compiled_to_the_same_image(path: Path) -> None:
     for text in programs(path):

@@ -244,6 +244,7 @@ def test_the_example_runs_against_a_peer_in_memory(tmp_path: Path) -> None:
     assert capture.read_bytes()[:4] == b"\x0a\x0d\x0d\x0a"
 
 
+@pytest.mark.slow
 def test_without_a_server_the_example_goes_on_trying() -> None:
     result = fbvm("run", DEMO, "--until", "Main.Done", "--max", "3s", "--json", "--show", "Main.Connection.Error_Code")
     data = json.loads(result.stdout)

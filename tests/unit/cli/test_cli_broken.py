@@ -131,6 +131,7 @@ def test_a_project_that_python_does_not_read(fbvm: Fbvm, line: str) -> None:
     assert re.search(r"fbvm\.toml:\d+:\d+: error P010[123]", found), found[:300]
 
 
+@pytest.mark.slow
 @each_of("line", WRONG_TOML)
 def test_a_library_that_python_does_not_read(fbvm: Fbvm, line: str) -> None:
     Path("own").mkdir(exist_ok=True)

@@ -100,6 +100,7 @@ def test_an_address_of_another_host(fbvm: Fbvm) -> None:
         assert "192.0.2.1:1502 cannot be used: it is not an address of this host\n" in result.stderr
 
 
+@pytest.mark.slow
 def test_two_doors_on_one_port(fbvm: Fbvm) -> None:
     with socket.create_server(("127.0.0.1", 0)) as sock:
         port = sock.getsockname()[1]
@@ -112,6 +113,7 @@ def test_two_doors_on_one_port(fbvm: Fbvm) -> None:
     assert f"it is the door of {UNIT}:502" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_door_to_a_unit_that_is_not_there(fbvm: Fbvm) -> None:
     project(("192.168.250.3:502", "127.0.0.1:0"))
     result = fbvm("run", ".")

@@ -109,6 +109,7 @@ def test_zeros_are_packed() -> None:
     assert zlib.decompress(many_zeros(1 << 16, 3)) == bytes(3 << 16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("largest", first_quick([1 << 22, trace_format.LARGEST_BYTES]))
 def test_a_trace_that_is_much_larger_when_unpacked(fbvm: Fbvm, largest: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trace_format, "LARGEST_BYTES", largest)
@@ -124,6 +125,7 @@ def test_a_trace_that_is_much_larger_when_unpacked(fbvm: Fbvm, largest: int, mon
         assert "too large" in result.output
 
 
+@pytest.mark.slow
 @each_of("header", [b"[" * 100_000, b'{"format":' * 50_000, b'{"a":' + b"9" * 5000 + b"}"])
 def test_a_header_of_a_trace_that_is_nested_deeply(fbvm: Fbvm, header: bytes) -> None:
     Path("deep.fbtrace").write_bytes(trace_format.MAGIC + chunk(trace_format.HEADER, zlib.compress(header)))
@@ -132,6 +134,7 @@ def test_a_header_of_a_trace_that_is_nested_deeply(fbvm: Fbvm, header: bytes) ->
     assert "header is damaged" in result.output
 
 
+@pytest.mark.slow
 def test_a_memory_image_that_is_nested_deeply(fbvm: Fbvm) -> None:
     Path("image.json").write_text("[" * 100_000, encoding="utf-8")
     assert "is not JSON" in fbvm("serve", "--bind", "nobody", "--image", "image.json").output

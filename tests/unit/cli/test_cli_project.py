@@ -66,6 +66,7 @@ def test_a_project_is_named_by_its_folder_or_file(folder: Path, monkeypatch: pyt
     assert run(str(folder / "fbvm.toml")).stdout == SAID
 
 
+@pytest.mark.slow
 def test_values_that_differ_are_a_range(folder: Path) -> None:
     (folder / "counter.st").write_text(PROGRAM.replace("step : INT", "step AT D1 : INT"), encoding="utf-8")
     (folder / "client.st").write_text("""

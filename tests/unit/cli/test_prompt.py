@@ -46,6 +46,7 @@ def test_lines_until_the_end_of_input() -> None:
     assert typed("step\rprint Main.Count\r") == ["step", "print Main.Count"]
 
 
+@pytest.mark.slow
 def test_control_c_takes_back_a_line() -> None:
     assert typed(f"print Main{CONTROL_C}scan\r") == ["scan"]
 
@@ -55,6 +56,7 @@ def test_what_was_typed_is_kept(own_history: Path) -> None:
     assert "scan 3" in own_history.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_without_a_place_for_it_there_is_no_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "file" / "in"))

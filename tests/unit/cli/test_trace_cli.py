@@ -87,6 +87,7 @@ def test_a_run_as_a_page(fbvm: Fbvm) -> None:
     assert fbvm(*arguments, "--html", "no/run.html").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_table_of_a_trace(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "writes")
     result = fbvm("table", "run.fbtrace", "CIO 0.00,Main.Pump")
@@ -101,6 +102,7 @@ scan 8   80ms
     assert fbvm("table", "run.fbtrace", "D300").exit_code == 1
 
 
+@pytest.mark.slow
 def test_every_statement(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "statements")
     assert "pump.st:16" in fbvm("table", "run.fbtrace", "D200", "--scans", "8", "--every").output
@@ -187,6 +189,7 @@ def test_mistakes_of_usage(fbvm: Fbvm, arguments: str, said: str) -> None:
     assert said in result.output
 
 
+@pytest.mark.slow
 def test_why_wants_one_trace_and_one_place(fbvm: Fbvm) -> None:
     assert "there is none here" in fbvm("why", "D200").output
     record(fbvm, "--depth", "statements")
@@ -207,6 +210,7 @@ def test_what_the_guide_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         assert CliRunner().invoke(main, shlex.split(command)).output == said, command
 
 
+@pytest.mark.slow
 def test_what_rungs_remember_is_not_drawn_unasked(tmp_path: Path) -> None:
     program = tmp_path / "edge.st"
     rungs = "LD P_On\nTIM 1 #0001\nLD T0001\n@SET Over\n"

@@ -72,6 +72,7 @@ def test_source_is_the_module() -> None:
 # --- sharing --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_plcs_with_one_image_share_its_code() -> None:
     program = image(COUNT)
     engines = [NativeEngine(program, power_on(program), 0) for _ in range(3 * entries.BLOCK)]
@@ -297,6 +298,7 @@ def test_large_floats_become_ulint(level: int, number: float, operation: str) ->
     assert slot(e, "u64", 8) == (int(number) if operation == "truncate" else round(number))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one_step", first_quick([False, True]))
 @pytest.mark.parametrize("operation", first_quick(["truncate", "nearest"]))
 def test_what_does_not_fit_an_integer_with_the_instruction_of_a_processor_and_without(

@@ -112,6 +112,7 @@ def expected(text: bytes, wanted: bytes, width: int) -> int:
     return text.decode(form).find(wanted.decode(form)) + 1 if wanted else 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1, 2])
 def test_a_search_finds_what_python_finds(width: int) -> None:
     numbers = random.Random(width)

@@ -64,6 +64,7 @@ def test_all_that_a_program_does_is_told_in_its_order() -> None:
     assert first_difference(compiled) == ""
 
 
+@pytest.mark.slow
 @each_of("name,code,before,after", PROGRAMS, ids=lambda row: row[0])
 def test_every_statement(name: str, code: Block, before: dict[int, bytes], after: Any) -> None:
     program = image((*(node for each in code for node in (("observe", "statement", 3, None), each)),))

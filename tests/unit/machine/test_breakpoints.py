@@ -197,6 +197,7 @@ def test_a_condition_that_is_none_is_refused(plc: Plc) -> None:
 # --- engines agree --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
 @pytest.mark.parametrize("level", [0, 2])
 def test_engines_stop_at_the_same_observations_with_the_same_memory(level: int) -> None:

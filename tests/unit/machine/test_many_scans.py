@@ -159,6 +159,7 @@ def test_after_a_restart_the_first_scan_is_one_again() -> None:
     assert many.read("R.firsts") == 1
 
 
+@pytest.mark.slow
 def test_a_task_that_a_variable_starts_is_looked_at_in_every_scan() -> None:
     text = PROGRAM.replace("{trap}", ";").replace("{quick}", "T#10ms").replace(
         "TASK Slow(INTERVAL := T#25ms,", "TASK Slow(SINGLE := Go,")

@@ -254,6 +254,7 @@ def test_a_processor_without_machine_code_is_run_from_outside(monkeypatch: pytes
     assert isinstance(way(other), ProgramAlone) and isinstance(way(rig), WithUnits)
 
 
+@pytest.mark.slow
 def test_with_the_python_engine_no_program_of_a_unit_is_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(NativeEngine, "run", lambda self, task: pytest.fail("machine code"))
     rig, etn21 = Rig(image(), (0, MS), engine="python"), Etn21(0, "192.168.250.20")

@@ -192,6 +192,7 @@ def test_nothing_is_kept_of_a_connection_that_the_peer_has_reset(host: Host) -> 
     assert (host.network.relays.channels_behind, host.network.relays.carried) == (0, {})
 
 
+@pytest.mark.slow
 def test_nobody_answers_an_open_in_silence(host: Host) -> None:
     host.network.faults.append(fault("silent"))
     host.scan(Connect(1, SERVER))
@@ -404,6 +405,7 @@ def test_two_units_of_a_network_meet_a_fault_once(host: Host) -> None:
     assert data_of(told) == b"qq"
 
 
+@pytest.mark.slow
 @each_of("kind", KINDS)
 def test_after_each_kind_all_is_well(kind: str) -> None:
     host = Host(KINDS[kind])

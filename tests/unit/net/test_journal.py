@@ -249,6 +249,7 @@ def test_any_engine_replays(options: dict[str, Any]) -> None:
     assert replay.differs is None
 
 
+@pytest.mark.slow
 def test_a_program_nested_deeper_than_the_host_recurses() -> None:
     image = image_of(f"PROGRAM Main VAR n, one : LINT := 1; END_VAR n := n{' + one' * 900}; END_PROGRAM")
     file = io.StringIO()

@@ -131,6 +131,7 @@ def test_a_range_is_a_row_each(plc: Plc) -> None:
     assert chart(plc, scans=1, signals=["D5..D6"]) == "D5  0\nD6  0"
 
 
+@pytest.mark.slow
 def test_what_cannot_be_charted_is_refused(plc: Plc) -> None:
     with pytest.raises(TypeError, match="Main is Counter, which is no single value; name its members"):
         Recorder(plc, ["Main"])

@@ -104,6 +104,7 @@ def test_charts_are_drawn_as_they_were_in_each_scan() -> None:
     assert "→ TRUE" in "\n".join(drawn["1"]) and drawn["2"] == drawn["3"] and len(data["pictures"]) == 3
 
 
+@pytest.mark.slow
 def test_names_and_scans_choose() -> None:
     data = page_data(traced(100), ["Main.Pump", "D200"], range(10, 20))
     assert [signal["name"] for signal in data["signals"]] == ["Main.Pump", "D200"]

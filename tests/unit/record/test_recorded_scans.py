@@ -65,6 +65,7 @@ def test_drawings_are_those_of_a_trace() -> None:
     assert drawings(recorded) == drawings(trace)
 
 
+@pytest.mark.slow
 def test_a_scan_that_traps_has_an_end() -> None:
     made = compile_text("PROGRAM Main VAR n : INT := 5; END_VAR n := n - 1; n := 100 / n; n := 5 - n; END_PROGRAM").image
     assert made is not None

@@ -177,6 +177,7 @@ def happen(plc: Plc, number: int) -> None:
             plc.cycle_ns = 3_000_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_whatever_is_done_between_scans_is_done_again(image: Image, engine: str) -> None:
     plc, twin, seen, again = Plc(image, engine=engine), Plc(image), WatchedRun(), WatchedRun()
@@ -292,6 +293,7 @@ def test_units_are_run_again_with_what_the_network_told_them(engine: str, timing
         assert contents(kept.at(scan)) == seen.rows[scan - 1][-1][1]
 
 
+@pytest.mark.slow
 def test_a_change_of_a_unit_is_an_input() -> None:
     plc = client("python")
     kept = recorded(plc)

@@ -290,6 +290,7 @@ address = "192.168.250.21"
 """
 
 
+@pytest.mark.slow
 def test_a_server_in_memory_answers(folder: Path) -> None:
     built = plant(folder, PAIR.format(fault=""))
     assert isinstance(built.network, LoopNetwork)
@@ -297,6 +298,7 @@ def test_a_server_in_memory_answers(folder: Path) -> None:
     assert (built.runs[0].reason, built.runs[0].plc.read("D200..D201")) == ("until", [1000, 1001])
 
 
+@pytest.mark.slow
 def test_faults_lie_on_the_way(folder: Path) -> None:
     built = plant(folder, PAIR.format(fault='[[fault]]\nkind = "refused"'))
     run_all(built.runs)

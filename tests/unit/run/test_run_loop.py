@@ -206,6 +206,7 @@ def test_event_pace_sleeps_until_a_unit_has_work(clock: Clock) -> None:
     assert network.waits_ms == [7, 10]
 
 
+@pytest.mark.slow
 def test_an_idle_plc_with_a_running_timer_is_woken_by_the_timer_only(clock: Clock) -> None:
     compilation = compile_text("""PROGRAM Main
 VAR t : TON; n : UDINT; END_VAR

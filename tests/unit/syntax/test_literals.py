@@ -103,6 +103,7 @@ def test_a_string_beyond_latin_1_becomes_utf_8_bytes_with_a_warning() -> None:
     assert (value, [d.code for d in diagnostics]) == ("Î©", ["S0192"])
 
 
+@pytest.mark.slow
 @given(st.dates(date(1678, 1, 1), date(2262, 4, 10)))
 def test_dates_agree_with_the_calendar(day: date) -> None:
     assert literals.typed("D", day.isoformat())[1] == (day - date(1970, 1, 1)).days * DAY
@@ -115,6 +116,7 @@ def test_moments_agree_with_the_calendar(moment: datetime) -> None:
     assert literals.typed("LDT", moment.strftime("%4Y-%m-%d-%H:%M:%S.%f").lstrip("0"))[1] == since
 
 
+@pytest.mark.slow
 @given(st.integers(-2**63 + 1, 2**63 - 1))
 def test_durations_of_all_units_add_up(total: int) -> None:
     rest, text = abs(total), "-" if total < 0 else ""
@@ -124,6 +126,7 @@ def test_durations_of_all_units_add_up(total: int) -> None:
     assert literals.duration(text) == total
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**64 - 1), st.sampled_from([(2, "b"), (8, "o"), (16, "X")]))
 def test_based_numbers_agree_with_python(value: int, form: tuple[int, str]) -> None:
     assert literals.number(f"{form[0]}#{value:{form[1]}}") == ("int", value, None)

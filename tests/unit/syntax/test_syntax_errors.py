@@ -150,10 +150,12 @@ def test_a_method_without_end_stops_at_its_pou() -> None:
     assert [d.message for d in errors] == ["METHOD has no end before `END_FUNCTION_BLOCK`"]
 
 
+@pytest.mark.slow
 def test_there_is_an_end_of_errors() -> None:
     assert len(wrong("PROGRAM p\n" + "x := 1\n" * 1000 + "END_PROGRAM")) == 100
 
 
+@pytest.mark.slow
 def test_what_was_read_before_too_many_errors_is_kept() -> None:
     tree, _ = parse(Source("x", "PROGRAM p END_PROGRAM TYPE t : INT; END_TYPE PROGRAM q\n" + "x := 1\n" * 200))
     assert isinstance(tree, SourceText) and len(tree.declarations) == 2

@@ -424,6 +424,7 @@ def test_a_file_that_cannot_be_read_is_an_error(project: pytest.Pytester) -> Non
     result.stdout.fnmatch_lines(["*test_it.st:1:*error S01*"])
 
 
+@pytest.mark.slow
 def test_other_files_are_left_alone(project: pytest.Pytester, tmp_path: Path) -> None:
     result = run(project, "--collect-only")
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED

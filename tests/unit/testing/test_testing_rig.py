@@ -85,6 +85,7 @@ def test_an_enumeration_reads_as_its_member() -> None:
     assert batch.State == 9, "no member"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("give", [
     lambda batch, name, value: batch.scan({name: value}), lambda batch, name, value: batch.write(**{name: value}),
     lambda batch, name, value: batch.run(scans=1, **{name: value}), lambda batch, name, value: setattr(batch, name, value),
@@ -331,6 +332,7 @@ def test_without_a_name_the_only_pou_is_meant(tmp_path: Path) -> None:
         subject([other], "")
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compiled_says_why(tmp_path: Path) -> None:
     with pytest.raises(SubjectError, match="there is no Fan; there is Pump"):
         rig("Fan")

@@ -183,6 +183,7 @@ def test_garbage_raises_nothing(garbage: bytes) -> None:
     assert splitter.broken == whole.broken
 
 
+@pytest.mark.slow
 @given(st.binary(min_size=1, max_size=253), st.integers(0, 255))
 def test_every_pdu_gets_one_well_formed_answer(pdu: bytes, unit: int) -> None:
     reply = ModbusServer(coils=300, holding_registers=300).answer(Adu(9, unit, pdu).to_bytes())
