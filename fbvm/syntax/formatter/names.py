@@ -238,7 +238,12 @@ def _is_ladder(node: Node) -> bool:
 
 def _children(node: Node) -> Iterator[Node]:
     """The nodes directly below a node; of a chart what was written."""
-    todo: list[Any] = [node.steps, node.transitions] if isinstance(node, Sfc) else [getattr(node, n) for n in names_of(node)]
+    written = names_of(node)
+    if isinstance(node, Sfc):
+        written = ("steps", "transitions")
+    elif isinstance(node, Transition) and node.body is not None:
+        written = ("body",)  # the condition stands for the name, which is a declaration
+    todo: list[Any] = [getattr(node, name) for name in written]
     while todo:
         value = todo.pop()
         if isinstance(value, Node):
