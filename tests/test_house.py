@@ -52,7 +52,7 @@ FLOORS = {
 }  # fmt: skip
 """A room may import from its own floor and from below.  Rooms without a folder yet have their place already."""
 ORDERS = {
-    "syntax": ("tree", "st", "ladder/instructions", "ladder/drawing", "ladder", "sfc", "recovery", "", "formatter"),
+    "syntax": ("tree", "st", "ladder/instructions", "ladder/drawing", "ladder", "il", "sfc", "recovery", "", "formatter"),
     "check": ("symbols", "expressions", "calls", "declarations", "lint", ""),
     "interchange": ("plcopen", "plcopen/read", "plcopen/write"),
     "code": ("", "builder", "layout", "pictures", "lowering", "store", "compiler"),

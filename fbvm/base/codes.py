@@ -40,6 +40,7 @@ CODES: dict[str, Code] = {
         "S0111": "chart that cannot be executed",
         "S0112": "action of a step is wrong",
         "S0113": "drawing of a rung that cannot be read",
+        "S0114": "instruction list that cannot be executed",
         "S0201": "unknown name",
         "S0202": "name declared twice",
         "S0203": "POU or type declared twice",

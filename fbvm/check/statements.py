@@ -17,7 +17,7 @@ from fbvm.check.expressions.writes import place, warn_of_written_counter, writab
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Value
 from fbvm.syntax import tree
-from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree import il, ladder, sfc
 
 
 def check_body(context: Context, pou: Pou) -> None:
@@ -255,7 +255,7 @@ class _Statements:
             return
         self.scope.fit(node.value, self.pou.result.type)
 
-    def _rungs(self, node: ladder.Ladder | ladder.Rung) -> None:
+    def _rungs(self, node: ladder.Ladder | ladder.Rung | il.InstructionList) -> None:
         self.block(node.body)
 
     def _sfc(self, node: sfc.Sfc) -> None:
@@ -273,6 +273,7 @@ _CHECK: dict[type, Callable[..., None]] = {
     tree.Assign: _Statements._assign, tree.CallStatement: _Statements._call, tree.If: _Statements._if,
     tree.Case: _Statements._case, tree.For: _Statements._for, tree.While: _Statements._while,
     tree.Repeat: _Statements._repeat, tree.Exit: _Statements._leave, tree.Continue: _Statements._leave,
+    il.InstructionList: _Statements._rungs,
     ladder.Ladder: _Statements._rungs, ladder.Rung: _Statements._rungs, sfc.Sfc: _Statements._sfc,
     tree.Return: _Statements._return, tree.Empty: _Statements._empty, tree.RefusedStatement: _Statements._refused,
 }

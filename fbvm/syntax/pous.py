@@ -26,6 +26,7 @@ from fbvm.syntax.tree import (
     TypeSpec,
     VarSection,
 )
+from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Step, Transition
 
@@ -69,6 +70,7 @@ class SourceBuilder(SfcElements):
         declared = [each for each in sections if isinstance(each, VarSection)]
         actions = [each for each in elements if isinstance(each, Action)]
         self._add_ladders(word, actions, declared)
+        declared += self._sections_of_lists()
         self.numbered = dict(self.numbered_everywhere)
         body = self._without_jumps(body, declared)
         if self.charted or any(isinstance(each, Step | Transition) for each in elements):
@@ -114,6 +116,22 @@ class SourceBuilder(SfcElements):
         body = charts.body(word, body, [each for each in elements if not isinstance(each, Refused)])
         declared += charts.sections
         return body, charts.actions
+
+    def _sections_of_lists(self) -> list[VarSection]:
+        """The hidden sections with the temporaries of the POU's instruction lists."""
+        lists = (each for each in self.lists if each.temporaries)
+        made = [VarSection(each.start, each.end, "VAR_TEMP", (), each.temporaries, True) for each in lists]
+        self.lists.clear()
+        self.blocks.clear()
+        return made
+
+    def instruction_list(self, token: Token) -> InstructionList:
+        """A body in the instruction list, which has a front end of its own."""
+        from fbvm.syntax.il.lowering import read_list
+
+        made = read_list(self, token)
+        self.lists.append(made)
+        return made
 
     def ladder(self, token: Token) -> Ladder:
         """LADDER .. END_LADDER, which has a front end of its own."""

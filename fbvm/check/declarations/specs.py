@@ -37,6 +37,7 @@ from fbvm.check.symbols.facts import Pou, is_block, is_open
 from fbvm.check.symbols.project import Resolved, TypeEntry
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.syntax import tree
+from fbvm.syntax.tree import il
 
 MAX_STRING = 65534
 """Characters of the longest STRING and WSTRING."""
@@ -158,6 +159,17 @@ def _block(scope: Scope, pou: Pou, spec: tree.NamedType) -> Resolved | None:
         return None
     assert pou.type is not None
     return pou.type, pou.initial
+
+
+def _type_of(scope: Scope, spec: il.TypeOf, name: str) -> Resolved | None:
+    """The type of an expression in the body of the POU whose interface is being resolved."""
+    kind = scope.settle(spec.of)
+    if kind is None:
+        return None
+    if is_block(kind):
+        scope.error("S0501", spec.of, f"{scope.text(spec.of)} is an instance and no value")
+        return None
+    return kind, default(kind)
 
 
 def _string(scope: Scope, spec: tree.StringSpec, name: str) -> Resolved | None:
@@ -338,6 +350,7 @@ def _has_inputs(kind: Type, values: tree.StructInit) -> bool:
 _RULES: dict[type, Callable[..., Resolved | None]] = {
     tree.NamedType: _named, tree.StringSpec: _string, tree.SubrangeSpec: _subrange, tree.ArraySpec: _array,
     tree.EnumSpec: _enumeration, tree.StructSpec: _structure, tree.UnionSpec: _structure, tree.RefSpec: _reference,
+    il.TypeOf: _type_of,
     tree.ConstructedSpec: lambda scope, spec, name: _constructed(scope, spec, spec.base, None),
 }
 """By class of specification: `rule(scope, spec, name)`."""

@@ -6,7 +6,7 @@ from fbvm.base.types import Elementary, EnumType, base
 from fbvm.check.expressions.values import is_any
 from fbvm.check.lint.body import Body
 from fbvm.syntax import tree
-from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree import il, ladder, sfc
 
 _LEAVES = {tree.Return: "RETURN", tree.Exit: "EXIT", tree.Continue: "CONTINUE"}
 _TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
@@ -53,7 +53,7 @@ class _Flow:
             return statement.otherwise is not None and self.block(statement.otherwise) and all(ends)
         if isinstance(statement, tree.For | tree.While | tree.Repeat):
             return self.loop(statement)
-        if isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc):
+        if isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList):
             return self.block(statement.body)
         if isinstance(statement, tree.Exit) and self.left:
             self.left[-1] = True

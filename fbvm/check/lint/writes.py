@@ -17,7 +17,7 @@ from fbvm.check.expressions.writes import place
 from fbvm.check.lint.body import Body
 from fbvm.check.symbols.facts import PouCall, Variable
 from fbvm.syntax import tree
-from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree import il, ladder, sfc
 
 SCANNED = frozenset((
     "R_TRIG", "F_TRIG", "TP", "TON", "TOF", "CTU", "CTD", "CTUD",
@@ -179,7 +179,7 @@ class _Order:
         if not isinstance(node, tree.While):
             definite.update((key, call) for key, call in inside.items() if isinstance(call, tree.Call))
 
-    def body_of(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc, definite: Definite) -> None:
+    def body_of(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList, definite: Definite) -> None:
         """Go through the statements of rungs or of a chart as through those of the block around them."""
         self.in_rung = isinstance(node, ladder.Rung)
         for statement in node.body:
@@ -299,6 +299,7 @@ _STEPS: dict[type, Callable[[_Order, Any, Definite], None]] = {
     tree.Assign: _Order.assign, tree.CallStatement: _Order.call, tree.If: _Order.choice, tree.Case: _Order.case,
     tree.For: _Order.loop, tree.While: _Order.loop, tree.Repeat: _Order.loop, tree.Return: _Order.leave,
     tree.Exit: _Order.leave, tree.Continue: _Order.leave, tree.Empty: _Order.nothing,
-    tree.RefusedStatement: _Order.nothing, ladder.Ladder: _Order.body_of, ladder.Rung: _Order.body_of,
+    tree.RefusedStatement: _Order.nothing, il.InstructionList: _Order.body_of,
+    ladder.Ladder: _Order.body_of, ladder.Rung: _Order.body_of,
     sfc.Sfc: _Order.body_of,
 }

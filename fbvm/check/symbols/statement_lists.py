@@ -5,10 +5,10 @@ from __future__ import annotations
 from fbvm.base.types import fold
 from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
-from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree import il, ladder, sfc
 
 _PLAIN = tree.Assign | tree.CallStatement
-_WITH_BODY = tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung | sfc.Sfc
+_WITH_BODY = tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList
 
 
 def bodies(statement: tree.Statement) -> list[tree.Block]:

@@ -15,7 +15,7 @@ from fbvm.code.lowering.step_costs import step_cost, with_costs
 from fbvm.code.operations import Node
 from fbvm.code.pictures.st_rungs import NoRung, st_rung
 from fbvm.syntax import tree
-from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree import il, ladder, sfc
 
 RULES = Rules(
     values={**operators.VALUES, **calls.VALUES, **variables.VALUES, **aggregates.VALUES},
@@ -77,7 +77,7 @@ def _detect(body: BodyContext, edge: Edge) -> None:
 
 def _draw(body: BodyContext, block: tree.Block) -> None:
     """Record pictures of statements of Structured Text as rungs, and which expressions are observed for their contacts."""
-    drawn_already = tree.Empty | ladder.Ladder | ladder.Rung | sfc.Sfc
+    drawn_already = tree.Empty | ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList
     for number, statement in enumerate((one for one in block if not isinstance(one, drawn_already)), 1):
         site, steps, comment = body.site(statement), (), ""  # type: int, tuple[tuple[int, str, str, tuple[str, ...]], ...], str
         try:

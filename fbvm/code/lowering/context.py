@@ -22,7 +22,7 @@ from fbvm.code.operations import FLOATS, TEXT_UNITS, Block, Node
 from fbvm.code.pictures.st_rungs import Mark
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import hides_inside
-from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree import il, ladder, sfc
 
 ValueRules = dict[type, Callable[..., Node]]
 """By class of expression `rule(body, expr)`: the value of one that is no constant, in the expression's own type."""
@@ -235,4 +235,4 @@ class BodyContext(Emitter):
 
 
 EXIT: Block = (("exit",),)
-_OBSERVED_BY_RULE = ladder.Ladder | ladder.Rung | sfc.Sfc
+_OBSERVED_BY_RULE = ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList

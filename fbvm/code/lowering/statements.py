@@ -11,7 +11,7 @@ from fbvm.code.lowering.context import EXIT, BodyContext, StatementRules
 from fbvm.code.operations import Block, Node
 from fbvm.code.pictures.sfc import sfc_picture
 from fbvm.syntax import tree
-from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree import il, ladder, sfc
 
 # --- assignments ------------------------------------------------------------------------------------------------------
 
@@ -130,7 +130,7 @@ def _return(body: BodyContext, node: tree.Return, site: int) -> None:
 # --- ladder and charts ------------------------------------------------------------------------------------------------
 
 
-def _ladder(body: BodyContext, node: ladder.Ladder, site: int) -> None:
+def _lines(body: BodyContext, node: ladder.Ladder | il.InstructionList, site: int) -> None:
     body.lower(node.body)
 
 
@@ -150,5 +150,5 @@ def _sfc(body: BodyContext, node: sfc.Sfc, site: int) -> None:
 
 STATEMENTS: StatementRules = {
     tree.Assign: _assign, tree.If: _if, tree.Case: _case, tree.Exit: _exit, tree.Continue: _continue, tree.Return: _return,
-    ladder.Ladder: _ladder, ladder.Rung: _rung, sfc.Sfc: _sfc,
+    il.InstructionList: _lines, ladder.Ladder: _lines, ladder.Rung: _rung, sfc.Sfc: _sfc,
 }

@@ -41,7 +41,7 @@ def formatted(source: Source, outside: Outside = NOTHING) -> tuple[str, list[Dia
 
 
 class _NeedsMending(Exception):
-    """The text is not parsed in detail, as an instruction list."""
+    """The text is understood only with a repair."""
 
 
 def _printed(source: Source, spelling: Spelling) -> str:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from fbvm.syntax.formatter.comments import Comment
 from fbvm.syntax.formatter.expressions import ExpressionLayout, Phrase
 from fbvm.syntax.formatter.layout import BLANK, HARD, Doc, Hang, Indent, Leaf, Verbatim
+from fbvm.syntax.il.text import list_lines
 from fbvm.syntax.ladder.mnemonics import read_rungs
 from fbvm.syntax.ladder.text import rung_lines
 from fbvm.syntax.st.lexer import Token
@@ -133,6 +134,12 @@ class StatementLayout(ExpressionLayout):
         words = Token("", "LADDER", token.start, token.end)
         rows = [part for line in rung_lines(rungs) for part in (HARD, Verbatim(line, 0))]
         return Phrase(token.start, self.leaf(words), *rows, HARD, "END_LADDER", level="refused")
+
+    def instruction_list(self, token: Token) -> Phrase:
+        """An instruction list, in columns."""
+        written = list_lines(self.comments.text, token.start, token.end, lambda word: self.leaf(word).text)
+        rows = [part for line in written for part in (HARD, Verbatim(line, 0))]
+        return Phrase(token.start, *rows[1:], level="refused")
 
     def head(self, word: Token, condition: Phrase, then: Token) -> Doc:
         return (self.leaf(word), " ", self.hung(condition), " ", self.closer(then))

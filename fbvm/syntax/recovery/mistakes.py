@@ -275,7 +275,7 @@ def _ladder(automaton: Automaton, token: Token, following: list[Token]) -> Repai
 
 
 def _instruction_list(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
-    """`LD a` at the beginning of a line: the whole body is an instruction list."""
+    """`LD a` at the beginning of a line, and a `;` somewhere: an instruction list with statements or `;` in it."""
     word = automaton.before
     line = automaton.text[:word.start].rpartition("\n")[2].strip()
     if word.type != "NAME" or word.text.upper() not in INSTRUCTION_LIST or (line and not line.endswith(":")):
@@ -284,8 +284,8 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
         return None
     while token.type not in BODY_ENDS and token.type != "$END":
         token = automaton.next()
-    return Repair([token], word.start, word.end, "the instruction list is understood but not executed by this version",
-                  "write the body in Structured Text", cut=True, code="S0901", silent=token.start)
+    return Repair([token], word.start, word.end, "an instruction list has no `;` and no statements of Structured Text",
+                  "each instruction stands on a line of its own, without `;`", cut=True, silent=token.start)
 
 
 MISTAKES: tuple[Callable[[Automaton, Token, list[Token]], Repair | None], ...] = (

@@ -6,7 +6,8 @@ from fbvm.base.diagnostics import Source
 from fbvm.syntax.st.declarations import Declarations
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.statements import Items
-from fbvm.syntax.tree import Action, Block, Call, CallStatement, Expr, Name, NameRef
+from fbvm.syntax.tree import Action, Assign, Block, Call, CallStatement, Expr, Literal, Name, NameRef
+from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.sfc import QUALIFIERS, Association, Step, Transition
 
 Part = Step | Transition
@@ -50,6 +51,8 @@ class SfcElements(Declarations):
                         to: Token, targets: list[Name], colon: Token, items: Items, end: Token) -> Transition:
         body = self.block(items)
         only = body[0] if len(body) == 1 else None
+        if isinstance(only, InstructionList):
+            return self._condition_of_list(word, token, priority, sources, targets, only, end)
         if isinstance(only, CallStatement) and not isinstance(only.call, Call):
             self.report("S0101", colon.start, colon.end, "`:=` expected in front of the condition, but `:` found",
                         "behind `:` stand statements that assign the condition to the transition's name")
@@ -59,6 +62,24 @@ class SfcElements(Declarations):
                         "the statements assign the condition to it; or write `:= condition;`")
             token = word
         return self._transition(word, token, priority, sources, targets, NameRef(token.start, token.end, token.text), body, end)
+
+    def _condition_of_list(self, word: Token, token: Token | None, priority: int | None, sources: list[Name], targets: list[Name],
+                           made: InstructionList, end: Token) -> Transition:
+        """A transition whose condition is the current result at the end of an instruction list (table 54)."""
+        truth = made.result
+        if truth is None:
+            self.report("S0111", made.start, made.end, "this instruction list has no current result at its end",
+                        "the condition is the last current result")
+            truth = Literal(made.start, made.end, "bool", False, None, "FALSE")
+        if not made.body:
+            return self._transition(word, token, priority, sources, targets, truth, None, end)
+        if token is None:
+            self.report("S0111", word.start, word.end, "a transition with statements needs a name",
+                        "the statements assign the condition to it; or write `:= condition;`")
+            token = word
+        named = NameRef(token.start, token.end, token.text)
+        body = (made, Assign(made.end, made.end, (named,), ":=", truth))
+        return self._transition(word, token, priority, sources, targets, named, body, end)
 
     def _transition(self, word: Token, token: Token | None, priority: int | None, sources: list[Name],
                     targets: list[Name], condition: Expr, body: Block | None, end: Token) -> Transition:

@@ -29,6 +29,8 @@ wrong one; the recovery needs the stacks as they are before that."""
 
 ELEMENTS = frozenset(("STEP", "TRANSITION"))
 """Words of charts, whose conditions in the grammar say that they are no names."""
+NO_NAMES = ELEMENTS | {"INSTRUCTION_LIST"}
+"""Terminals of words that are not reserved, and no names where they have these terminals."""
 NAMED = re.compile(r"\s+\w+\s*:(?!=)")
 """The text behind ACTION that says that ACTION is no name."""
 FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
@@ -202,6 +204,6 @@ class Automaton:
     def may_be_name(self, token: Token) -> bool:
         """Whether a word that the grammar cannot take here may be a name of the user."""
         if token.type in self.soft:
-            return token.text[-1] != "=" and token.type not in ELEMENTS and not (
+            return token.text[-1] != "=" and token.type not in NO_NAMES and not (
                 token.type == "ACTION" and NAMED.match(self.text, token.end))
         return token.type in FUNCTION_OPERATORS and self.text[token.end:token.end + 20].lstrip().startswith("(")

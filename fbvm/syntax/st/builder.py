@@ -10,6 +10,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.refused import refused_what
 from fbvm.syntax.tree import Expr, Name, Refused, Statement
+from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 
 CHAIN_LIMIT = 1000
@@ -54,6 +55,11 @@ class Builder:
         """THIS and SUPER seen since the last statement."""
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""
+        self.lists: list[InstructionList] = []
+        """Instruction lists of the POU that is being read."""
+        self.blocks: dict[str, str] = {}
+        """Variables of the POU that is being read whose types are the names of blocks with inputs S and R -> these types, both in
+        capitals."""
         self.numbered: dict[str, str] = {}
         """Symbol of a timer or counter, in capitals -> the number that it is declared AT, as T5."""
         self.numbered_everywhere: dict[str, str] = {}

@@ -34,6 +34,8 @@ from fbvm.syntax.tree import (
 )
 
 Settings = AccessVars | ConfigVars
+LATCHING = ("RS", "SR", "CT")
+"""With what the names of the standard blocks begin that have inputs S or R."""
 ConfigItem = VarSection | Task | ProgramInstance | Refused | Settings
 
 
@@ -43,6 +45,9 @@ class Declarations(Types):
     # --- variables ---
 
     def var_section(self, word: Token, qualifiers: list[Name], variables: list[VarDecl], end: Token) -> VarSection:
+        for declared in variables:
+            if isinstance(declared.spec, NamedType) and declared.spec.text[:2].upper() in LATCHING:
+                self.blocks.update((name.text.upper(), declared.spec.text.upper()) for name in declared.names)
         return VarSection(word.start, end.end, word.text.upper(), tuple(qualifiers), tuple(variables))
 
     def global_vars(self, section: VarSection) -> GlobalVars:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fbvm.base.types import fold
 from fbvm.syntax import tree
 from fbvm.syntax.tree import Block, Expr, NameRef, Statement
+from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.node import changed
 
 LOOPS = tree.For | tree.While | tree.Repeat
@@ -176,6 +177,6 @@ def _rebuilt(node: Statement, inner: Callable[[Block], Block]) -> Statement:
     if isinstance(node, tree.Case):
         cases = tuple(changed(branch, body=inner(branch.body)) for branch in node.branches)
         return changed(node, branches=cases, otherwise=None if node.otherwise is None else inner(node.otherwise))
-    if isinstance(node, tree.For | tree.While | tree.Repeat):
+    if isinstance(node, tree.For | tree.While | tree.Repeat | InstructionList):
         return changed(node, body=inner(node.body))
     return node

@@ -43,6 +43,11 @@ _END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUN
                      r"ACTION)\b")
 
 
+_LIST_ENDS = re.compile(r"""(?isx) // [^\n]* | \(\* .*? \*\) | /\* .*? \*/ | \{ [^}]* \} | (?P<text> '[^'\n]*' | "[^"\n]*")
+                        | (?P<end> \b (?:END_\w+ | ACTION | TRANSITION | STEP | INITIAL_STEP) \b) | (?P<other> ; | \bLADDER\b)""")
+"""What is passed over in an instruction list, what ends it, and what shows that it is none."""
+_FIRST = re.compile(r"[ \t]*(?:\w+[ \t]*:[ \t]*)?")
+"""What may stand on its line in front of the first instruction of an instruction list."""
 _END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")
 
 
@@ -166,15 +171,16 @@ class Kinds(dict[str, str]):
 
 
 class Lexer:
-    """The tokens of one text, in order; `pragmas` fills while they are taken."""
+    """The tokens of one text, in order; `pragmas` fills while they are taken.  Without `lists`, an instruction list is not one
+    token: its words are."""
 
-    def __init__(self, text: str, report: Report) -> None:
-        self.text, self.report = text, report
+    def __init__(self, text: str, report: Report, lists: bool = True) -> None:
+        self.text, self.report, self.lists = text, report, lists
         self.pragmas: list[Pragma] = []
 
-    def tokens(self) -> Iterator[Token]:
-        """Every token, then one of type "$END"."""
-        text, at, lex = self.text, 0, lexis()
+    def tokens(self, start: int = 0) -> Iterator[Token]:
+        """Every token from an offset on, then one of type "$END"."""
+        text, at, lex = self.text, start, lexis()
         match, signs, kinds, in_context, ends = lex.master.match, lex.signs, Kinds(lex.words), lex.in_context, lex.operand_ends
         before, length, new = "", len(text), tuple.__new__
         while True:
@@ -225,6 +231,11 @@ class Lexer:
             return (kind, end_of.end()) if end_of else ("NAME", end)
         if kind == "LADDER":
             return kind, self._ladder(start, end)
+        if kind == "INSTRUCTION_LIST":
+            last = self._instruction_list(start)
+            if last:
+                return kind, last
+            kind = "NAME"
         if before == "AT" or (before in lex.operand_ends and self.text.startswith("=", end)):
             return self._special(lex, before, kind, start, end)
         return kind, end
@@ -314,6 +325,23 @@ class Lexer:
             self.report("S0101", start, end, "LADDER without END_LADDER", "END_LADDER stands on a line of its own")
             return len(self.text)
         return found.end()
+
+    def _instruction_list(self, start: int) -> int:
+        """Where the instruction list ends that may begin here; 0 if this is none: a `;` follows."""
+        text = self.text
+        if not self.lists or not _FIRST.fullmatch(text, text.rfind("\n", 0, start) + 1, start):
+            return 0
+        at, last = start, start
+        for found in _LIST_ENDS.finditer(text, start):
+            if text[at:found.start()].strip():
+                last = at + len(text[at:found.start()].rstrip())
+            if found["other"]:
+                return 0
+            if found["end"]:
+                return last
+            last = found.end() if found["text"] else last
+            at = found.end()
+        return 0
 
     def _comment(self, start: int) -> int:
         """Where the bracket comment that begins at `start` ends; each kind nests in itself."""

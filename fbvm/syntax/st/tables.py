@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 from fbvm.base.cache import Cache, name_of
 from fbvm.base.data import data_folder
 
-FILES = {"st": ("common.lark", "declarations.lark", "st.lark"), "mnemonics": ("mnemonics.lark",)}
+FILES = {"st": ("common.lark", "declarations.lark", "st.lark"), "mnemonics": ("mnemonics.lark",),
+         "il": ("common.lark", "declarations.lark", "st.lark", "il.lark")}
 """The files of each language."""
 STORED = Cache("grammars", b"fbvm grammar 3\n", 16 << 20)
 
-STARTS = {"st": "source_text", "mnemonics": "line"}
+STARTS = {"st": "source_text", "mnemonics": "line", "il": "operand_list"}
 
 
 class Rule(NamedTuple):

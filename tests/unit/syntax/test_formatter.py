@@ -279,10 +279,51 @@ def test_depth_is_no_limit() -> None:
     assert body("IF a THEN " * 150 + "b; " + "END_IF; " * 150).count("END_IF;") == 150
 
 
-def test_an_instruction_list_stays_as_it_is() -> None:
-    text = "PROGRAM Main\nVAR a, b : BOOL; END_VAR\n  LD a\n  AND b\n  ST a\nEND_PROGRAM\n"
+WRITTEN_LIST = """\
+PROGRAM Main
+VAR
+    Go, b : BOOL;
+    n     : INT;
+    t     : TON;
+END_VAR
+        LD      Go  // the button
+        ANDN    b  // (* and *)
+
+        // both
+        ST      b  (* one *)  (* two *)
+        JMPC    over
+        LD      n
+        ADD     (
+            LD      3
+            MUL     -1
+        )
+        &N      16#0F
+        ST      n
+    over:
+        CAL     t(  // a timer
+                    IN := Go,
+                    PT := T#1s
+                )
+        CAL     t(IN := NOT b, Q => Go)
+        LD      n
+        LIMIT   3, n
+        ST      n
+END_PROGRAM
+"""
+"""An instruction list in canonical text."""
+
+
+def test_an_instruction_list_stands_in_columns() -> None:
+    loose = WRITTEN_LIST.replace("LD      Go  ", "ld GO ").replace("over:\n        CAL     t(", "over :  cal t (").replace(" := ", ":=")
+    loose = loose.replace("        // both", "\n\n // both").replace("ADD     (", "add(").replace("            MUL", "mul")
+    assert formatted(Source("x.st", loose)) == (WRITTEN_LIST, [])
+    assert formatted(Source("x.st", WRITTEN_LIST)) == (WRITTEN_LIST, [])
+
+
+def test_an_instruction_list_with_a_mistake_stays_as_it_is() -> None:
+    text = "PROGRAM Main\nVAR a, b : BOOL; END_VAR\n  LD a\n  AND b + 1\n  ST a\nEND_PROGRAM\n"
     written, wrong = formatted(Source("x.st", text))
-    assert written == text and [d.code for d in wrong] == ["S0901"]
+    assert written == text and [d.code for d in wrong] == ["S0114"]
 
 
 def test_labels_stay_as_they_are_written() -> None:
