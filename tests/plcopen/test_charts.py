@@ -144,3 +144,12 @@ def test_what_stands_beside_the_chart_is_named() -> None:
     made = chart(step(1, "s", first=True), value(5, "x"), declared="x")
     assert [d.code for d in made.errors] == ["X0203"]
     assert "belongs to no transition" in made.errors[0].message
+
+
+def test_a_condition_in_an_instruction_list() -> None:
+    text = '<inline name=""><IL><xhtml:p>LD go\nANDN done</xhtml:p></IL></inline>'
+    negated = transition(5, "3", text.replace("LD go\nANDN", "LD")).replace("<condition>", '<condition negated="true">')
+    made = chart(step(1, "idle", first=True), transition(2, "1", text), step(3, "busy", "2"), actions(4, "3", does("x")),
+                 negated, jump(6, "5", "idle"), declared="go done x")
+    assert made.errors == []
+    assert states(made, "x", ["go=1 done=1", "done=0", "done=1"]) == ["0", "1", "1"]

@@ -343,3 +343,9 @@ def test_an_operand_that_is_typed_at_a_pin_counts() -> None:
     made = imported(pou(value(1, "n") + typed + result(4, "3.OUT", "m"), variable("n", "INT", "2") + variable("m", "INT"),
                         language="FBD"))
     assert states(made, "m", [""]) == ["42"]
+
+
+def test_an_instruction_list_is_taken_over() -> None:
+    made = imported(pou("<xhtml:p>LD a\nANDN b\nJMPC on\nLD FALSE\non: ST q</xhtml:p>", "a b q", language="IL"))
+    assert codes(made) == []
+    assert states(made, "q", ["a=1", "b=1", "b=0"]) == ["1", "0", "1"]

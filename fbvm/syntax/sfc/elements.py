@@ -72,10 +72,10 @@ class SfcElements(Declarations):
                         "the condition is the last current result")
             truth = Literal(made.start, made.end, "bool", False, None, "FALSE")
         if not made.body:
-            return self._transition(word, token, priority, sources, targets, truth, None, end)
+            return self._transition(word, token, priority, sources, targets, truth, (made,), end)
         if token is None:
-            self.report("S0111", word.start, word.end, "a transition with statements needs a name",
-                        "the statements assign the condition to it; or write `:= condition;`")
+            self.report("S0111", word.start, word.end, "a transition whose instruction list stores, calls or jumps needs a name",
+                        "write a name behind TRANSITION")
             token = word
         named = NameRef(token.start, token.end, token.text)
         body = (made, Assign(made.end, made.end, (named,), ":=", truth))

@@ -106,8 +106,10 @@ class ChartLowering(ChartContext):
         begin = tree.Assign(transition.targets[0].start, transition.targets[0].end, (first,), ":=", self.truth(True))
         fires = (begin, *(self.put(step, True) for step in (*others, *map(self.exited, steps))))
         tested = tree.If(transition.start, transition.end, ((seen, fires),), tuple(self._wake_for_condition(transition)) or None)
-        if transition.body is not None and transition.name is not None:
-            self.temporary(transition.name.text)
+        named = transition.name
+        if named is not None and transition.body is not None and isinstance(transition.condition, NameRef) \
+                and transition.condition.start == named.start:
+            self.temporary(named.text)
         return self.when(self.join("AND", enabled), (*(transition.body or ()), tested))
 
     def _wake_for_condition(self, transition: Transition) -> Iterable[Statement]:

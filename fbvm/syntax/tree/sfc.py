@@ -39,7 +39,8 @@ class Step(Node):
 @_node
 class Transition(Node):
     """`TRANSITION name (PRIORITY := n) FROM .. TO .. := condition; END_TRANSITION`.  With a `body`, that assigns the
-    condition to the transition's name, and `condition` is this name."""
+    condition to the transition's name, and `condition` is this name; or `body` is an instruction list that does nothing but
+    compute the condition."""
 
     name: Name | None
     priority: int | None

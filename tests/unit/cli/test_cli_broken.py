@@ -42,7 +42,7 @@ def fbvm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fbvm:
     ("LADDER\nKEEP 100.00\nEND_LADDER", "S0110"),
     ("INITIAL_STEP A: END_STEP\nTRANSITION FROM B TO A := TRUE; END_TRANSITION", "there is no step B"),
     ("INITIAL_STEP A: END_STEP\nTRANSITION FROM A TO B := TRUE; END_TRANSITION", "there is no step B"),
-    ("INITIAL_STEP A: END_STEP\nTRANSITION t FROM A TO A:\nLD x\nEND_TRANSITION", "X0301"),
+    ("INITIAL_STEP A: END_STEP\nTRANSITION t FROM A TO A:\nEND_TRANSITION", "X0301"),
 ])
 def test_export_of_sources_with_errors(fbvm: Fbvm, body: str, said: str) -> None:
     Path("wrong.st").write_text(f"PROGRAM Main VAR x : BOOL; END_VAR\n{body}\nEND_PROGRAM\n", encoding="utf-8")

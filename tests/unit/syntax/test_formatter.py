@@ -314,8 +314,9 @@ END_PROGRAM
 
 
 def test_an_instruction_list_stands_in_columns() -> None:
-    loose = WRITTEN_LIST.replace("LD      Go  ", "ld GO ").replace("over:\n        CAL     t(", "over :  cal t (").replace(" := ", ":=")
-    loose = loose.replace("        // both", "\n\n // both").replace("ADD     (", "add(").replace("            MUL", "mul")
+    loose = WRITTEN_LIST.replace("LD      Go  ", "ld GO ").replace(" := ", ":=")
+    loose = loose.replace("over:\n        CAL     t(", "over :  cal t (").replace("        // both", "\n\n // both")
+    loose = loose.replace("ADD     (", "add(").replace("            MUL", "mul")
     assert formatted(Source("x.st", loose)) == (WRITTEN_LIST, [])
     assert formatted(Source("x.st", WRITTEN_LIST)) == (WRITTEN_LIST, [])
 

@@ -205,7 +205,8 @@ class Chart:
             if ";" not in plain and ":=" not in plain and (not match or not match[1] or match[1].upper() == name.upper()):
                 return name, _turned(" ".join(plain.split()) or "TRUE", negated), []
         lines = self.write(body)
-        return name, "", [*lines, f"{name} := NOT {name};"] if negated else lines
+        turned = "NOT" if body.language == "IL" else f"{name} := NOT {name};"
+        return name, "", [*lines, turned] if negated else lines
 
     def _drawn(self, name: str, element: Element, diagram: Diagram, negated: bool) -> tuple[str, str, list[str]]:
         """A condition that is drawn: the objects that feed it."""

@@ -9,6 +9,7 @@ from fbvm.interchange.plcopen.markup import Element, element
 from fbvm.interchange.plcopen.write.layout import End, wired
 from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
+from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.sfc import Sfc, Step, Transition
 
 LANE, HIGH, TOP = 320, 160, 40
@@ -127,8 +128,11 @@ class ChartWriter:
         if transition.body is None:
             text = element("ST", element("xhtml:p", self.types.text(transition.condition)))
             return element("condition", element("inline", text, name=""))
-        assert transition.name is not None
         body = transition.body
+        if len(body) == 1 and isinstance(body[0], InstructionList) and not body[0].body:
+            written = self.body(body, body[0].start, body[0].end)
+            return element("condition", element("inline", written, name=transition.name.text if transition.name else ""))
+        assert transition.name is not None
         if not body:
             raise NotExportable(transition, f"the transition {transition.name.text} has no condition that can be exported", "")
         start, end = body[0].start, transition.end

@@ -12,6 +12,7 @@ from fbvm.interchange.plcopen.write.rungs import RungWriter
 from fbvm.interchange.plcopen.write.statements import StatementWriter
 from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
+from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Sfc
 
@@ -106,7 +107,7 @@ def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str])
     text = types.source.text[start:end]
     if not any(isinstance(statement, Ladder) for statement in body):
         types.kept.append((start, end))
-        return element("ST", element("xhtml:p", _dedented(text))), {}
+        return element("IL" if _is_list(body) else "ST", element("xhtml:p", _dedented(text))), {}
     if len(body) > 1 and (_JUMP.search(text) or _LABEL.search(_without_ladder(text))):
         raise NotExportable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
     drawing = Drawing()
@@ -118,6 +119,12 @@ def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str])
         else:
             statements.write(statement)
     return element("LD", *drawing.elements), rungs.declared
+
+
+def _is_list(body: tree.Block) -> bool:
+    """Whether a body is an instruction list; its jumps back have become loops around parts of it."""
+    return any(isinstance(each, InstructionList) or isinstance(each, tree.Repeat) and _is_list(each.body)
+               or isinstance(each, tree.If) and any(_is_list(inner) for _, inner in each.branches) for each in body)  # fmt: skip
 
 
 def _without_ladder(text: str) -> str:
