@@ -193,7 +193,7 @@ def _value(where: Place | Span, written: object) -> object:
 def _network(project: Project, net: str) -> LoopNetwork | TcpNetwork:
     if net == "tcp":
         rows = {said: real for said, real in project.servers if real is not None} | dict(project.doors)
-        return TcpNetwork(rows, seed=project.seed, faults=project.faults)
+        return TcpNetwork(rows, backlog=project.backlog, seed=project.seed, faults=project.faults)
     network = LoopNetwork(project.seed, faults=project.faults)
     for said, _ in project.servers:
         network.place(said, ModbusPeer(server()))

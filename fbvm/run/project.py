@@ -75,6 +75,7 @@ SERVER: Keys = {
 DOOR: Keys = {
     "address": Key(endpoint, "The address of a unit, and a port at which its program waits."),
     "bind": Key(host, "Address and port of this computer where others reach it; port 0: one that the system chooses.", None),
+    "backlog": Key(flag, "Whether callers wait until a socket of the unit is free, where the unit refuses them.", False),
     "host": Key(host, "The former name of `bind`.", None),
 }
 UNIT: Keys = {
@@ -183,6 +184,8 @@ class Project:
     """Endpoint of a Modbus server and where it is on the host; None: where its endpoint says."""
     doors: tuple[tuple[Peer, tuple[str, int]], ...]
     """A unit's endpoint and where others reach it on the host."""
+    backlog: frozenset[Peer]
+    """The units' endpoints whose doors hold callers until a socket is free."""
     faults: tuple[Fault, ...]
     """What goes wrong on a network in memory."""
     plcs: tuple[PlcRow, ...]
@@ -232,6 +235,7 @@ def read_project(path: Path, *, allow_outside: bool = False) -> Project | list[D
         found, run["net"], run["seed"], run["for"], run["scans"],
         tuple((row["address"], row["host"]) for row in table["server"]),
         tuple((row["address"], row["bind"] or row["host"]) for row in table["door"]),
+        frozenset(row["address"] for row in table["door"] if row["backlog"]),
         tuple(fault_of(row) for row in table["fault"]),
         tuple(_plc(name, row, path.parent) for name, row in table["plc"].items()),
     )  # fmt: skip

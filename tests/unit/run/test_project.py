@@ -356,6 +356,8 @@ ONE = "[plc.a]\nsources = ['counter.st']\n"
     ("[[fault]]\nerror = 'ECONREFUSED'", [
         ("P0103", 4, "fault 1.error: 'ECONREFUSED' is no errno name such as ECONNREFUSED or EHOSTUNREACH")]),
     ("[[door]]\naddress = '1.2.3.4:502'", [("P0104", 3, "door 1.bind is missing")]),
+    ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\nbacklog = 5", [
+        ("P0103", 6, "door 1.backlog: 5 is neither true nor false")]),
     ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\nhost = '127.0.0.1:0'", [
         ("P0103", 6, "door 1 has bind and host, which are the same")]),
     ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\n[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:1'", [
@@ -383,6 +385,11 @@ bind = "127.0.0.1:0"
 [[fault]]
 peer = "1.2.3.4:502"
 """
+
+
+def test_doors_hold_callers_only_where_the_file_says_so(folder: Path) -> None:
+    assert project(folder, DOORED).backlog == frozenset()
+    assert project(folder, DOORED.replace("[[fault]]", "backlog = true\n[[fault]]")).backlog == {Peer("1.2.3.4", 502)}
 
 
 def test_what_cannot_be_done_with_real_connections_is_refused(folder: Path) -> None:
