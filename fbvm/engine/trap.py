@@ -51,13 +51,14 @@ _WORDS = {
     "R0101": "{0} divided by {1}",
     "R0102": "index {0} outside {1}..{2}",
     "R0103": "value {0} outside {1}..{2}",
-    "R0104": "step budget used up (watchdog)",
     "R0106": "shift or rotate by {0}",
     "R0107": "selector {0} of MUX outside 0..{1}",
     "R0108": "string position or length {0} out of range",
     "R0112": "the scan took longer than the watch cycle time of {0} ms",
     "R0111": "text {0!r} cannot be converted to {1}",
 }
+ENDLESS = "a loop waits for what does not change within a scan, or there is too much work for one"
+"""The usual causes of R0104."""
 _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} outside {1}..{2}"}
 """R0105 by the number of its values: BCD, text and data type, value and limits."""
 
@@ -72,6 +73,8 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), insta
         words = _CONVERSION[len(values)].format(*map(_shown, values))
     elif code in _WORDS and values:
         words = _WORDS[code].format(*map(_shown, values))
+    elif code == "R0104":
+        words = f"{CODES[code].title}: {ENDLESS}"
     else:
         words = CODES[code].title if code in CODES else code
     return Trap(code, place, values, f"{code} {place}: {words}", instance)

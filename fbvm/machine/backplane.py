@@ -20,6 +20,8 @@ KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
 """What a project calls a unit: the class, and the arguments by the keys that are written for them."""
 BRINGERS: Mapping[str, Callable[[], Unit]] = {unit.table.area: unit for unit in (Noc, Tianxing)}
 """What makes the unit that brings a mailbox, by the mailbox's name."""
+UNIT_OF_AREA: Mapping[str, str] = {Noc.table.area: "NOC", Tianxing.table.area: "Tianxing"}
+"""What a project calls the unit that brings a mailbox, by the mailbox's name."""
 ETN21_ADDRESS = "192.168.250.21"
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import errno
 import socket
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible, why_unusable
@@ -30,15 +30,15 @@ class TcpNetwork(Switchboard):
     A unit without a row listens on the host's address `bind`, on the port of its request if that is 1024 or above; the first
     one listens at `door`, if that is given.  Host names of the map are resolved here, once.
 
-    With `backlog` the host keeps a port open on which a unit has listened: who calls while none of the unit's sockets waits is
-    let in as soon as one does.  Without, such a caller is refused, as by the unit; only those wait that the host has accepted
-    in the same moment as the caller who took the last socket.  `faults` are rows of `net.faults`, `seed` starts their random
-    numbers.  Raises OSError for a name that cannot be resolved."""
+    With `backlog`, True or the endpoints of units, the host keeps a port open on which a unit has listened: who calls while none
+    of the unit's sockets waits is let in as soon as one does.  Without, such a caller is refused, as by the unit; only those
+    wait that the host has accepted in the same moment as the caller who took the last socket.  `faults` are rows of
+    `net.faults`, `seed` starts their random numbers.  Raises OSError for a name that cannot be resolved."""
 
     virtual_time = False
 
     def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *,
-                 door: Peer | None = None, backlog: bool = False, seed: int = 0,
+                 door: Peer | None = None, backlog: bool | Collection[Peer] = False, seed: int = 0,
                  faults: Iterable[Fault] = ()) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
         super().__init__(AddressMap(rows, bind, door), seed, faults)
@@ -187,7 +187,7 @@ class _Listener(HostChannel):
                 if not isinstance(error, BlockingIOError | ConnectionAbortedError):
                     self.failed(errno_name(error))
                 return
-            self._let_in(conn, Peer(*name), now_ns, has_waited=self.link.network.waiting.keeps)
+            self._let_in(conn, Peer(*name), now_ns, has_waited=self.link.network.waiting.keeps(self.local))
 
     def _let_in(self, conn: socket.socket, real: Peer, now_ns: int, has_waited: bool) -> None:
         """Gives a caller that the host has accepted to the first listener that it fits; resets a stranger.  Who `has_waited` may

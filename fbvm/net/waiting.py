@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Generic, Protocol, TypeVar
 
 from fbvm.net.host_link import HostLink
@@ -26,21 +27,26 @@ Socket = TypeVar("Socket", bound=Closable)
 
 
 class WaitingCallers(Generic[Socket]):
-    """`keeps` is True if the host's port stays open while none of a unit's sockets waits, so that callers wait there."""
+    """`backlog` says of which endpoints the host's port stays open while none of the unit's sockets waits, so that callers wait
+    there: True for all."""
 
-    def __init__(self, network: Switchboard, keeps: bool) -> None:
-        self._network, self.keeps = network, keeps
+    def __init__(self, network: Switchboard, backlog: bool | Collection[Peer]) -> None:
+        self._network, self._backlog = network, backlog
         self._kept: dict[Peer, tuple[Socket, _Bell]] = {}
         self.held: dict[Peer, list[tuple[Socket, Peer]]] = {}
         """Callers of a unit's endpoint whom the host has accepted beside the one that took its last listener."""
 
+    def keeps(self, endpoint: Peer) -> bool:
+        """True if callers of a unit's endpoint wait until a socket of the unit does."""
+        return self._backlog if isinstance(self._backlog, bool) else endpoint in self._backlog
+
     def keep(self, link: HostLink, endpoint: Peer, sock: Socket) -> bool:
         """Keeps the listening socket of a unit's endpoint until its next listener opens; False if that is not wanted."""
-        if self.keeps:
+        if keeps := self.keeps(endpoint):
             bell = _Bell(self._network, link, endpoint, sock)
             self._kept[endpoint] = sock, bell
             self._network.watch(sock, READ, bell)
-        return self.keeps
+        return keeps
 
     def take(self, endpoint: Peer) -> Socket | None:
         """The listening socket that was kept for a unit's endpoint, if there is one."""

@@ -6,12 +6,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from ipaddress import IPv4Address
 
+from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.base.toml import load_toml
 from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
-from fbvm.machine.backplane import KINDS, make_unit
+from fbvm.machine.backplane import KINDS, UNIT_OF_AREA, make_unit
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
@@ -147,6 +149,16 @@ class Plant:
                 return False
         return True
 
+    def missing_units(self) -> Iterator[str]:
+        """What a user should know of PLCs whose program talks to a unit that they do not have."""
+        for kind in self.kinds:
+            attached = {unit.kind for unit in kind.row.units}
+            for wanted, library in sorted(units_of(kind.runs[0].plc.image).items() if kind.runs else ()):
+                if wanted not in attached:
+                    name = kind.row.name
+                    yield (f"{name} has no unit of type {wanted}, to which blocks of {library} talk: they reach nobody; "
+                           f"write [[plc.{name}.unit]] with its address")
+
     def _running(self, plc: Plc, row: PlcRow, writes: Iterable[TimedWrite], number: int) -> Running | None:
         phase_ns = row.cycle_ns * number // (row.count or 1) // MOMENT_NS * MOMENT_NS
         try:
@@ -190,10 +202,22 @@ def _value(where: Place | Span, written: object) -> object:
     return conform(where.type, written, where.name)
 
 
+def units_of(image: Image) -> dict[str, str]:
+    """The types of units to which shipped blocks of a program talk, each with what talks to it: a mailbox or a library."""
+    found = {UNIT_OF_AREA[box.name]: f"the mailbox {box.name}" for box in image.layout.mailboxes if box.name in UNIT_OF_AREA}
+    for folder in sorted({site.file.rpartition("/")[0] for site in image.sites} - {""}):
+        described = data_folder("fblib") / folder / "library.toml"
+        if described.is_file():
+            kind = str(load_toml(described.read_text(encoding="utf-8")).get("unit", "")).partition(",")[0]
+            if kind in KINDS:
+                found[kind] = f"the library {folder}"
+    return found
+
+
 def _network(project: Project, net: str) -> LoopNetwork | TcpNetwork:
     if net == "tcp":
         rows = {said: real for said, real in project.servers if real is not None} | dict(project.doors)
-        return TcpNetwork(rows, seed=project.seed, faults=project.faults)
+        return TcpNetwork(rows, backlog=project.backlog, seed=project.seed, faults=project.faults)
     network = LoopNetwork(project.seed, faults=project.faults)
     for said, _ in project.servers:
         network.place(said, ModbusPeer(server()))

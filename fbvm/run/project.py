@@ -20,8 +20,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +62,8 @@ NETS = ("loop", "tcp")
 MOST = 100_000
 """PLCs of one kind."""
 
+MOST_NAMED = 5
+"""Files that a hint names."""
 MOST_NUMBER = 1 << 62
 
 RUN: Keys = {
@@ -75,6 +79,7 @@ SERVER: Keys = {
 DOOR: Keys = {
     "address": Key(endpoint, "The address of a unit, and a port at which its program waits."),
     "bind": Key(host, "Address and port of this computer where others reach it; port 0: one that the system chooses.", None),
+    "backlog": Key(flag, "Whether callers wait until a socket of the unit is free, where the unit refuses them.", False),
     "host": Key(host, "The former name of `bind`.", None),
 }
 UNIT: Keys = {
@@ -183,6 +188,8 @@ class Project:
     """Endpoint of a Modbus server and where it is on the host; None: where its endpoint says."""
     doors: tuple[tuple[Peer, tuple[str, int]], ...]
     """A unit's endpoint and where others reach it on the host."""
+    backlog: frozenset[Peer]
+    """The units' endpoints whose doors hold callers until a socket is free."""
     faults: tuple[Fault, ...]
     """What goes wrong on a network in memory."""
     plcs: tuple[PlcRow, ...]
@@ -232,6 +239,7 @@ def read_project(path: Path, *, allow_outside: bool = False) -> Project | list[D
         found, run["net"], run["seed"], run["for"], run["scans"],
         tuple((row["address"], row["host"]) for row in table["server"]),
         tuple((row["address"], row["bind"] or row["host"]) for row in table["door"]),
+        frozenset(row["address"] for row in table["door"] if row["backlog"]),
         tuple(fault_of(row) for row in table["fault"]),
         tuple(_plc(name, row, path.parent) for name, row in table["plc"].items()),
     )  # fmt: skip
@@ -283,13 +291,25 @@ def _check_units(reading: Reading, plcs: Mapping[str, Any]) -> None:
 
 
 def _check_paths(reading: Reading, plcs: Mapping[str, Any], folder: Path) -> None:
-    """Complain about paths that only another system takes, such as those with backslashes."""
+    """Complain about sources that are not there, and paths that only another system takes, such as those with backslashes."""
     for name, row in plcs.items():
         for key in ("sources", "libraries"):
             for written in row[key]:
-                hint = foreign_path(written)
-                if hint and not (folder / written).is_dir() and not (folder / written).is_file():
-                    reading.report("P0103", ("plc", name, key), f"plc.{name}.{key}: {written} is no path on this system", hint)
+                where, place = folder / written, ("plc", name, key)
+                if os.path.lexists(where):
+                    continue
+                if hint := foreign_path(written):
+                    reading.report("P0103", place, f"plc.{name}.{key}: {written} is no path on this system", hint)
+                elif key == "sources":
+                    reading.report("P0103", place, f"plc.{name}.sources: there is no file {written}", _near(where))
+
+
+def _near(path: Path) -> str:
+    """A hint for a file that is not there: one of a similar name, or the sources that its folder has."""
+    there = sorted(found.name for found in path.parent.glob("*.st")) if path.parent.is_dir() else []
+    if near := get_close_matches(path.name, there, 1):
+        return f"did you mean {near[0]}?"
+    return f"there is {', '.join(there[:MOST_NAMED])}" + ", ..." * (len(there) > MOST_NAMED) if there else ""
 
 
 def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:

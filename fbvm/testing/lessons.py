@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -90,6 +91,26 @@ def run_pytest(arguments: Sequence[str], cwd: Path | None = None, quiet: bool = 
     installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
     command = [sys.executable, "-m", "pytest", *([] if installed else ["-p", PLUGIN]), *arguments]
     return subprocess.run(command, cwd=cwd, check=False, stdout=subprocess.DEVNULL if quiet else None).returncode
+
+
+def prediction_mistake(lesson: Lesson, folder: Path) -> str:
+    """What is wrong with a learner's prediction, without the right one; "" if it is right.
+
+    The report of a failed test would show the answer, and so would a test of a program that is still the given one."""
+    target = folder / lesson.slug
+    with tempfile.TemporaryDirectory() as temporary:
+        listing = Path(temporary) / "results.xml"
+        status = run_pytest([*QUIET, "--rootdir", str(target), "-c", str(_ini(target)), f"--junitxml={listing}",
+                             "--fbvm-pages", "0", "-k", PREDICTION, str(target)], quiet=True)  # fmt: skip
+        if status == 0:
+            return ""
+        cases = list(ElementTree.parse(listing).iter("failure")) if listing.is_file() else []
+    said = (cases[0].get("message") or "") if cases else ""
+    if f"AssertionError: {ANSWERS}" in said:
+        return said.split("\n", 1)[0].removeprefix("AssertionError: ")
+    if not said or not said.startswith(("assert ", "AssertionError")):
+        return ""  # given.st is broken, or the test: the check shows how
+    return f"{ANSWERS}: this is not what the program does; read the text again, and look: fbvm step shows every statement"
 
 
 def check(lesson: Lesson, folder: Path) -> int:

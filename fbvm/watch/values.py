@@ -99,11 +99,19 @@ _EXAMPLES = {
 }  # fmt: skip
 
 
+class NoLiteral(ValueError):
+    """A text is no literal of any type."""
+
+
 def refusal(kind: Type, name: str, text: str) -> TypeError:
     """The error that variable `name` of type `kind` does not take the literal `text`, with an example of one that it takes."""
+    return TypeError(f"{name} is {kind.name} and takes {_example(kind)}, not {text}")
+
+
+def _example(kind: Type) -> str:
+    """What a variable of a type takes."""
     number = "a number" if "ANY_REAL" in families(kind) else "a whole number"
-    example = "one character" if "ANY_CHAR" in families(kind) else _EXAMPLES.get(sort_of(kind), number)
-    return TypeError(f"{name} is {kind.name} and takes {example}, not {text}")
+    return "one character" if "ANY_CHAR" in families(kind) else _EXAMPLES.get(sort_of(kind), number)
 
 
 def nearest_real(value: float) -> float:
@@ -230,7 +238,7 @@ def literal(text: str) -> tuple[Value, Type | None]:
         raise ValueError(str(error.args[0])) from None
     except IndexError:
         raise ValueError(f"{text!r} ends within an escape") from None
-    raise ValueError(f"{text!r} is no literal")
+    raise NoLiteral(f"{text!r} is no literal")
 
 
 _QUOTED = re.compile(r"(W?(STRING|CHAR)#)?['\"].", re.I | re.S)
@@ -267,6 +275,8 @@ def _literal_of(kind: Type, text: str, name: str) -> Value:
     wanted = sort_of(kind)
     try:
         value, shown = literal(text if wanted not in DATES or "#" in text else f"{base(kind).name}#{text}")
+    except NoLiteral as error:
+        raise ValueError(f"{name}: {error}; {kind.name} takes {_example(kind)}") from None
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
     sort = sort_of(shown) if shown else "text" if isinstance(value, str) else "number"

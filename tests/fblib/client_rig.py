@@ -22,6 +22,8 @@ from fbvm.wire.modbus_server import ModbusServer
 SERVER = Peer("192.168.250.2", 502)
 SECOND_NS = 1_000_000_000
 UNTOUCHED = [0xEEEE, 0xEEEE, 0xEEEE]
+LONGEST_S = 25
+"""So many seconds a command may take: its Reply_Time, after at most 150 receives that drop what came before it."""
 FIRST = 1000
 """The address of the first register on the wire."""
 
@@ -114,7 +116,7 @@ class ClientRig:
             return "-"
         self.plc.write("Main.Command", True)
         self.scan()
-        assert self.becomes(self.kind.ended, 8), "it is stuck"
+        assert self.becomes(self.kind.ended, LONGEST_S), "it is stuck"
         self.scan()
         code, data = self.plc.read(self.kind.code), self.plc.read(self.kind.data)
         self.plc.write("Main.Command", False)

@@ -271,7 +271,7 @@ RUDE_ENDS = {
     "speaks first": [GOOD] * 3,
     "speaks first, garbage": [GOOD] * 3,
     "drips for ever": [SILENT] * 3,
-    "floods from the start": [SILENT] * 3,
+    "floods from the start": [GARBLED] * 3,
 }
 """What three requests end with, each a second after the end of the one before, by server."""
 RUDE_ENDS_OF_REAL = {

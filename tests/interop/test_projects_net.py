@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import socket
+import time
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -83,3 +85,61 @@ def test_plcs_talk_to_each_other(tmp_path: Path, net: str) -> None:
         plant.close()
     assert [run.reason for run in plant.runs] == ["until", "until"]
     assert plant.kinds[1].values(plant.runs[1]) == {"Main.done": True, "Main.read.Error_Code": 0}
+
+
+DOOR = """
+[run]
+net = "tcp"
+[plc.station]
+sources = ["server.st"]
+[[plc.station.unit]]
+address = "192.168.250.2"
+[[door]]
+address = "192.168.250.2:502"
+bind = "127.0.0.1:0"
+"""
+READ_D5 = bytes.fromhex("0001 0000 0006 01 03 0005 0001")
+BOUND_S = 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("backlog", [True, False])
+def test_a_door_holds_callers_where_the_project_says_so(tmp_path: Path, backlog: bool) -> None:
+    """The second client calls while the unit's only socket serves the first."""
+    example = Path(__file__).resolve().parents[2] / "examples" / "server.st"
+    (tmp_path / "server.st").write_bytes(example.read_bytes())
+    (tmp_path / "fbvm.toml").write_text(DOOR + "backlog = true\n" * backlog, encoding="utf-8")
+    project = read_project(tmp_path / "fbvm.toml")
+    assert isinstance(project, Project)
+    plant = Plant(project)
+    try:
+        plc = plant.runs[0].plc
+        (door,) = plant.doors.values()
+
+        def answer(client: socket.socket) -> bytes:
+            client.setblocking(False)
+            client.sendall(READ_D5)
+            ends_s = time.monotonic() + BOUND_S
+            while time.monotonic() < ends_s:
+                assert plc.scan(time.monotonic_ns()) is None
+                try:
+                    return client.recv(99)
+                except BlockingIOError:
+                    continue
+            raise AssertionError("no answer")
+
+        plc.write("D5", 7)
+        while not plc.read("CIO 1519.01"):  # passive open
+            plc.scan(time.monotonic_ns())
+        plc.scan(time.monotonic_ns())
+        with socket.create_connection((door.host, door.port), BOUND_S) as first:
+            assert answer(first)[-2:] == b"\0\7"
+            if not backlog:
+                with pytest.raises(ConnectionRefusedError):
+                    socket.create_connection((door.host, door.port), BOUND_S)
+                return
+            second = socket.create_connection((door.host, door.port), BOUND_S)
+        with second:
+            assert answer(second)[-2:] == b"\0\7"
+    finally:
+        plant.close()

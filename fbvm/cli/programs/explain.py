@@ -1,4 +1,4 @@
-"""`fbvm explain`: the page of a diagnostic, of an instruction of ladder, or of a block of the libraries."""
+"""`fbvm explain`: the page of a diagnostic, a ladder instruction, a block of the libraries or a standard function."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import click
 from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
-from fbvm.check import block_pages, instructions
+from fbvm.check import block_pages, function_pages, instructions
 from fbvm.cli.shared.terminal import say
 from fbvm.syntax.ladder.instructions.instruction_set import meant, spelling
 
@@ -18,7 +18,7 @@ def command(code: str | None) -> None:
     """Print the page of a diagnostic: a wrong program, the reason, the repair.  Without CODE: the list of all codes.
 
     `fbvm explain MOV` says what an instruction of ladder does, with its operands and flags; `fbvm explain TON` what a block
-    or function of the libraries does, with its pins.
+    or function of the libraries does, with its pins, and `fbvm explain LIMIT` what a standard function does.
 
     `fbvm explain dialects` says what compilers disagree about, and which answers --dialect chooses; `fbvm explain fault` which
     kinds of faults a network has, and their keys."""
@@ -36,9 +36,14 @@ def command(code: str | None) -> None:
         return
     if (instruction := instructions.find(code)) is not None:
         say(instructions.page(instruction))
+        if (function := function_pages.page(code)) is not None:
+            say(f"\n{function}")
         return
     if (block := block_pages.page(code)) is not None:
         say(block)
+        return
+    if (function := function_pages.page(code)) is not None:
+        say(function)
         return
     try:
         say(page(code))

@@ -32,7 +32,7 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
 
     Without LESSON, lists them.  `fbvm learn 1` shows the first one and makes a folder for it; there, write your prediction into
     answers.toml and change program.st, then `fbvm learn 1 --check`.  Status 1 if something is not right yet."""
-    from fbvm.testing.lessons import check, lessons
+    from fbvm.testing.lessons import check, lessons, prediction_mistake
 
     if (checked or learners) and find_spec("pytest") is None:
         raise click.UsageError("checks need pytest: pip install pytest")
@@ -56,6 +56,10 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
         say(found.text)
         say(f"Your files are in {named(target)}.  When you are ready: fbvm learn {number} --check")
         return
+    if mistake := prediction_mistake(found, folder):
+        say(mistake, fg="yellow", err=True)
+        say("The program is checked when the prediction is right.", err=True)
+        sys.exit(status.FAILED)
     if check(found, folder):
         sys.exit(status.FAILED)
     following = f"; the next one: fbvm learn {number + 1}" if number < len(lessons()) else "; that was the last one"

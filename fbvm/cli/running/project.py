@@ -13,7 +13,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.project_arguments import check_project_options, read_given_project
-from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, value_text
+from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, scans_in, value_text
 from fbvm.cli.shared.sources import report_diagnostics, show_diagnostic
 from fbvm.cli.shared.terminal import say, say_json
 from fbvm.machine.scan_times import Lateness, ScanTimes
@@ -24,7 +24,7 @@ from fbvm.run.project import Project
 from fbvm.run.running import Running
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
-from fbvm.watch.values import Value, show_time
+from fbvm.watch.values import Value
 
 OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json"}
 """The options that may be given with a project; all others are in its file."""
@@ -50,6 +50,8 @@ def run_project(file: Path, context: click.Context) -> int:
         return _refuse(plant.diagnostics, as_json)
     for diagnostic in plant.diagnostics:
         show_diagnostic(diagnostic)
+    for message in plant.missing_units():
+        say(message, fg="yellow", err=True)
     say_doors(plant.doors)
     if isinstance(plant.network, TcpNetwork):
         plant.network.notices.tell = notice_teller(HOW_TO_MAP, plant.doors)
@@ -101,8 +103,8 @@ def _lines(kind: Kind) -> Iterator[str]:
     many = f"{len(kind.runs):,} PLCs, " if kind.row.count is not None else ""
     each = " each" if many else ""
     ends = sorted({run.reason for run in kind.runs})
-    lasted = show_time(max(run.plc.elapsed_ns for run in kind.runs) // 1_000_000 * 1_000_000)[2:]
-    yield f"{kind.row.name}: {many}{_scans(min(scans), max(scans))}{each} in {lasted}, ended by {', '.join(ends)}"
+    lasted_ns = max(run.plc.elapsed_ns for run in kind.runs)
+    yield f"{kind.row.name}: {many}{scans_in(min(scans), max(scans), lasted_ns, each)}, ended by {', '.join(ends)}"
     first = kind.runs[0].plc
     names = Names.of(first.image, first.memory.areas)
     for name, place in kind.watched.items():
@@ -117,10 +119,6 @@ def _lines(kind: Kind) -> Iterator[str]:
 
 def _number(value: Value) -> float:
     return value if isinstance(value, int | float) else 0.0
-
-
-def _scans(least: int, most: int) -> str:
-    return (f"{least:,}" if least == most else f"{least:,} to {most:,}") + " scan" + "s" * (most != 1)
 
 
 def _for_scripts(plant: Plant) -> Iterator[tuple[str, object]]:

@@ -137,15 +137,16 @@ def command(
         journal = start_journal(stack, path, files, program, libraries, banks, said) if path else None
         plc = _plc(image, cycle_ns, options["engine"], journal)
         plc.watch_cycle.time_ns = options["watch_ns"]
-        if options["pcap"]:
-            network.tap = _capture(stack, options["pcap"], network, plc).tap
+        capture = _capture(stack, options["pcap"], network, plc) if options["pcap"] else None
+        if capture:
+            network.tap = capture.tap
         for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
         _try_doors(plc, network, options["mappings"], options["doors"])
         with write_trace(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
                 write_page(plc, options["html"], files, libraries) as page, \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
-            result = _run(plc, as_json, **options)
+            result = _run(plc, as_json, capture, **options)
             page.only_last = result.reason == "interrupted"
         result.print()
         _warn_unused_mappings(plc, network)
@@ -163,7 +164,8 @@ def _plc(image: Image, cycle_ns: int, engine: str, journal: Journal | None) -> P
 
 
 def _run(
-    plc: Plc, as_json: bool, *, settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
+    plc: Plc, as_json: bool, capture: Capture | None, *,
+    settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
     pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
     scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], **_: Any,
 ) -> RunResult:  # fmt: skip
@@ -177,10 +179,16 @@ def _run(
         names = charted_names(charted)
         recorder = Recorder(plc, names) if names else None
         set_breakpoints(plc, lines, watched, conditions)
-        with RunProgress(None if as_json else plc, scans, for_ns or max_ns) as progress:
+        with RunProgress(None if as_json else plc, scans, for_ns or max_ns) as shown_progress:
+
+            def progress(plc: Plc) -> None:
+                shown_progress.update(plc)
+                if capture:  # of a quiet network a buffer would take minutes to fill
+                    capture.flush()
+
             reason = loop.run(
                 plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes, pace=pace,
-                progress=progress.update,
+                progress=progress,
             )  # fmt: skip
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None

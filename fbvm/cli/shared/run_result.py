@@ -56,6 +56,8 @@ class RunResult:
         names = Names.of(self.plc.image, self.plc.memory.areas)
         for text, place in self.places.items():
             say(f"{text} = {value_text(place, names.read(self.plc.read, place))}")
+        if not self.places and not self.recorder and sys.stderr.isatty():  # else a run would end wordless
+            say(f"{scans_in(self.plc.scans, self.plc.scans, self.plc.elapsed_ns)}, ended by {self.reason}", err=True)
         if self.scan_time:
             say(str(self.plc.scan_times), err=True)
             if self.plc.lateness.count:
@@ -77,6 +79,12 @@ class RunResult:
             "trap": json_trap(plc.trap),
             **({"scan_time": plc.scan_times.as_dict(), "lateness": plc.lateness.as_dict()} if self.scan_time else {}),
         }  # fmt: skip
+
+
+def scans_in(least: int, most: int, lasted_ns: int, each: str = "") -> str:
+    """How many scans were executed, by the PLC with the fewest and the one with the most, and how long that was."""
+    scans = f"{least:,}" if least == most else f"{least:,} to {most:,}"
+    return f"{scans} scan{'s' * (most != 1)}{each} in {show_time(lasted_ns // MS_NS * MS_NS)[2:]}"
 
 
 def json_trap(trap: Trap | None) -> dict[str, object] | None:

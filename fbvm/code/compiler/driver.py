@@ -22,6 +22,7 @@ from fbvm.check.symbols.library import Libraries, LibraryError
 from fbvm.check.symbols.project import Project
 from fbvm.code.builder.evaluation import evaluate
 from fbvm.code.compiler.follow_on_errors import FollowOnErrors
+from fbvm.code.compiler.neighbours import with_neighbours
 from fbvm.code.image import Image, ProgramRun, TaskRow
 from fbvm.code.layout.layout import lay_out
 from fbvm.code.lowering.initial_references import InitialReferences
@@ -107,7 +108,9 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
                                no_warn=unwanted, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
         if entry and made.image:
             image_cache.write(entry, sources, made.image, made.diagnostics)
-    return Compilation(None, unreadable + made.diagnostics) if unreadable else made
+    if made.image and not unreadable:
+        return made
+    return Compilation(None, unreadable + with_neighbours(made.diagnostics, paths))
 
 
 def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,

@@ -243,22 +243,24 @@ class PythonEngine:
             self._standing = self._bind(translate(self.image, Build.STEPPED))
         return self._steps(self.image.tasks[task_index].programs, self._standing)
 
-    def observations(self, task_index: int) -> Generator[Observation, None, Trap | None]:
+    def observations(self, task_index: int, most: int | None = None) -> Generator[Observation, None, Trap | None]:
         """Executes a task, and tells its observations afterwards: the generator yields and returns what that of `observe` does.
 
         At each of them the memory is as it was at that moment, but for the system page; whoever changes it changes nothing in
-        the run.  Faster than `observe`.  An exception of a substitute comes after the observations before.  Raises ValueError
-        for a plain build."""
+        the run.  Faster than `observe`.  With `most` a loop that has made so many entries of the log, one to three
+        an observation, goes on untold, and "cut" is the last observation; not so where Python functions take the place of
+        bodies.  An exception of such a function comes after the observations before.  Raises ValueError for a plain build."""
         if self._log is None:
             raise ValueError("a plain build has no observations")
-        return self._told(self._log, task_index)
+        return self._told(self._log, task_index, most)
 
-    def _told(self, log: Log, task_index: int) -> Generator[Observation, None, Trap | None]:
+    def _told(self, log: Log, task_index: int, most: int | None) -> Generator[Observation, None, Trap | None]:
         found: Trap | None = None
         failure: Exception | None = None
         programs, memory = self.image.tasks[task_index].programs, self.memory.u8
-        before = bytes(memory)
-        log.most = ENDLESS if self.substitutes else MOST_ENTRIES
+        before, counted = bytes(memory), list(self.counted)
+        log.most = ENDLESS if self.substitutes else most or MOST_ENTRIES
+        self._spaces[0]["longest"] = min(log.most, MOST_ENTRIES)
         try:
             for run in programs:
                 log.begin(run.body, run.offset)
@@ -266,13 +268,17 @@ class PythonEngine:
                 log.end()
         except Full:
             memory[:] = before
-            return (yield from self.observe(task_index))
+            if most is None:
+                return (yield from self.observe(task_index))
+            self.counted[:] = counted
+            return (yield from self._told_in_part(log, task_index))
         except Stop as stop:
             found = trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
         except Exception as error:
             failure = error
         finally:
             log.most = 0
+            self._spaces[0]["longest"] = MOST_ENTRIES
         after = bytes(memory)
         memory[:] = before
         try:
@@ -282,6 +288,25 @@ class PythonEngine:
         memory[:] = after
         if failure:
             raise failure
+        return found
+
+    def _told_in_part(self, log: Log, task_index: int) -> Generator[Observation, None, Trap | None]:
+        """Does a task again whose log has become too long, tells what is in the log, and that there was more."""
+        entries, memory = log.entries[:], self.memory.u8
+        before = bytes(memory)
+        log.most = 0
+        log.entries.clear()
+        self._spaces[0]["longest"] = MOST_ENTRIES
+        found = self.run(task_index)
+        after = bytes(memory)
+        memory[:] = before
+        log.entries[:] = entries
+        try:
+            yield from log.observations()
+        finally:
+            log.entries.clear()
+        yield Observation("cut", NO_SITE, None)
+        memory[:] = after
         return found
 
     def _steps(self, programs: tuple[ProgramRun, ...],

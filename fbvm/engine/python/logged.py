@@ -78,7 +78,7 @@ class LoggedWriter(ObservedWriter):
             super().line(f"note({waiting[0]})" if len(waiting) == 1 else f"notes(({', '.join(waiting)}))")
 
     def begin_pass(self) -> None:
-        self.line(f"if len(entries) > {MOST_ENTRIES}: full()")
+        self.line("if len(entries) > longest: full()")
 
     def call_body(self, pou: int, address: Address | None, place: str) -> None:
         where, offset = self._static(address) if address else (ABSOLUTE, 0)
@@ -175,7 +175,8 @@ class Log:
         self._call, self._return, self._write, self._silent = range(len(table), len(rows))
         self.entries: list[Any] = []
         self.names: dict[str, Any] = {
-            "entries": self.entries, "note": self.entries.append, "notes": self.entries.extend, "full": self._full}
+            "entries": self.entries, "note": self.entries.append, "notes": self.entries.extend, "full": self._full,
+            "longest": MOST_ENTRIES}  # fmt: skip
         self.most = 0
         """Entries at which a loop gives up; 0 if nobody wants the list, which is emptied instead."""
 

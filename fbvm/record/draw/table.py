@@ -17,7 +17,7 @@ from typing import Protocol
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase
-from fbvm.record.trace.events import Event, Frame, Read, Return, Statement, Write
+from fbvm.record.trace.events import Cut, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.recorder import Signal
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
@@ -25,6 +25,8 @@ from fbvm.watch.values import Value, show_time
 
 MARK = ">"
 WIDEST_CELL = 24
+NOT_RECORDED = "(not recorded)"
+"""What a task did after the events that are recorded of it, which are about MOST_EVENTS."""
 MOST_READS = 32
 """Values that are kept as the operands of a value without a name."""
 
@@ -100,6 +102,7 @@ class ScanTable:
         self._values: list[Value] | None = None
         self._statement: Statement | None = None
         self._reads: dict[Frame, dict[str, str]] = {}
+        self._cut_scans: set[int] = set()
         self._nameless: dict[int, dict[str, str]] = {}
         """By offset the values that were read for a value without a name, such as the condition of a rung."""
 
@@ -113,8 +116,9 @@ class ScanTable:
             if moved:
                 self.changes.append(Change(plc.scans, signal, before, now, None, "", phase))
         self._values = values
-        if phase is Phase.INPUTS or any(changed):
-            self.bands[-1].rows.append(Row(phase.value, values, changed))
+        cut = phase is Phase.PROGRAM and plc.scans in self._cut_scans
+        if phase is Phase.INPUTS or any(changed) or cut:
+            self.bands[-1].rows.append(Row(NOT_RECORDED if cut else phase.value, values, changed))
 
     def event(self, plc: ScanState, event: Event) -> None:
         """Records the reads of a statement, and the changes by its writes."""
@@ -131,6 +135,9 @@ class ScanTable:
                 read[place.name] = Signal(place, place.name).text(self._names.read(plc.read, place))
         elif isinstance(event, Return):
             self._reads.pop(event.frame, None)
+        elif isinstance(event, Cut):
+            self._finish(plc)
+            self._cut_scans.add(plc.scans)
         elif isinstance(event, Write) and self._names.at(event.offset) is None:
             self._nameless[event.offset] = dict(islice(self._reads.get(event.frame, {}).items(), MOST_READS))
         elif isinstance(event, Write) and (written := self._written_signals(event)):

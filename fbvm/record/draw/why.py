@@ -8,12 +8,13 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Protocol
 
 from fbvm.base.memory import Memory, Snapshot, compare
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase
-from fbvm.record.trace.events import Event, Frame, Read, Statement, Write
+from fbvm.record.trace.events import Cut, Event, Frame, Read, Statement, Write
 from fbvm.record.trace.format import xor
 from fbvm.record.trace.recorder import Signal
 from fbvm.watch.names import Names, is_single
@@ -26,7 +27,7 @@ DEEPEST = 6
 WINDOWS = (100, 2000)
 """Scans that are searched first, and then, before all scans are."""
 MOST_FACTS = 32
-"""Operands that are kept of a value without a name."""
+"""Operands that are kept of a value without a name, and of a condition around a statement."""
 LARGEST_BYTES = 4096
 """A larger write is kept whole and compressed, not byte by byte."""
 
@@ -120,7 +121,8 @@ class _Changes:
         self._changes: dict[int, list[tuple[int, Change]]] = {}
         self._large: list[tuple[range, bytes, Change]] = []
         """Writes of more than LARGEST_BYTES: the offsets, the bits that changed as compressed bytes, and the change."""
-        self._reads: dict[tuple[Frame, int], list[Fact]] = {}
+        self._reads: dict[tuple[Frame, int], dict[int, Fact]] = {}
+        """By execution of a body and statement the last read of each place, by its `id`: a loop reads the same time and again."""
         self._nameless: dict[int, tuple[Fact, ...]] = {}
         """By offset the operands of values without a name: conditions of rungs, variables of functions."""
         self._pending: list[Fact] = []
@@ -128,38 +130,44 @@ class _Changes:
         self._guards: list[Fact] = []
         """These operands, while the next statement is executed, whose condition they are."""
         self._known: Snapshot | None = None
+        self._cut = False
+        """Whether the scan has executed statements that are not recorded."""
         self.order = 0
         trace.follow(self, scans)
 
     def phase(self, moment: Instant, phase: Phase) -> None:
         self.order += 1
         now = moment.memory.snapshot()
-        if phase is not Phase.PROGRAM and self._known is not None:
+        if (phase is not Phase.PROGRAM or self._cut) and self._known is not None:
             change = Change(moment.scans, moment.now_ns, self.order, phase=phase)
             old, new = bytes(self._known), bytes(now)
             for offset, size in compare(self._known, now):
                 for at in range(offset, offset + size):
                     self._changes.setdefault(at, []).append((old[at] ^ new[at], change))
-        self._known = now
+        self._known, self._cut = now, False
         if phase is Phase.REFRESH:
             self._reads.clear()
 
     def event(self, moment: Instant, event: Event) -> None:
         self.order += 1
         if isinstance(event, Statement):
-            self._reads[event.frame, event.site] = []
+            self._reads[event.frame, event.site] = {}
             self._guards, self._pending = self._pending, []
         elif isinstance(event, Read):
             place = self._trace.names.at(event.offset, event.bit if event.bit < 8 else None)
-            facts = self._reads.setdefault((event.frame, event.site), [])
+            facts = self._reads.setdefault((event.frame, event.site), {})
             if place is None:
                 self._pending = list(self._nameless.get(event.offset, ()))
-                facts += self._pending
+                facts.update((id(fact.place), fact) for fact in self._pending)
             else:
-                facts.append(Fact(place, Signal(place, place.name).text(self._trace.names.read(moment.read, place)), self.order))
+                facts.pop(id(place), None)  # the last read stands last
+                text = Signal(place, place.name).text(self._trace.names.read(moment.read, place))
+                facts[id(place)] = Fact(place, text, self.order)
         elif isinstance(event, Write):
             self._written(moment, event)
             self._pending = []
+        elif isinstance(event, Cut):
+            self._known, self._cut = moment.memory.snapshot(), True
 
     def _written(self, moment: Instant, event: Write) -> None:
         if self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
@@ -179,10 +187,11 @@ class _Changes:
 
     def _facts(self, frame: Frame, site: int) -> Iterator[Fact]:
         """The reads of a statement, then those of the conditions around it."""
-        own = self._reads.get((frame, site), ())
-        yield from own or (replace(fact, guard=True) for fact in self._guards)
+        own = self._reads.get((frame, site), {})
+        yield from own.values() or (replace(fact, guard=True) for fact in self._guards)
         while site >= 0 and (site := self._trace.outer[site]) >= 0:
-            for fact in self._reads.get((frame, site), ()):
+            last = list(islice(reversed(self._reads.get((frame, site), {}).values()), MOST_FACTS))
+            for fact in reversed(last):
                 yield Fact(fact.place, fact.value, fact.order, True)
 
     def last(self, place: Place, before: int) -> Change | None:
@@ -285,6 +294,8 @@ def _since(trace: EventSource, cause: Cause) -> str:
     when = f" since scan {change.scan} ({show_time(change.now_ns).removeprefix('T#')})"
     if change.phase is Phase.REFRESH:
         return f"{when}, by a unit in the I/O refresh"
+    if change.phase is Phase.PROGRAM:
+        return f"{when}, by a statement that is not recorded: there were too many in this scan"
     if change.phase is not None:
         return f"{when}, from outside the program"
     if change.site is None:

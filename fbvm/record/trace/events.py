@@ -95,7 +95,11 @@ class NetworkEvent(NamedTuple):
     tap_event: TapEvent
 
 
-Event: TypeAlias = Call | Return | Statement | Read | Write | Contact | NetworkEvent
+class Cut(NamedTuple):
+    """The task has executed more statements, of which nothing is reported."""
+
+
+Event: TypeAlias = Call | Return | Statement | Read | Write | Contact | NetworkEvent | Cut
 
 
 class ObservedEngine:
@@ -103,17 +107,18 @@ class ObservedEngine:
 
     `program` is the engine that it replaces, whose substitutes of bodies it takes over.  With `stands_still` the run waits at
     each event, so that `report` may change the memory; without, it is over before its first event is reported, which takes
-    a fraction of the time, and the memory is brought back to each moment (but for the system page)."""
+    a fraction of the time, and the memory is brought back to each moment (but for the system page).  `most` limits what is
+    reported of a task that loops, see `PythonEngine.observations`."""
 
     machine = None
     """There is no machine code."""
 
     def __init__(self, image: Image, memory: Memory, report: Callable[[Event], None], program: object = None,
-                 stands_still: bool = False) -> None:  # fmt: skip
+                 stands_still: bool = False, most: int | None = None) -> None:  # fmt: skip
         self.memory = memory
         self.report = report
         self.program = program
-        self.stands_still = stands_still
+        self.stands_still, self.most = stands_still, most
         known: object = program._engine if isinstance(program, ObservedEngine) else program
         self._counter: object = program._counter if isinstance(program, ObservedEngine) else program
         self._engine: PythonEngine = PythonEngine(image_of(known, image), memory, observed=True)
@@ -145,7 +150,8 @@ class ObservedEngine:
     def _observations(self, task_index: int) -> Generator[Observation, None, None]:
         """The observations of a task; keeps the trap that ended it."""
         engine = self._engine
-        self._trap = yield from (engine.observe if self.stands_still else engine.observations)(task_index)
+        self._trap = yield from (
+            engine.observe(task_index) if self.stands_still else engine.observations(task_index, self.most))
 
     def _report_all(self, observations: Iterable[Observation]) -> None:
         """Reports the events of observations, but not statements inside a call that the compiler has added, such as one at the
@@ -181,6 +187,8 @@ class ObservedEngine:
                 frame = caller
                 generated_depth -= bool(generated_depth)
                 report(Return(ended))
+            elif kind == "cut":
+                report(Cut())
             else:
                 report(Contact(site, frame, *detail))
 

@@ -15,6 +15,7 @@ Records follow: a tag, then unsigned numbers of 7 bits a byte, the lowest first,
     READ       frame, site + 1, offset, bit, size, bytes
     WRITE      frame, site + 1, offset, bit, size, old bytes, new bytes
     CONTACT    frame, site, value, JSON of the element (its size, bytes)
+    CUT                                  the scan has executed more statements, of which nothing is recorded
     NETWORK    JSON of an event of the network (its size, bytes), before the PHASE of the I/O refresh: time ns, kind, local
                host and port, remote host and port, 1 if the unit sent it, 1 if it is mirrored, hexadecimal data
 
@@ -36,7 +37,7 @@ MAGIC = b"FBVMTRC1"
 HEADER, BLOCK = 1, 2
 LINE = 32
 """Bytes of memory that are compared and written together."""
-PHASE, SCAN, FRAME, END, STATEMENT, READ, WRITE, CONTACT, NETWORK = range(9)
+PHASE, SCAN, FRAME, END, STATEMENT, READ, WRITE, CONTACT, NETWORK, CUT = range(10)
 PHASES = (Phase.INPUTS, Phase.PROGRAM, Phase.REFRESH)
 _CHUNK = struct.Struct("<BIIQI")
 LARGEST_BYTES = 1 << 29

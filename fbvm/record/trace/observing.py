@@ -22,17 +22,18 @@ class Listener(Protocol):
 
 
 @contextmanager
-def observing(plc: Plc, listener: Listener, stands_still: bool = False) -> Iterator[None]:
+def observing(plc: Plc, listener: Listener, stands_still: bool = False, most: int | None = None) -> Iterator[None]:
     """Reports the events of all scans of `plc` to `listener` inside the `with` block.
 
     At each event the memory of `plc` is as it was at that moment.  A listener that changes the memory says `stands_still`:
-    the scan then waits for it at each event."""
+    the scan then waits for it at each event.  With `most` a task that loops is reported up to about so many events, then `Cut`;
+    not where somebody else observes the PLC, too."""
     program = plc.engine
     report = partial(listener.event, plc)
     if isinstance(program, ObservedEngine):
         report = partial(_both, program.report, report)
-        stands_still = stands_still or program.stands_still
-    plc.engine = ObservedEngine(plc.image, plc.memory, report, program, stands_still)
+        stands_still, most = stands_still or program.stands_still, None
+    plc.engine = ObservedEngine(plc.image, plc.memory, report, program, stands_still, most)
     plc.phases.append(listener.phase)
     try:
         yield

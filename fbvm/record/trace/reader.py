@@ -20,10 +20,11 @@ from fbvm.base.memory import Memory
 from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
 from fbvm.record.trace import symbols
-from fbvm.record.trace.events import Call, Contact, Event, Frame, NetworkEvent, Read, Return, Statement, Write
+from fbvm.record.trace.events import Call, Contact, Cut, Event, Frame, NetworkEvent, Read, Return, Statement, Write
 from fbvm.record.trace.format import (
     BLOCK,
     CONTACT,
+    CUT,
     END,
     FRAME,
     HEADER,
@@ -215,6 +216,8 @@ class _Player:
         cursor = self._cursor
         if tag == NETWORK:
             return _passing(cursor.bytes(cursor.number()))
+        if tag == CUT:
+            return Cut()
         if tag == FRAME:
             body, start, site, caller = (cursor.number() for _ in range(4))
             frame = Frame(body, start, site - 1, self._frames[caller - 1] if caller else self._outside)

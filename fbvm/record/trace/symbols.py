@@ -24,6 +24,9 @@ from fbvm.base.types import (
     string,
 )
 
+DEEPEST = 200
+"""Types one in the other: far more than programs have, and few enough for who follows them."""
+
 
 class SymbolError(ValueError):
     """The data are no symbols that `to_data` has written."""
@@ -39,10 +42,30 @@ def to_data(symbols: Mapping[str, Field]) -> dict[str, Any]:
 def from_data(data: Mapping[str, Any]) -> dict[str, Field]:
     """The symbols again, by folded name.  Raises SymbolError for what `to_data` did not write."""
     try:
-        reader = _Reader(data["types"])
-        return {fold(field.name): field for field in map(reader.field, data["symbols"])}
+        reader, known = _Reader(data["types"]), dict[int, int]()
+        fields = {fold(field.name): field for field in map(reader.field, data["symbols"])}
+        if max((_depth(field.type, known) for field in fields.values()), default=0) > DEEPEST:
+            raise SymbolError(f"no symbols: types are nested deeper than {DEEPEST}")
+        return fields
+    except SymbolError:
+        raise
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError) as error:
         raise SymbolError(f"no symbols: {type(error).__name__} {error}") from None
+
+
+def _depth(kind: Type, known: dict[int, int]) -> int:
+    """How many types a type has one in the other.  `known` are those of types that were seen, 0 while one is looked at.
+
+    Raises SymbolError for a type that holds itself, which only damage makes."""
+    if not isinstance(kind, ArrayType | StructType):
+        return 1
+    if id(kind) not in known:
+        known[id(kind)] = 0
+        inner = [kind.element] if isinstance(kind, ArrayType) else [field.type for field in kind.fields.values()]
+        known[id(kind)] = 1 + max((_depth(each, known) for each in inner), default=0)
+    if not known[id(kind)]:
+        raise SymbolError(f"no symbols: {kind.name} holds itself")
+    return known[id(kind)]
 
 
 class _Writer:

@@ -14,10 +14,11 @@ from fbvm.base.areas import AREAS
 from fbvm.code.image import Image
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.trace import symbols
-from fbvm.record.trace.events import Call, Contact, Event, Frame, Read, Return, Statement, Write
+from fbvm.record.trace.events import Call, Contact, Cut, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.format import (
     BLOCK,
     CONTACT,
+    CUT,
     END,
     FRAME,
     HEADER,
@@ -59,6 +60,11 @@ class Depth(Enum):
     STATEMENTS = "statements"
 
 
+MOST_EVENTS = 60_000
+"""About so many events inside a task are recorded, and how the memory is at its end: of a loop of two million statements nobody
+looks at more, and it would take half a minute to write, and again to read."""
+
+
 class TraceWriter:
     """Records `plc` into `file`, a binary file, from its next scan until `close`.
 
@@ -89,7 +95,7 @@ class TraceWriter:
         self._open = False
         self._frames: dict[Frame, int] = {}
         self._heads: dict[tuple[int, int, tuple[int, ...]], bytes] = {}
-        self._notes: dict[type, Callable[[Any], None]] = {Write: self._note_write}
+        self._notes: dict[type, Callable[[Any], None]] = {Write: self._note_write, Cut: self._note_cut}
         if depth is Depth.STATEMENTS:
             self._notes |= {Statement: self._note_statement, Read: self._note_read, Call: self._note_began,
                             Return: self._note_ended, Contact: self._note_contact}  # fmt: skip
@@ -100,7 +106,7 @@ class TraceWriter:
         deque(self._changed(), 0)
         self._attached = ExitStack()
         if depth is not Depth.SCANS:
-            self._attached.enter_context(observing(plc, self))
+            self._attached.enter_context(observing(plc, self, most=MOST_EVENTS))
         plc.watchers.append(self._scan_ended)
         self._attached.callback(plc.watchers.remove, self._scan_ended)
         self._tapped: list[tuple[int, TapEvent]] = []
@@ -214,6 +220,9 @@ class TraceWriter:
             self._head(WRITE, frame, event.site + 1, offset, bit, len(value))
             self._out += old
             self._out += value
+
+    def _note_cut(self, event: Cut) -> None:
+        put(self._out, CUT)
 
     def _note_contact(self, event: Contact) -> None:
         text = json.dumps(event.element).encode()

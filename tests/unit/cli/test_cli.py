@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 from rows import each_of
@@ -15,7 +17,11 @@ from fbvm.base.codes import CODES
 from fbvm.cli.main import GROUP_OF, main
 from fbvm.cli.running.demo import command_name
 from fbvm.cli.shared.options import split_names
+from fbvm.cli.shared.run_result import RunResult
+from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
 from fbvm.record.draw.chart import Chart
+from fbvm.record.export.pcapng import Capture
 
 HOUSE = Path(__file__).resolve().parents[3]
 DEMO = str(HOUSE / "examples" / "demo.st")
@@ -527,3 +533,33 @@ def test_the_demo_names_the_command_as_it_can_be_called(
     monkeypatch.setattr("fbvm.cli.running.demo.shutil.which", lambda name: found)
     monkeypatch.setattr(sys, "argv", [argument.format(here=Path.cwd())])
     assert command_name() == called_so
+
+
+def test_a_capture_is_flushed_while_a_program_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever opens it before the end sees what has been sent."""
+    path = tmp_path / "run.pcapng"
+    seen: list[int] = []
+
+    def flush(capture: Capture, original: Callable[[Capture], None] = Capture.flush) -> None:
+        original(capture)
+        seen.append(path.stat().st_size)
+
+    monkeypatch.setattr(Capture, "flush", flush)
+    monkeypatch.setattr("fbvm.run.loop.PROGRESS_NS", 0)
+    assert fbvm("run", str(DEMO), "--map", "192.168.250.1:502=peer", "--scans", "60", "--pcap", str(path)).exit_code == 0
+    assert any(0 < size < path.stat().st_size for size in seen)
+
+
+def test_a_run_that_shows_nothing_says_what_ran(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a terminal only: scripts get what they asked for."""
+    made = compile_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM").image
+    assert made is not None
+    plc = Plc(made)
+    result = RunResult(plc, plc.run(scans=1500), {}, None, False, "")
+    result.print()
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    result.print()
+    assert click.unstyle(capsys.readouterr().err) == "1,500 scans in 15s, ended by scans\n"
+    RunResult(plc, "scans", {"Main.n": plc.find("Main.n")}, None, False, "").print()
+    assert click.unstyle(capsys.readouterr().out) == "Main.n = 1500\n"

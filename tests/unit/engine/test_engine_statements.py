@@ -103,7 +103,9 @@ def test_due_notes_the_earliest(times: tuple[int, ...], noted: int) -> None:
 def test_an_endless_loop_ends_by_its_budget() -> None:
     rig = execute((("loop", (), (("charge", 1, 7), add(0, const("i16", 1))), ()),), budget=1000)
     assert rig.trap is not None
-    assert rig.trap.message == "R0104 Main.st:7:5 in Main: step budget used up (watchdog)"
+    assert rig.trap.message == (
+        "R0104 Main.st:7:5 in Main: step budget used up (watchdog): a loop waits for what does not change within a scan, or "
+        "there is too much work for one")  # fmt: skip
     assert rig.slot("i16") == 1000
 
 

@@ -134,6 +134,14 @@ def test_a_run_that_does_not_end_is_told_as_well(monkeypatch: pytest.MonkeyPatch
     assert len(expected) == 100_001 and list(endless().observations(0)) == expected
 
 
+def test_a_loop_is_told_as_far_as_somebody_wants() -> None:
+    told, whole = endless(), endless()
+    seen = list(told.observations(0, most=50))
+    assert seen[:-1] == list(whole.observe(0))[: len(seen) - 1] and seen[-1].kind == "cut"
+    assert 50 <= len(seen) <= 53
+    assert bytes(told.memory.u8) == bytes(whole.memory.u8)
+
+
 @pytest.mark.slow
 def test_nothing_is_kept_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fbvm.engine.python.logged.MOST_ENTRIES", 100)

@@ -51,6 +51,27 @@ def segments(content: bytes) -> list[tuple[int, str, int, bytes]]:
     return found
 
 
+def test_what_was_written_is_seen_when_the_capture_is_flushed(tmp_path: Path) -> None:
+    """Of a quiet network too, whose few frames a buffer would keep for minutes; where nothing was written, nothing is done."""
+    path = tmp_path / "quiet.pcapng"
+    flushed = 0
+
+    class File(io.BufferedWriter):
+        def flush(self) -> None:
+            nonlocal flushed
+            flushed += 1
+            super().flush()
+
+    with File(io.FileIO(path, "wb")) as file:
+        capture = Capture(file)
+        capture.tap(MS, UNIT, TapEvent(TapKind.UDP, Peer(UNIT, 9600), SERVER, True, b"abc"))
+        assert path.stat().st_size == 0
+        capture.flush()
+        assert [b"abc" in body for kind, body in blocks(path.read_bytes()) if kind == 6] == [True]
+        capture.flush()
+        assert flushed == 1
+
+
 def test_one_exchange_frame_by_frame() -> None:
     file = io.BytesIO()
     network = LoopNetwork(latency_ns=MS)

@@ -357,6 +357,26 @@ def test_what_are_no_symbols(data: dict[str, Any]) -> None:
         symbols.from_data(data)
 
 
+def structure(name: str, inner: Any) -> list[Any]:
+    return [name, 8, 8, False, [["part", inner, 0, "VAR", None, 0]]]
+
+
+@pytest.mark.parametrize(("types", "message"), [
+    ([structure("A", ["struct", 0])], "A holds itself"),
+    ([structure("A", ["struct", 1]), structure("B", ["array", [[0, 1]], ["struct", 0]])], "holds itself"),
+    ([structure(f"S{number}", ["struct", number + 1]) for number in range(200)] + [structure("Last", "INT")], "deeper than 200"),
+])  # fmt: skip
+def test_types_that_only_damage_makes(types: list[Any], message: str) -> None:
+    with pytest.raises(symbols.SymbolError, match=message):
+        symbols.from_data({"types": types, "symbols": [["a", ["struct", 0], 0, "VAR", None, 0]]})
+
+
+def test_a_type_may_refer_to_itself() -> None:
+    types = [structure("A", ["ref", "REF_TO A", ["struct", 0], False, False])]
+    found = symbols.from_data({"types": types, "symbols": [["a", ["struct", 0], 0, "VAR", None, 0]]})
+    assert found["A"].type.name == "A"
+
+
 @pytest.mark.parametrize("selected", [(), ("Main.*",)])
 def test_references_are_left_out_of_a_chart_of_everything(selected: Sequence[str]) -> None:
     plc = Plc(image("PROGRAM Main\nVAR a : INT; r : REF_TO INT; p : POINTER TO INT; f : REFERENCE TO INT;\n"

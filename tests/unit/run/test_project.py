@@ -142,6 +142,7 @@ def test_the_least_that_must_be_said(folder: Path) -> None:
         ("P0103", 6, "fault 1.from: '-1s' is before power-on")]),
 ])  # fmt: skip
 def test_what_is_wrong_is_said_where_it_stands(folder: Path, text: str, messages: list[tuple[str, int, str]]) -> None:
+    (folder / "c.st").touch()
     found = read(folder, text)
     assert isinstance(found, list)
     assert said(found) == messages
@@ -331,8 +332,38 @@ def test_what_does_not_fit_the_program(folder: Path, text: str, line: int, messa
 
 def test_errors_of_programs_are_told_as_always(folder: Path) -> None:
     (folder / "bad.st").write_text("PROGRAM Main\n    x := 1;\nEND_PROGRAM\n", encoding="utf-8")
-    built = Plant(project(folder, '[plc.a]\nsources = ["bad.st"]\n[plc.b]\nsources = ["none.st"]\n'))
+    (folder / "dots.st").mkdir()
+    built = Plant(project(folder, '[plc.a]\nsources = ["bad.st"]\n[plc.b]\nsources = ["dots.st"]\n'))
     assert [found.code for found in errors(built.diagnostics)] == ["S0201", "S0107"]
+
+
+def test_a_source_that_is_not_there_is_told_at_its_place(folder: Path) -> None:
+    for written, hint in (("countre.st", "did you mean counter.st?"), ("x/y.st", "")):
+        found = read(folder, f"[plc.a]\ncycle = '10ms'\nsources = ['{written}']\n")
+        assert isinstance(found, list)
+        assert said(found) == [("P0103", 3, f"plc.a.sources: there is no file {written}")]
+        assert found[0].hint == hint
+    found = read(folder, "[plc.a]\nsources = ['valve.st']\n")
+    assert isinstance(found, list) and found[0].hint.startswith("there is ") and "counter.st" in found[0].hint
+
+
+@pytest.mark.parametrize(("program", "unit", "said"), [
+    ("PROGRAM Main VAR s : ETN_Modbus_Server; END_VAR s(); END_PROGRAM", "ETN21", "the library omron/etn_modbus"),
+    ("PROGRAM Main VAR c : MTCP_ETN_Connect; END_VAR c(Connect := TRUE); END_PROGRAM", "ETN21", "the library omron/mtcp_etn"),
+    ("PROGRAM Main VAR s : MSTR_Server; END_VAR s(); END_PROGRAM", "NOC", "the mailbox NOC"),
+])  # fmt: skip
+def test_a_program_without_the_unit_that_it_talks_to_is_told_of(folder: Path, program: str, unit: str, said: str) -> None:
+    (folder / "talks.st").write_text(program, encoding="utf-8")
+    text = "[plc.a]\nsources = ['talks.st']\n"
+    (message,) = Plant(project(folder, text)).missing_units()
+    assert message == (f"a has no unit of type {unit}, to which blocks of {said} talk: they reach nobody; "
+                       "write [[plc.a.unit]] with its address")  # fmt: skip
+    with_unit = text + f"[[plc.a.unit]]\ntype = '{unit}'\naddress = '10.0.0.1'\n" + "slot = 3\n" * (unit == "NOC")
+    assert list(Plant(project(folder, with_unit)).missing_units()) == []
+
+
+def test_a_program_that_talks_to_nobody_needs_no_unit(folder: Path) -> None:
+    assert list(Plant(project(folder, ONE)).missing_units()) == []
 
 
 # --- faults, doors and paths --------------------------------------------------------------------------------------------
@@ -358,6 +389,8 @@ ONE = "[plc.a]\nsources = ['counter.st']\n"
     ("[[fault]]\nerror = 'ECONREFUSED'", [
         ("P0103", 4, "fault 1.error: 'ECONREFUSED' is no errno name such as ECONNREFUSED or EHOSTUNREACH")]),
     ("[[door]]\naddress = '1.2.3.4:502'", [("P0104", 3, "door 1.bind is missing")]),
+    ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\nbacklog = 5", [
+        ("P0103", 6, "door 1.backlog: 5 is neither true nor false")]),
     ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\nhost = '127.0.0.1:0'", [
         ("P0103", 6, "door 1 has bind and host, which are the same")]),
     ("[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:0'\n[[door]]\naddress = '1.2.3.4:502'\nbind = '127.0.0.1:1'", [
@@ -385,6 +418,11 @@ bind = "127.0.0.1:0"
 [[fault]]
 peer = "1.2.3.4:502"
 """
+
+
+def test_doors_hold_callers_only_where_the_file_says_so(folder: Path) -> None:
+    assert project(folder, DOORED).backlog == frozenset()
+    assert project(folder, DOORED.replace("[[fault]]", "backlog = true\n[[fault]]")).backlog == {Peer("1.2.3.4", 502)}
 
 
 def test_what_cannot_be_done_with_real_connections_is_refused(folder: Path) -> None:

@@ -143,6 +143,12 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert called("1", "--check")[0] == 1
+    answers = tmp_path / "lessons" / lessons()[0].slug / ANSWERS
+    for written, message in (("", "is still empty; predict first"), ("3", "this is not what the program does")):
+        answers.write_text(f'lamp_on_in_scan = "{written}"\n', encoding="utf-8")
+        code, output = called("1", "--check")
+        assert code == 1 and message in output and "checked when the prediction is right" in output
+        assert "4" not in output and "5" not in output, "the answer is not given away"
     for path in (lessons()[0].folder / "solution").iterdir():
         (tmp_path / "lessons" / lessons()[0].slug / path.name).write_bytes(path.read_bytes())
     code, output = called("1", "--check")

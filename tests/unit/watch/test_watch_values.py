@@ -101,7 +101,9 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
 @each_of(("kind", "text", "message"), [
     (t.TIME, "10", "x is TIME and takes a time such as 10ms, not 10"),
     (t.INT, "10ms", "x is INT and takes a whole number, not 10ms"),
-    (t.INT, "ten", "x: 'ten' is no literal"),
+    (t.INT, "ten", "x: 'ten' is no literal; INT takes a whole number"),
+    (t.BOOL, "yes", "x: 'yes' is no literal; BOOL takes TRUE or FALSE"),
+    (t.TIME, "soon", "x: 'soon' is no literal; TIME takes a time such as 10ms"),
     (t.WORD, "TRUE", "x is WORD and takes a whole number, not TRUE"),
     (t.INT, "1.5", "x is INT and takes a whole number, not 1.5"),
     (t.WORD, "-1", "x: -1 is out of range of WORD, which holds 0..65535; for these bits write 65535 or 16#FFFF"),
