@@ -100,7 +100,8 @@ class Plc(NamedValues):
         self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
         self._io = IORefresh(self.units, self.memory)
         self._fast_paths = FastPaths(self._io, self._schedule)
-        self._servicing = PeripheralServicing(self, image)
+        self.servicing = PeripheralServicing(self, image)
+        """FINS commands, and the PLC's clock."""
         self._next_mode: Mode | None = None  # from the next scan on
         write(self.memory, image.initial)
         self._recorder: InputRecorder | None = None
@@ -187,9 +188,9 @@ class Plc(NamedValues):
 
     def _serve_peripherals(self) -> None:
         """Peripheral servicing, the last part of a scan; a change of mode that it brings is for the next scan."""
-        if self.trap or not self._servicing.is_needed:
+        if self.trap or not self.servicing.is_needed:
             return
-        if self._servicing.serve(self.now_ns):
+        if self.servicing.serve(self.now_ns):
             self._io.changed_words = True
         if mode := self._next_mode:
             if self._recorder:
@@ -259,7 +260,7 @@ class Plc(NamedValues):
 
         0 if a unit changed words that the program has not seen; else when a timer of the program ends, an interval of a task
         has passed, or a unit changes something by itself."""
-        return min(self._io.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
+        return min(self._io.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns), self.servicing.wake_ns)
 
     def run(
         self,
@@ -284,7 +285,7 @@ class Plc(NamedValues):
         """Up to `most` scans in virtual time without coming back from machine code, while no unit has anything to do.
 
         Returns False if there was none: if somebody has to be told between scans, use `scan`."""
-        if self.watchers or self._servicing.is_needed:
+        if self.watchers or self.servicing.is_needed:
             return False
         if self.breakpoints.armed:
             done, self.trap = self._many_stoppable(most)
@@ -305,7 +306,7 @@ class Plc(NamedValues):
         `clock` is read before each scan; `now_ns` is what it told last.  Returns the times of the scans.  Returns [] without a
         scan if somebody has a part in them or has to be told between them: use `scan`."""
         times: list[int] = []
-        if self.watchers or self._recorder or self.trap or self._servicing.is_needed or not (path := self._fast_path()):
+        if self.watchers or self._recorder or self.trap or self.servicing.is_needed or not (path := self._fast_path()):
             return times
         try:
             self.trap = self.watch_cycle.judged(path.burst(times, most, now_ns, clock, self.budget))
@@ -365,15 +366,6 @@ class Plc(NamedValues):
     def servicing_changes_mode(self, running: bool) -> None:
         self._next_mode = RUN if running else Mode.PROGRAM
 
-    @property
-    def clock_ns(self) -> int:
-        """The PLC's clock at power-on, which FINS reads and sets: ns since 2000-01-01 00:00."""
-        return self._servicing.registers.clock_ns
-
-    @clock_ns.setter
-    def clock_ns(self, date_ns: int) -> None:
-        self._servicing.registers.clock_ns = date_ns
-
     def warm_start(self) -> None:
         """Power off and on: retained variables and areas keep their values, everything else begins anew."""
         with self._acting("start", "warm"):
@@ -397,7 +389,7 @@ class Plc(NamedValues):
             attached.link.submit(attached.unit.reset(self.memory), self.now_ns)
 
     def _restart(self, kept: Kept) -> None:
-        start(self.memory, self.image, [*kept, self._servicing.registers.kept()])
+        start(self.memory, self.image, [*kept, self.servicing.registers.kept()])
         self.watch_cycle.clear()
         self._schedule.reset()
         self._leave()

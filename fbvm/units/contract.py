@@ -235,5 +235,10 @@ class FinsUnit(Unit, Protocol):
     def serve(self, cpu: CpuUnit, now_ns: int) -> list[Request]:
         """Serves the commands that have come, in the order of their arrival; returns what the network has to do."""
 
+    def execute(self, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
+        """Executes a command of this PLC's own program for a unit of the rack; its end code and data."""
+
     def send(self, command: Command) -> int:
-        """Takes a command of a network instruction, which the next `serve` sends; returns an end code, 0000 if it is taken."""
+        """Takes a command of a network instruction, which the next `serve` sends from the unit's node.
+
+        Returns an end code, 0000 if it is taken."""

@@ -346,6 +346,7 @@ class Etn21:
         else:
             requests = fins.serve(cpu, now_ns)
             if fins.asks_restart:
+                fins.asks_restart = False
                 cpu.memory.words("A")[at.RESTART] |= self._mask
         self._show_fins(cpu.memory, fins)
         return requests
@@ -358,6 +359,10 @@ class Etn21:
             self.changed_words = True
         if not d[m + at.LOCAL_IP]:
             d[m + at.LOCAL_IP], d[m + at.LOCAL_IP + 1] = words_of(self.address)
+
+    def execute(self, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
+        """Executes a command of the PLC's own program for this unit; end code and data."""
+        return self._fins.execute(command, cpu) if self._fins else (EndCode.NO_UNIT, b"")
 
     def send(self, command: Command) -> int:
         """Takes a command of a network instruction; an end code, 0000 if the next servicing sends it."""

@@ -80,7 +80,7 @@ def test_the_clock_goes_on_over_a_restart() -> None:
 
 def test_the_clock_of_a_plc_is_set_from_outside() -> None:
     rig = FinsRig()
-    rig.plc.clock_ns = 86_400_000_000_000 * 31
+    rig.plc.servicing.clock_ns = 86_400_000_000_000 * 31
     assert rig.command(0x0701) == ("0000", "00 02 01 00 00 00 02")
 
 

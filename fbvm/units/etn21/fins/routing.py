@@ -67,10 +67,14 @@ def endpoint_of(settings: FinsSettings, state: FinsState, node: int) -> Peer:
 
 
 def learn(settings: FinsSettings, state: FinsState, node: int, remote: Peer) -> int:
-    """Notes from where a node has sent.  Returns end code 2108 for a node of the IP address table at another address."""
+    """Notes from where a node has sent.  Returns end code 2108 for a node of the IP address table at another address.
+
+    A client that uses the unit's own node is answered where it is."""
+    if node == settings.own_node:
+        return EndCode.NORMAL
     fixed = settings.nodes.get(node)
     if fixed and fixed.host != remote.host:
         return EndCode.CANNOT_CHANGE
-    if not fixed and 0 < node <= LAST_NODE and node != settings.own_node:
+    if not fixed and 0 < node <= LAST_NODE:
         state.learned[node] = remote
     return EndCode.NORMAL

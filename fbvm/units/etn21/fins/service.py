@@ -7,6 +7,7 @@ command came from; a real unit looks the node up in its table, so that two clien
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from fbvm.base.areas import NEVER
 from fbvm.units.contract import CpuUnit
@@ -54,7 +55,7 @@ class FinsService:
         self._frames = 0
         """Frames of this servicing."""
         self.asks_restart = False
-        """True if a command of this servicing restarts the unit."""
+        """True if a command restarts the unit; who does so resets it."""
         self._cpu: CpuUnit
         self._now_ns = 0
 
@@ -88,9 +89,19 @@ class FinsService:
         self.state = FinsState(busy=busy, closing=set(busy))
         return [Close(channel, True) for channel in sorted(busy - closing)]
 
+    def execute(self, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
+        """Executes a command of the PLC's own program; end code and data."""
+        if refused := routing.refusal(self.settings, command, len(command.to_bytes())):
+            return refused, b""
+        end_code, data = routing.execute(self.settings, command, cpu)
+        self.asks_restart = self.asks_restart or routing.restarts(command, end_code)
+        return end_code, data
+
     def send(self, command: Command) -> int:
-        """Takes a command of a network instruction; an end code, 0000 if it goes out in the next servicing."""
-        node = command.header.destination.node
+        """Takes a command of a network instruction; an end code, 0000 if it goes out in the next servicing, from this node."""
+        header = command.header
+        header = replace(header, source=replace(header.source, node=self.settings.own_node))
+        command, node = replace(command, header=header), header.destination.node
         for channel, found in self.state.connections.items():
             if found.node == node:
                 self.state.outgoing.append(Send(channel, tcp.Message(tcp.Kind.FRAME, command.to_bytes()).to_bytes()))
@@ -111,7 +122,6 @@ class FinsService:
     def serve(self, cpu: CpuUnit, now_ns: int) -> list[Request]:
         """Serves what has come; returns what the network has to do."""
         self._requests, self._frames, self._cpu, self._now_ns = [], 0, cpu, now_ns
-        self.asks_restart = False
         state = self.state
         events, state.events = state.events, []
         for number, event in enumerate(events):
