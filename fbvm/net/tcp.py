@@ -29,11 +29,10 @@ class TcpNetwork(Switchboard):
 
     A unit without a row listens on the host's address `bind`, on the port of its request if that is 1024 or above; the first
     one listens at `door`, if that is given.  Host names of the map are resolved here, once.
-
     With `backlog` the host keeps a port open on which a unit has listened: who calls while none of the unit's sockets waits is
     let in as soon as one does.  Without, such a caller is refused, as by the unit; only those wait that the host has accepted
-    in the same moment as the caller who took the last socket.  `faults` are rows of `net.faults`, `seed` starts their random
-    numbers.  Raises OSError for a name that cannot be resolved."""
+    together with the last one.  `faults` are rows of `net.faults`, `seed` is for their random numbers.  Raises OSError for a name
+    without an address."""
 
     virtual_time = False
 
@@ -59,14 +58,13 @@ class TcpNetwork(Switchboard):
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """The endpoint of the host for a unit's own endpoint, also before the unit listens.
 
-        A port that the system has to choose is chosen now, and stays; it is the same number for TCP and for UDP.  Raises OSError
-        if there is none."""
+        A port that the system has to choose is chosen now, for TCP and UDP, and stays.  Raises OSError if there is none."""
         real = self.map.local(endpoint)
         if real.port:
             return real
         if (transport, endpoint) not in self._reserved:
-            other = self._reserved.get((UDP if transport == TCP else TCP, endpoint))
-            self._reserved[transport, endpoint] = (other[0], None) if other else reserve(real.host, transport)
+            other, _ = self._reserved.get((UDP if transport == TCP else TCP, endpoint), (None, None))
+            self._reserved[transport, endpoint] = (other, None) if other else reserve(real.host, transport)
         return self._reserved[transport, endpoint][0]
 
     def try_door(self, real: Peer, transport: str = TCP) -> None:

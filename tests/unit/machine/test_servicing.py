@@ -107,7 +107,7 @@ def test_a_request_is_answered_beside_units_that_run_in_machine_code() -> None:
     for value in range(20):
         assert rig.command(0x0102, f"82 0064 00 0001 {value:04X}") == ("0000", "")
         assert rig.plc.read("D100") == value
-        assert client.frame("80 00 02 00 01 00 00 EF 00 01 01 01 82 00 64 00 00 01").endswith(f"00 00 {value >> 8:02X} {value:02X}")
+        assert client.frame("80 00 02 00 01 00 00 EF 00 01 01 01 82 00 64 00 00 01").endswith(f"00 00 00 {value:02X}")
     assert rig.plc.read("CIO 1523") == 1
 
 

@@ -1,4 +1,4 @@
-"""Commands of the CPU unit and of the ETN21: every end code by the shortest frame that provokes it, edges, and when things happen."""
+"""Commands of the CPU unit and of the ETN21: every end code by the shortest frame that provokes it, edges, and when."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ REFUSED = [
     (0x0105, "82 0000 00 82 7FFF 00 0002", {}, "1104"), (0x0105, "30 0000 00 82 0000 00 0001", {}, "1101"),
     (0x0201, "", {}, "0402"), (0x0306, "", {}, "0402"), (0x2201, "", {}, "0402"), (0x1234, "", {}, "0401"),
     (0x0801, "01", {}, "0401"), (0x0403, "", {}, "0401"), (0x2730, "", {}, "0401"),
-    (0x0401, "0001 02", {}, "1106"), (0x0401, "FFFF 01", {}, "110C"), (0x0401, "FF", {}, "1002"), (0x0401, "FFFF0200", {}, "1001"),
+    (0x0401, "0001 02", {}, "1106"), (0x0401, "FFFF 01", {}, "110C"), (0x0401, "FF", {}, "1002"),
+    (0x0401, "FFFF0200", {}, "1001"),
     (0x0402, "0005", {}, "1106"), (0x0402, "FF", {}, "1002"), (0x0501, "02", {}, "110C"), (0x0620, "02", {}, "110C"),
     (0x0702, "26 13 22 13 44", {}, "1100"), (0x0702, "26 1A 22 13 44", {}, "1100"), (0x0702, "26 11 22 13", {}, "1002"),
     (0x0C01, "0005", {}, "1106"), (0x2301, "0001 0002 30 0064 01", {}, "1100"), (0x2301, "0002 0001 30 0064 01", {}, "1003"),
@@ -151,7 +152,7 @@ def test_cycle_times_of_the_last_eight_cycles(rig: FinsRig) -> None:
     assert rig.command(0x0620, "01") == ("0000", "00 00 00 64 00 00 00 64 00 00 00 64")
     rig.plc.cycle_ns = 20_000_000
     rig.plc.run(scans=5)
-    end_code, data = rig.command(0x0620, "01")
+    _, data = rig.command(0x0620, "01")
     average, longest, least = (int(data.replace(" ", "")[at : at + 8], 16) for at in (0, 8, 16))
     assert (longest, least) == (200, 100)
     assert 100 < average < 200
@@ -282,7 +283,7 @@ def test_without_fins_nothing_is_opened_and_no_word_is_shown() -> None:
                                    {"fins_nodes": {"2": "1.2.3"}}, {"fins_nodes": {"255": "1.2.3.4"}},
                                    {"fins_nodes": {"2": "1.2.3.4:x"}}, {"fins_access": "all"}])  # fmt: skip
 def test_a_service_that_cannot_be_is_refused(given: dict[str, object]) -> None:
-    with pytest.raises(ValueError, match="FINS|node|fins_access"):
+    with pytest.raises(ValueError, match=r"FINS|node|fins_access"):
         Etn21(0, "192.168.250.1", fins=True, **given)  # type: ignore[arg-type]
 
 

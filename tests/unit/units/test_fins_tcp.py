@@ -189,8 +189,8 @@ DEEDS: dict[str, Deed] = {
     "command 2^32 - 1": _says(HEAD + b"\0\0\0\x08\xff\xff\xff\xff" + bytes(4), after_hello=True),
     "a frame of no bytes": _says(_frame(b""), after_hello=True),
     "a frame of eleven bytes": _says(_frame(bytes(11)), after_hello=True),
-    "frames of random bytes": _says(*[_frame(bytes((number * 37 + at * 11) % 256 for at in range(12, 60))) for number in range(40)],
-                                    after_hello=True),
+    "frames of random bytes": _says(
+        *[_frame(bytes((number * 37 + at * 11) % 256 for at in range(12, 60))) for number in range(40)], after_hello=True),
     "a response that nobody waits for": _sends_responses,
     "silence": _is_silent,
     "half a message": _stops_in_a_message,
