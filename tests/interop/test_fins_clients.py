@@ -1,7 +1,7 @@
 """Clients of other people that speak FINS, against `fbvm serve --fins`: each as far as it can (see their own limits below).
 
 `fins` takes one receive for a whole message, `fins-driver` has no FINS/TCP, `omron-fins` frames TCP rightly up to 114 words, and
-`finscommand` insists on port 9600.  FBVM_FINS_CLIENTS is a folder with one folder a client, each filled by `pip install --target`,
+`finscommand` insists on port 9600.  FBVM_FINS_CLIENTS is a folder with one folder a client, filled by `pip install --target`,
 and with `node_modules`."""
 
 from __future__ import annotations
