@@ -57,8 +57,9 @@ ORDERS = {
     "interchange": ("plcopen", "plcopen/read", "plcopen/write"),
     "code": ("", "builder", "layout", "pictures", "lowering", "store", "compiler"),
     "engine": ("", "python", "native/llvm", "native/library", "native/emit", "native/scans", "native", "choice"),
-    "units": ("", "etn21", "port"),
-    "machine": ("scan", "fast", ""),
+    "wire": ("", "fins"),
+    "units": ("", "etn21/fins", "etn21", "port"),
+    "machine": ("scan", "servicing", "fast", ""),
     "record": ("trace", "recording", "draw", "export", "page"),
     "cli": ("shared", "programs", "running", "recordings", "projects", ""),
 }

@@ -128,6 +128,14 @@ BUDGET = 16
 """Statements that the scan may still execute, 64-bit signed."""
 SCANS = 24
 """Number of scans done, 64-bit."""
+CLOCK = 32
+"""The PLC's clock: ns from 2000-01-01 00:00 to power-on, 64-bit signed."""
+OPERATING = 40
+"""0: MONITOR, in which FINS may force bits; 1: RUN."""
+ACCESS_RIGHT = 48
+"""Who has the access right by FINS: bit 24 is ON if anybody has; then unit, node and network, a byte each."""
+CYCLE_TIMES = 64
+"""Cycle times for FINS, 64-bit each: how many were measured, least and longest, then the last eight in ns."""
 NEVER = (1 << 63) - 1
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.unit import Etn21
@@ -12,7 +13,8 @@ from fbvm.units.port.tianxing import Tianxing
 UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc, "Tianxing": Tianxing}
 """What makes a unit, by the name of its class, as journals write it."""
 KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
-    "ETN21": ("Etn21", {"number": "unit_number", "timing": "timing", "seed": "seed"}),
+    "ETN21": ("Etn21", {"number": "unit_number", "timing": "timing", "seed": "seed", "fins": "fins", "fins_port": "fins_port",
+                        "fins_node": "fins_node", "fins_nodes": "fins_nodes", "fins_access": "fins_access"}),
     "NOC": ("Noc", {"slot": "rack_slot", "mac": "mac", "module": "module_type", "http": "http", "ftp": "ftp",
                     "restart": "restart_ns"}),
     "Tianxing": ("Tianxing", {"model": "model"}),
@@ -31,7 +33,9 @@ def make_unit(kind: str, address: str, options: Mapping[str, object]) -> Unit:
     return UNITS[name](address=address, **{arguments[key]: value for key, value in options.items()})
 
 
-def usual_units(mailboxes: Iterable[str], timing: str = "exact", seed: int = 0) -> list[Unit]:
-    """An ETN21 with unit number 0, and the unit of each mailbox that the program uses."""
+def usual_units(mailboxes: Iterable[str], timing: str = "exact", seed: int = 0,
+                fins: Mapping[str, Any] | None = None) -> list[Unit]:
+    """An ETN21 with unit number 0, and the unit of each mailbox that the program uses.  `fins` are arguments of the ETN21 about
+    FINS, None for none."""
     brought = [BRINGERS[name]() for name in mailboxes if name in BRINGERS]
-    return [Etn21(0, ETN21_ADDRESS, timing=timing, seed=seed), *brought]
+    return [Etn21(0, ETN21_ADDRESS, timing=timing, seed=seed, **(fins or {})), *brought]

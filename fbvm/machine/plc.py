@@ -26,6 +26,7 @@ from fbvm.machine.scan.tasks import TaskSchedule, too_short_intervals
 from fbvm.machine.scan.values import NamedValues
 from fbvm.machine.scan.watch_cycle import WatchCycle
 from fbvm.machine.scan_times import Lateness, ScanTimes
+from fbvm.machine.servicing.peripheral import PeripheralServicing
 from fbvm.machine.state import RUN, Mode, Phase, State, Stopped
 from fbvm.net.journal import Journal
 from fbvm.units.contract import Unit
@@ -99,6 +100,9 @@ class Plc(NamedValues):
         self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
         self._io = IORefresh(self.units, self.memory)
         self._fast_paths = FastPaths(self._io, self._schedule)
+        self.servicing = PeripheralServicing(self, image)
+        """FINS commands, and the PLC's clock."""
+        self._next_mode: Mode | None = None  # from the next scan on
         write(self.memory, image.initial)
         self._recorder: InputRecorder | None = None
         if journal:
@@ -121,6 +125,7 @@ class Plc(NamedValues):
             if path := self._fast_path():
                 self.now_ns = now_ns
                 self.trap = self.watch_cycle.judged(path.once(now_ns, self.budget))
+                self._serve_peripherals()
                 self.scans += 1
                 self._tell()
                 return self.trap
@@ -172,6 +177,7 @@ class Plc(NamedValues):
         """The part of a plain scan behind its program: the I/O refresh, and counting the scan."""
         if not self.trap:
             self._fast_paths.refresh(self.now_ns, self._journal)
+            self._serve_peripherals()
             if self.phases:
                 self._over(Phase.REFRESH)
         self.scans += 1
@@ -179,6 +185,18 @@ class Plc(NamedValues):
         if self._journal:
             self._journal.after(self.watch_cycle.ended(self.trap, self.budget))
         self._tell()
+
+    def _serve_peripherals(self) -> None:
+        """Peripheral servicing, the last part of a scan; a change of mode that it brings is for the next scan."""
+        if self.trap or not self.servicing.is_needed:
+            return
+        if self.servicing.serve(self.now_ns):
+            self._io.changed_words = True
+        if mode := self._next_mode:
+            if self._recorder:
+                self._recorder.changed()
+            self._change_mode(mode)
+            self._next_mode = None
 
     def _tell(self) -> None:
         """Called at the end of each scan: tells recorder and watchers."""
@@ -242,7 +260,7 @@ class Plc(NamedValues):
 
         0 if a unit changed words that the program has not seen; else when a timer of the program ends, an interval of a task
         has passed, or a unit changes something by itself."""
-        return min(self._io.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
+        return min(self._io.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns), self.servicing.wake_ns)
 
     def run(
         self,
@@ -267,7 +285,7 @@ class Plc(NamedValues):
         """Up to `most` scans in virtual time without coming back from machine code, while no unit has anything to do.
 
         Returns False if there was none: if somebody has to be told between scans, use `scan`."""
-        if self.watchers:
+        if self.watchers or self.servicing.is_needed:
             return False
         if self.breakpoints.armed:
             done, self.trap = self._many_stoppable(most)
@@ -288,7 +306,7 @@ class Plc(NamedValues):
         `clock` is read before each scan; `now_ns` is what it told last.  Returns the times of the scans.  Returns [] without a
         scan if somebody has a part in them or has to be told between them: use `scan`."""
         times: list[int] = []
-        if self.watchers or self._recorder or self.trap or not (path := self._fast_path()):
+        if self.watchers or self._recorder or self.trap or self.servicing.is_needed or not (path := self._fast_path()):
             return times
         try:
             self.trap = self.watch_cycle.judged(path.burst(times, most, now_ns, clock, self.budget))
@@ -333,10 +351,20 @@ class Plc(NamedValues):
     @mode.setter
     def mode(self, mode: Mode) -> None:
         with self._acting("mode", mode.value):
-            if mode is RUN and self._mode is not RUN:
-                held = ("CIO", "W", "TF", "T") if self._clock_words.io_memory_held else ()
-                self._restart(retained(self.memory, self.image, held))
-            self._mode = mode
+            self._change_mode(mode)
+
+    def _change_mode(self, mode: Mode) -> None:
+        if mode is RUN and self._mode is not RUN:
+            held = ("CIO", "W", "TF", "T") if self._clock_words.io_memory_held else ()
+            self._restart(retained(self.memory, self.image, held))
+        self._mode = mode
+
+    @property
+    def is_running(self) -> bool:
+        return self._mode is RUN
+
+    def servicing_changes_mode(self, running: bool) -> None:
+        self._next_mode = RUN if running else Mode.PROGRAM
 
     def warm_start(self) -> None:
         """Power off and on: retained variables and areas keep their values, everything else begins anew."""
@@ -361,7 +389,7 @@ class Plc(NamedValues):
             attached.link.submit(attached.unit.reset(self.memory), self.now_ns)
 
     def _restart(self, kept: Kept) -> None:
-        start(self.memory, self.image, kept)
+        start(self.memory, self.image, [*kept, self.servicing.registers.kept()])
         self.watch_cycle.clear()
         self._schedule.reset()
         self._leave()
@@ -408,7 +436,7 @@ class Plc(NamedValues):
         self._due.clear()
 
     def fork(self) -> Plc:
-        """A second PLC in the same state, without units, watchers and connections, whether or not this one has them."""
+        """A second PLC in the same state, without units, watchers and connections."""
         twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self.engine_choice)
         twin.restore(self.snapshot())
         return twin

@@ -132,7 +132,7 @@ class Switchboard(ABC):
         return found
 
     @abstractmethod
-    def try_door(self, real: Peer) -> None:
+    def try_door(self, real: Peer, transport: str = TCP) -> None:
         """Tries whether a unit will be able to listen at an endpoint of the host.  Raises OSError that names it."""
 
     @abstractmethod

@@ -17,7 +17,7 @@ from fbvm.net.faults import Fault
 from fbvm.net.host_link import HostLink
 from fbvm.net.notices import NoticeKind
 from fbvm.net.relays import Relays
-from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, WRITE, Switchboard, errno_name
+from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, errno_name
 from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, has_left, reserve, reset_on_close, try_to_listen
 from fbvm.net.waiting import MAX_HELD, WaitingCallers
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
@@ -59,16 +59,17 @@ class TcpNetwork(Switchboard):
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """The endpoint of the host for a unit's own endpoint, also before the unit listens.
 
-        A port that the system has to choose is chosen now, and stays.  Raises OSError if there is none."""
+        A port that the system has to choose is chosen now, for TCP and UDP, and stays.  Raises OSError if there is none."""
         real = self.map.local(endpoint)
         if real.port:
             return real
         if (transport, endpoint) not in self._reserved:
-            self._reserved[transport, endpoint] = reserve(real.host, transport)
+            other, _ = self._reserved.get((UDP if transport == TCP else TCP, endpoint), (None, None))
+            self._reserved[transport, endpoint] = (other, None) if other else reserve(real.host, transport)
         return self._reserved[transport, endpoint][0]
 
-    def try_door(self, real: Peer) -> None:
-        try_to_listen(real)
+    def try_door(self, real: Peer, transport: str = TCP) -> None:
+        try_to_listen(real, transport)
 
     def close(self) -> None:
         """Closes all connections and sockets."""

@@ -10,6 +10,7 @@ from fbvm.base.host import keeps_ports, linger_format, shares_ports
 from fbvm.net.addresses import dotted, why_unusable
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, Channel, undeliverable
 from fbvm.net.host_link import HostLink
+from fbvm.net.notices import NoticeKind
 from fbvm.net.relays import FaultyChannel, Relays
 from fbvm.net.switchboard import READ, TCP, UDP, Switchboard, Watcher, errno_name
 from fbvm.wire.link import Bind, Connect, Listen, Opened, Peer, Received, Sent
@@ -26,13 +27,15 @@ def share_port(sock: socket.socket) -> None:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
 
 
-def try_to_listen(real: Peer) -> None:
+def try_to_listen(real: Peer, transport: str = TCP) -> None:
     """Listens at an endpoint of the host for a moment.  Raises OSError that names the endpoint and says why not."""
     try:
-        with socket.socket() as sock:
-            share_port(sock)
+        with socket.socket(type=socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM) as sock:
+            if transport == TCP:
+                share_port(sock)
             sock.bind(dotted(real))
-            sock.listen()
+            if transport == TCP:
+                sock.listen()
     except OSError as error:
         raise OSError(error.errno, f"{real} cannot be used: {why_unusable(error)}") from None
 
@@ -136,7 +139,12 @@ class UdpPort(HostChannel):
     transport = UDP
 
     def open(self, now_ns: int) -> None:
-        sock = self.make(socket.SOCK_DGRAM, self.network.listening_endpoint(self.local, UDP))
+        real = self.network.listening_endpoint(self.local, UDP)
+        try:
+            sock = self.make(socket.SOCK_DGRAM, real)
+        except OSError as error:
+            self.network.notices.note(NoticeKind.UNUSABLE, self.local, real, why_unusable(error))
+            raise
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self.real = Peer(*sock.getsockname())
         self.local = Peer(self.local.host, self.local.port or self.real.port)

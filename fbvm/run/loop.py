@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import heapq
 import time
+from calendar import timegm
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, cast
 
@@ -24,6 +25,8 @@ RunNumbers = dict[int, None]
 """An ordered set of run numbers."""
 PROGRESS_NS = 100_000_000
 """The shortest time between two calls of `progress`."""
+YEAR_2000_S = 946_684_800
+"""2000-01-01 in seconds since 1970."""
 PAUSE_NS = 1_000_000
 """How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
@@ -67,6 +70,9 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         watchdogs = [Watchdog(run.plc) for run in runs]
         clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
+            servicing = run.plc.servicing
+            if servicing.is_needed and not servicing.clock_ns:
+                servicing.clock_ns = local_date_ns() - start_ns
             run.begin(start_ns + run.phase_ns, real.behind)
     else:  # nothing happens between two periods of virtual time
         for run in runs:
@@ -266,6 +272,12 @@ class _RealClock:
     def stop(self) -> None:
         for network in self._networks:
             network.driven = False
+
+
+def local_date_ns() -> int:
+    """The host's date and local time in nanoseconds since 2000-01-01 00:00, as the clock of a PLC has it."""
+    now_ns = time.time_ns()
+    return (timegm(time.localtime(now_ns // 1_000_000_000)) - YEAR_2000_S) * 1_000_000_000 + now_ns % 1_000_000_000
 
 
 def epoch_ns() -> int:

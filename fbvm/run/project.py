@@ -49,12 +49,14 @@ from fbvm.run.project_reader import (
     one_of,
     text,
     texts,
+    texts_by_name,
     time_between,
     time_ns,
     whole,
 )
 from fbvm.run.running import PACES
 from fbvm.syntax.text import read
+from fbvm.units.etn21.fins.state import ACCESS
 from fbvm.wire.link import Peer
 
 FILE = "fbvm.toml"
@@ -88,6 +90,13 @@ UNIT: Keys = {
     "number": Key(whole(0, 15), "ETN21: the unit number.", None),
     "timing": Key(one_of(("exact", "real")), "ETN21: services end after fixed or after seeded numbers of scans.", None),
     "seed": Key(whole(0, MOST_NUMBER), "ETN21: where the random numbers of real timing begin.", None),
+    "fins": Key(flag, "ETN21: whether it serves FINS, by UDP and TCP.", None),
+    "fins_port": Key(whole(1, 65535), "ETN21: the port of FINS, 9600 if none is given.", None),
+    "fins_node": Key(whole(0, 254), "ETN21: the FINS node, else the last part of the address; 0 is every node.", None),
+    "fins_nodes": Key(texts_by_name, "ETN21: endpoints of FINS nodes that are not at their own address, such as "
+                                     "{ 7 = \"192.168.251.2:9600\" }.", None),
+    "fins_access": Key(one_of(tuple(ACCESS)), "ETN21: what may be done by FINS: everything, no change of the mode, reads only.",
+                       None),
     "slot": Key(whole(0, 254), "NOC: the slot in the rack, 0 to 16, or 254 for the port of the CPU.", None),
     "mac": Key(text, "NOC: the MAC address that the program reads.", None),
     "module": Key(whole(0, 31), "NOC: the number of the module type that the program reads.", None),

@@ -128,6 +128,12 @@ def _texts(value: object) -> tuple[str, ...]:
     return tuple(value)
 
 
+def _texts_by_name(value: object) -> dict[str, str]:
+    if not isinstance(value, dict) or not value or not all(isinstance(item, str) and item for item in value.values()):
+        raise ValueError(f'{value!r} is no table of texts; write {{ one = "this", other = "that" }}')
+    return dict(value)
+
+
 def _flag(value: object) -> bool:
     if not isinstance(value, bool):
         raise ValueError(f"{value!r} is neither true nor false")
@@ -210,6 +216,7 @@ def kind_of_text(called: str, value: Callable[[object], str]) -> Kind:
 
 text = Kind("a text", _text)
 texts = Kind("a list of texts", _texts)
+texts_by_name = Kind("a table of texts", _texts_by_name)
 flag = Kind("true or false", _flag)
 anything = Kind("a value", lambda value: value)
 time_ns = Kind('a time above 0, such as "10ms"', _time_ns)

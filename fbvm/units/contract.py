@@ -8,6 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from fbvm.base.memory import Snapshot
 from fbvm.processor.contract import Contract
+from fbvm.wire.fins.frames import Command, Response
 from fbvm.wire.link import Event, Request
 
 
@@ -191,3 +192,53 @@ class ProcessorUnit(Unit, Protocol):
     def finish(self) -> list[Request]:
         """The requests that the program has left for the network.  To be called at once after a run that left an urgent one,
         else, if the run left any, before events are posted again."""
+
+
+@dataclass(frozen=True)
+class FinsAccess:
+    """What commands that reach the CPU unit through a unit may do: write, and change the operating mode."""
+
+    may_write: bool = True
+    may_control: bool = True
+
+
+class CpuUnit(Protocol):
+    """The CPU unit as a unit with FINS meets it in peripheral servicing."""
+
+    @property
+    def memory(self) -> AreaMemory:
+        """The PLC's memory, for the unit's own words."""
+
+    def execute(self, command: Command, access: FinsAccess) -> tuple[int, bytes]:
+        """Executes a command for the CPU unit in one piece, between two executions of the program; its end code and data."""
+
+    def take_response(self, response: Response) -> None:
+        """Takes the response to a command that a network instruction of the program has sent."""
+
+
+@runtime_checkable
+class FinsUnit(Unit, Protocol):
+    """A unit that serves FINS in peripheral servicing, behind the I/O refresh in which it got the network's events."""
+
+    @property
+    def has_fins(self) -> bool:
+        """True if FINS was asked for: without, no port is opened."""
+
+    @property
+    def unit_number(self) -> int:
+        """Its number among the CPU bus units."""
+
+    @property
+    def node(self) -> int:
+        """Its FINS node address."""
+
+    def serve(self, cpu: CpuUnit, now_ns: int) -> list[Request]:
+        """Serves the commands that have come, in the order of their arrival; returns what the network has to do."""
+
+    def execute(self, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
+        """Executes a command of this PLC's own program for a unit of the rack; its end code and data."""
+
+    def send(self, command: Command) -> int:
+        """Takes a command of a network instruction, which the next `serve` sends from the unit's node.
+
+        Returns an end code, 0000 if it is taken."""

@@ -98,10 +98,10 @@ def test_every_instruction_has_a_row() -> None:
 
 
 def test_what_is_known_and_not_built_is_refused_by_name() -> None:
-    made = compile_text("PROGRAM Main\nLADDER\nLD P_On\nSEND(090) D0 D1 D2\nEND_LADDER\nEND_PROGRAM")
+    made = compile_text("PROGRAM Main\nLADDER\nLD P_On\nPMCR(260) #0 #0 D0 D1\nEND_LADDER\nEND_PROGRAM")
     assert [(d.code, d.message) for d in made.diagnostics] == [
-        ("S0110", "SEND is understood and not executed")]
-    assert "no FINS network" in made.diagnostics[0].hint
+        ("S0110", "PMCR is understood and not executed")]
+    assert "no serial line" in made.diagnostics[0].hint
 
 
 # --- beside Python --------------------------------------------------------------------------------------------------

@@ -52,7 +52,7 @@ def test_everything_says_what_it_does_or_why_it_is_refused() -> None:
 
 
 @each_of(("name", "part"), [
-    ("mov", "flags: P_ER P_EQ P_N"), ("=", "a contact"), ("SEND", "no FINS network"), ("SFT", "takes 3 conditions"),
+    ("mov", "flags: P_ER P_EQ P_N"), ("=", "a contact"), ("PMCR", "no serial line"), ("SFT", "takes 3 conditions"),
     ("@mov", "MOV(021)"), ("MOV(021)", "MOV(021)"), ("21", "MOV(021)"), ("@<>", "a contact")])
 def test_explain(name: str, part: str) -> None:
     result = CliRunner().invoke(main, ["explain", name])

@@ -11,17 +11,17 @@ WRONG = "_ws.malformed || tcp.checksum.status == 0 || ip.checksum.status == 0 ||
 """Malformed, a wrong checksum, or a warning or error of any dissector."""
 
 
+def tshark(capture: Path, *arguments: str) -> list[str]:
+    """The words that tshark prints about a capture."""
+    command = [str(TSHARK), "-n", "-r", str(capture), "-o", "tcp.check_checksum:TRUE", "-o", "ip.check_checksum:TRUE", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+
+
 def dissected(capture: Path) -> list[str]:
     """Function codes of the Modbus frames that tshark finds, if it has nothing to say against the capture.
 
     An empty list where tshark is not installed."""
-
-    def tshark(*arguments: str) -> list[str]:
-        command = [str(TSHARK), "-n", "-r", str(capture), "-o", "tcp.check_checksum:TRUE",
-                   "-o", "ip.check_checksum:TRUE", *arguments]  # fmt: skip
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-
     if not TSHARK:
         return []
-    assert tshark("-Y", WRONG) == []
-    return tshark("-Y", "modbus", "-T", "fields", "-e", "modbus.func_code")
+    assert tshark(capture, "-Y", WRONG) == []
+    return tshark(capture, "-Y", "modbus", "-T", "fields", "-e", "modbus.func_code")

@@ -28,7 +28,7 @@ FOLDER = "lessons"
 @click.option("--report", "out", type=click.Path(file_okay=False, path_type=Path), metavar="DIR", default="report",
               show_default=True, help="With --class: where report.html, traces and pages go.")
 def command(number: int | None, checked: bool, solved: bool, folder: Path, learners: Path | None, out: Path) -> None:
-    """Twelve lessons: read, predict, look, change, check.
+    """Thirteen lessons: read, predict, look, change, check.
 
     Without LESSON, lists them.  `fbvm learn 1` shows the first one and makes a folder for it; there, write your prediction into
     answers.toml and change program.st, then `fbvm learn 1 --check`.  Status 1 if something is not right yet."""

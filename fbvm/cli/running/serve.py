@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Collection
 from contextlib import AbstractContextManager, ExitStack
 from io import TextIOWrapper
 from pathlib import Path
@@ -19,6 +20,7 @@ from fbvm.base.host import ending_signals, handling, saving_signals
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
 from fbvm.cli.shared.files import OutputError, growing_file, writing
+from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, open_fins
 from fbvm.cli.shared.networks import mailbox_names
 from fbvm.cli.shared.options import address, bind_option, time_ns, watch_cycle_option
 from fbvm.cli.shared.sources import compile_or_exit, source_options
@@ -42,6 +44,8 @@ SERVED = {"CIO": 5801, "D": 32768}
 
 OWN_SETTINGS = {"sockets": "Sockets", "read_only": "Read_Only", "fn0f": "Fn0F", "full_dm": "Full_DM", "idle_ns": "Idle_Time"}
 """The options that set inputs of the shipped server program."""
+FINS_SETTINGS = {"read_only"}
+"""Those of them that FINS knows, too."""
 HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --map {endpoint}=127.0.0.1:{port}` has several"
 
 
@@ -57,6 +61,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 @click.option("--fn0f", is_flag=True, help="Serve 0F, write multiple coils, too.")
 @click.option("--full-dm", is_flag=True, help="Let 10, write multiple registers, begin anywhere in D.")
 @click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent so long (60s).")
+@fins_options
 @watch_cycle_option
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.  Words that it does not "
@@ -65,25 +70,30 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
               help="Write who asked what, a JSON object a line; - is the terminal.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], bind: str, port: int, image: Path | None,
-    log: Path | None, watch_ns: int, backlog: bool, **settings: int | None,
+    log: Path | None, watch_ns: int, backlog: bool, fins: bool, fins_bind: str, fins_port: int, fins_node: int | None,
+    fins_control: bool, **settings: int | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
-    reach the first port at which it waits.
+    reach the first port at which it waits.  With --fins, SCADA software and libraries that speak FINS reach it, too.
 
     Status 5 if the port cannot be used, 4 if a trap stopped the program, 2 if the memory could not be saved, else 0."""
     signals = Signals()
+    read_only = bool(settings["read_only"])
+    door = fins_door(fins_bind, fins_port, fins_node, fins_control, read_only) if fins else None
     with ExitStack() as stack:
         stack.enter_context(signals.installed())
-        plc = _own(files, program, libraries) if files else _shipped(settings)
+        plc = _own(files, program, libraries, FINS_SETTINGS if fins else ()) if files else _shipped(settings)
         plc.watch_cycle.time_ns = watch_ns
         if image:
             _load(plc, image)
-        network = _network(bind, port, backlog)
+        network = _network(bind, port, backlog, door)
         stack.callback(network.close)
         if log:
             network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
-        for unit in usual_units(mailbox_names(plc.image)):
+        for unit in usual_units(mailbox_names(plc.image), fins=door.unit if door else None):
             plc.attach(unit, network)
+        if door:
+            open_fins(network, door)
         reason, saved = _start(plc, network, signals), True
         while reason != "trap" and not signals.end:
             try:
@@ -109,10 +119,10 @@ def _shipped(settings: dict[str, int | None]) -> Plc:
     return plc
 
 
-def _own(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...]) -> Plc:
-    """A PLC with a program of the user's own.  Raises UsageError for options of the shipped one."""
+def _own(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], allowed: Collection[str]) -> Plc:
+    """A PLC with a program of the user's own.  Raises UsageError for options of the shipped one, but for those `allowed`."""
     context = click.get_current_context()
-    given = [parameter.opts[0] for parameter in context.command.params if parameter.name in OWN_SETTINGS
+    given = [parameter.opts[0] for parameter in context.command.params if parameter.name in OWN_SETTINGS.keys() - allowed
              and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT]  # fmt: skip
     if given:
         raise click.UsageError(f"{', '.join(given)}: said to the shipped server program; your own sets what it wants itself")
@@ -143,11 +153,11 @@ def _opened(stack: ExitStack, log: Path) -> IO[str]:
         return stack.enter_context(TextIOWrapper(growing_file(log, "ab"), encoding="utf-8"))
 
 
-def _network(bind: str, port: int, backlog: bool) -> TcpNetwork:
+def _network(bind: str, port: int, backlog: bool, fins: FinsDoor | None) -> TcpNetwork:
     """The network; its first door is at `bind` and `port`.  Ends with status 5 if that cannot be used."""
     real = Peer(address(bind), port)
     warn_if_reachable(real)
-    network = TcpNetwork(bind=real.host, door=real, backlog=backlog)
+    network = TcpNetwork(fins.rows if fins else None, real.host, door=real, backlog=backlog)
     try:
         network.try_door(real)
     except OSError as error:
@@ -162,7 +172,9 @@ def _start(plc: Plc, network: TcpNetwork, signals: Signals) -> str:
     say_notice = notice_teller(HOW_TO_MAP)
 
     def tell(notice: Notice) -> None:
-        if notice.kind in (NoticeKind.LISTENING, NoticeKind.UNUSABLE) and not doors:
+        if notice.endpoint == ENDPOINT and notice.kind is NoticeKind.LISTENING:
+            return
+        if notice.endpoint != ENDPOINT and notice.kind in (NoticeKind.LISTENING, NoticeKind.UNUSABLE) and not doors:
             doors.append(notice)
         elif notice.kind is not NoticeKind.LISTENING or notice.endpoint != doors[0].endpoint:
             say_notice(notice)

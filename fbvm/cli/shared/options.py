@@ -42,12 +42,12 @@ watch_cycle_option = option("--watch-cycle", "watch_ns", type=watch_cycle_ns, de
                             help="With real connections: the longest time that a scan may take, from 10ms to 40s.")
 
 
-def address(bind: str) -> str:
-    """The address of --bind.  Raises BadParameter if it is none."""
+def address(bind: str, option: str = "--bind") -> str:
+    """The address that an option says.  Raises BadParameter if it is none."""
     try:
         return str(IPv4Address(bind))
     except ValueError:
-        raise BadParameter(f"--bind {bind} is not an IPv4 address of this computer") from None
+        raise BadParameter(f"{option} {bind} is not an IPv4 address of this computer") from None
 
 
 @dataclass(frozen=True)

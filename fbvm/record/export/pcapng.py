@@ -16,6 +16,7 @@ from typing import BinaryIO
 
 from fbvm.record.export import frames
 from fbvm.record.export.frames import ACK, FIN, MAX_SEGMENT_BYTES, PSH, RST, SYN
+from fbvm.record.trace.packets import Dissector
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import TapEvent, TapKind
 
@@ -42,11 +43,13 @@ class Capture:
 
     `epoch_ns`, in nanoseconds since 1970, is the date of the PLC's time 0.  Each unit is an interface of the file, named by
     its address; packets between two units of one network are written once.  `comment` returns the comment of a packet by
-    the address of its unit, such as the number of the scan."""
+    the address of its unit, such as the number of the scan.  A packet that completes FINS frames says in its comment what they
+    are."""
 
     def __init__(self, file: BinaryIO, epoch_ns: int = 0, comment: Callable[[str], str] | None = None) -> None:
         self._file = file
         self._comment = comment
+        self._dissector = Dissector()
         self._epoch_ns = epoch_ns
         self._flows: dict[frozenset[Peer], _Flow] = {}
         self._interfaces: dict[str, int] = {}
@@ -62,8 +65,13 @@ class Capture:
             return
         pair = event.local, event.remote
         sender, receiver = pair if event.out else pair[::-1]
-        for frame in self._frames(event.kind, sender, receiver, event.data):
-            self._packet(now_ns, address, frame)
+        packets = self._dissector.dissect(now_ns, event)
+        said = [self._comment(address)] if self._comment else []
+        fins = [packet.info for packet in packets if packet.info.startswith("FINS")]
+        written = self._frames(event.kind, sender, receiver, event.data)
+        last = len(written) - 1 - (event.kind is TapKind.DATA)  # behind data comes an acknowledgement
+        for number, frame in enumerate(written):
+            self._packet(now_ns, address, frame, "; ".join(said + fins if number == last else said))
 
     def flush(self) -> None:
         """Lets others see what was written; cheap where nothing was."""
@@ -127,7 +135,7 @@ class Capture:
 
     # From frames to blocks.
 
-    def _packet(self, now_ns: int, address: str, frame: bytes) -> None:
+    def _packet(self, now_ns: int, address: str, frame: bytes, comment: str) -> None:
         if address not in self._interfaces:
             self._interfaces[address] = len(self._interfaces)
             options = _option(IF_NAME, address.encode()) + _option(IF_TSRESOL, NANOSECONDS) + _option(OPTION_END, b"")
@@ -136,7 +144,7 @@ class Capture:
         head = struct.pack(
             "<IIIII", self._interfaces[address], stamp >> 32, stamp & 0xFFFF_FFFF, len(frame), len(frame)
         )
-        options = _option(COMMENT, self._comment(address).encode()) + _option(OPTION_END, b"") if self._comment else b""
+        options = _option(COMMENT, comment.encode()) + _option(OPTION_END, b"") if comment else b""
         self._block(ENHANCED_PACKET, head + _padded(frame) + options)
 
     def _block(self, kind: int, body: bytes) -> None:

@@ -24,6 +24,7 @@ CIO_WORDS = 24
 
 FORCE_CLOSE = 1 << 2  # of word n, W421 6-7-5 p120
 LINK_UP = 1 << 14  # of n+17; the bit's number is assumed
+DISAGREEMENT = 1 << 14  # of n+18: host part of the address and FINS node, W420 4-1 p84
 
 # --- A words of the CPU unit, bit N for the CPU bus unit with number N, [K] ---------------------------------------------
 INITIALIZING = 302
@@ -36,6 +37,7 @@ PARAMETERS = 18  # area k from m + 18 + 10 * (k - 1)
 PARAMETERS_LENGTH = 10
 D_WORDS = 98
 """That the unit exchanges, from m on."""
+LOCAL_IP = 98  # m+98, m+99, [K]
 
 # --- offsets in a parameter area, W421 6-7-4 p117 --------------------------------------------------------------------
 OPTION_AND_SOCKET, LOCAL_PORT, REMOTE_HOST, REMOTE_PORT, COUNT, DATA_ADDRESS, TIMEOUT, RESPONSE = 0, 1, 2, 4, 5, 6, 8, 9

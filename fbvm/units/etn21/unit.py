@@ -1,26 +1,31 @@
 """The Omron ETN21 Ethernet unit: socket services by request switches, as a CS/CJ program sees them in CIO and D words.
 
 What the unit does is a program, `fblib/omron/etn21`, which its own processor runs once in an I/O refresh.  This module
-exchanges the words, as the backplane does, and carries what program and network tell each other.  No I/O in here.  FINS,
-mail, FTP and clock adjustment are not emulated; their words stay 0.  From W420, W421 and, for points that these leave
-open, W343.
+exchanges the words, as the backplane does, and carries what program and network tell each other.  No I/O in here.  FINS, if it
+is asked for, is the service in `fins/`.  Mail, FTP and clock adjustment are not emulated; their words stay 0.  From W420, W421
+and, for points that these leave open, W343.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 from fbvm.base.areas import NEVER
-from fbvm.units.contract import AreaMemory, Exchanged, ExchangedWords, Moves, UnitState
+from fbvm.units.addresses import words_of
+from fbvm.units.contract import AreaMemory, CpuUnit, Exchanged, ExchangedWords, Moves, UnitState
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
+from fbvm.units.etn21.fins.service import FinsService
+from fbvm.units.etn21.fins.state import ACCESS, FinsSettings, nodes_of
 from fbvm.units.etn21.inside import Inside, power_on
 from fbvm.units.etn21.map import Layout
 from fbvm.units.etn21.names import descriptions, meanings
 from fbvm.units.etn21.words import Words
+from fbvm.wire.fins.codes import EndCode
+from fbvm.wire.fins.frames import PORT, Command
 from fbvm.wire.link import Event, Request
 
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
@@ -37,7 +42,11 @@ class Etn21:
     `timing` is "exact" (a switch is accepted by the next refresh and finished by the one after, all words together)
     or "real" (seeded delays and words out of step).  `time_wait_ns` is how long a fixed local TCP port is held after
     a close from this side.  `odd_filler` is the low byte stored beside an odd last byte (00 is assumed); None keeps
-    what is there.  Raises ValueError for a wrong argument."""
+    what is there.
+
+    `fins` lets the unit serve FINS by UDP and TCP on `fins_port`, as node `fins_node` (None: the host part of its address; 0:
+    whatever node a frame is for).  `fins_nodes` is its IP address table, `fins_access` what may be done by FINS: "full",
+    "no-control" (no change of the operating mode) or "read-only".  Raises ValueError for a wrong argument."""
 
     def __init__(
         self,
@@ -49,6 +58,11 @@ class Etn21:
         time_wait_ns: int = TIME_WAIT_NS,
         odd_filler: int | None = 0x00,
         faults: Iterable[Fault] = (),
+        fins: bool = False,
+        fins_port: int = PORT,
+        fins_node: int | None = None,
+        fins_nodes: Mapping[str, str] | None = None,
+        fins_access: str = "full",
     ) -> None:
         if timing not in TIMINGS:
             raise ValueError(f"timing {timing!r} is neither 'exact' nor 'real'")
@@ -66,6 +80,15 @@ class Etn21:
         self._mask = 1 << self.layout.bit
         """Its bit in words for all units."""
         self._service_status, self._error_status = at.LINK_UP, 0
+        self._fins: FinsService | None = None
+        if fins_access not in ACCESS:
+            raise ValueError(f"fins_access {fins_access!r} is none of {', '.join(ACCESS)}")
+        if fins:
+            nodes = nodes_of(fins_nodes or {})
+            self._fins = FinsService(FinsSettings(address, unit_number, fins_port, fins_node, nodes, ACCESS[fins_access]))
+            self._error_status = at.DISAGREEMENT if self._fins.settings.disagrees else 0
+            self._made |= {"fins": True, "fins_port": fins_port, "fins_node": fins_node, "fins_nodes": dict(fins_nodes or {}),
+                           "fins_access": fins_access}  # fmt: skip
         self.changed_words = False
         self._engine = "auto"
         self._times_set = 0
@@ -97,6 +120,8 @@ class Etn21:
             twin._processor = self._processor.copy(self._made["odd_filler"])
         twin._service_status, twin._error_status = self._service_status, self._error_status
         twin._words, twin.changed_words = self._words, self.changed_words
+        if self._fins and twin._fins:
+            twin._fins.state = self._fins.state.copy()
         return twin
 
     @property
@@ -109,12 +134,15 @@ class Etn21:
         """All that the unit knows now, beside its arguments."""
         inside = self._processor
         memory, mail = (inside.own.memory.snapshot(), inside.mail.state) if inside else (None, None)
-        return UnitState(memory, (self._service_status, self._error_status, self.changed_words, mail))
+        fins = self._fins.state.copy() if self._fins else None
+        return UnitState(memory, (self._service_status, self._error_status, self.changed_words, mail, fins))
 
     def resume(self, state: UnitState, memory: AreaMemory) -> None:
         """Goes on from a state of a unit with the same arguments, in a PLC with this memory."""
         self._words = Words(self.layout, memory)
-        self._service_status, self._error_status, self.changed_words, mail = state.other
+        self._service_status, self._error_status, self.changed_words, mail, fins = state.other
+        if self._fins and fins:
+            self._fins.state = fins.copy()
         if state.memory is None:
             self._processor = None
         else:
@@ -153,10 +181,10 @@ class Etn21:
     @property
     def wake_ns(self) -> int:
         """When the unit has something to do by itself, in ns of the PLC's time; 0 for the next refresh."""
-        inside = self._processor
+        inside, fins_ns = self._processor, self._fins.wake_ns if self._fins else NEVER
         if inside is None:
-            return NEVER
-        return 0 if inside.mail.has_events else int(inside.wake[0])
+            return fins_ns
+        return 0 if inside.mail.has_events else min(fins_ns, int(inside.wake[0]))
 
     @property
     def link_up(self) -> bool:
@@ -210,14 +238,15 @@ class Etn21:
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on: the unit's own words and all switches 0, connections broken by RST."""
+        broken = self._fins.reset() if self._fins else []
         words = self._look_at(memory)
         asks = self._asks(words) or words.initializing[0] & self._mask
         if self._processor is None and words.are_blank and not asks:
             self._report(words)
-            return []
+            return broken
         self._inside.reset()
         self.changed_words = self._inside.run(words, 0)
-        return self.finish()
+        return broken + self.finish()
 
     def _look_at(self, memory: AreaMemory) -> Words:
         """Views of the unit's words in the PLC that the unit is in now; the program learns how long that PLC's areas are."""
@@ -244,6 +273,8 @@ class Etn21:
         words, inside = self._words, self._processor
         if words is None or words.memory is not memory:
             words = self._look_at(memory)
+        if events and self._fins:
+            events = self._fins.take(events)
         if events:
             self._inside.mail.post(events)
         elif not self._asks(words):
@@ -278,6 +309,8 @@ class Etn21:
 
     def post(self, events: Iterable[Event]) -> None:
         """Events of the network for the next run of the program."""
+        if self._fins:
+            events = self._fins.take(events)
         self._inside.mail.post(events)
 
     def finish(self) -> list[Request]:
@@ -285,3 +318,52 @@ class Etn21:
         if self._processor is None or self._words is None:
             return []
         return self._processor.mail.collect(self._words.memory)
+
+    # --- FINS ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def has_fins(self) -> bool:
+        """True if the unit serves FINS."""
+        return self._fins is not None
+
+    @property
+    def unit_number(self) -> int:
+        """Its number among the CPU bus units."""
+        return self.layout.bit
+
+    @property
+    def node(self) -> int:
+        """Its FINS node address; the host part of its IP address where FINS is off."""
+        return self._fins.settings.own_node if self._fins else int(self.address.rpartition(".")[2])
+
+    def serve(self, cpu: CpuUnit, now_ns: int) -> list[Request]:
+        """Peripheral servicing: executes the FINS commands that have come.  A unit that starts does nothing, and begins anew."""
+        fins = self._fins
+        if fins is None:
+            return []
+        if cpu.memory.words("A")[at.INITIALIZING] & self._mask:
+            requests = fins.reset()
+        else:
+            requests = fins.serve(cpu, now_ns)
+            if fins.asks_restart:
+                fins.asks_restart = False
+                cpu.memory.words("A")[at.RESTART] |= self._mask
+        self._show_fins(cpu.memory, fins)
+        return requests
+
+    def _show_fins(self, memory: AreaMemory, fins: FinsService) -> None:
+        """Writes the words about FINS: n+23, and m+98 and m+99 (the unit's address; assumed)."""
+        cio, d, (n, m) = memory.words("CIO"), memory.words("D"), (self.layout.n, self.layout.m)
+        if cio[n + at.FINS_TCP_STATUS] != fins.connection_bits:
+            cio[n + at.FINS_TCP_STATUS] = fins.connection_bits
+            self.changed_words = True
+        if not d[m + at.LOCAL_IP]:
+            d[m + at.LOCAL_IP], d[m + at.LOCAL_IP + 1] = words_of(self.address)
+
+    def execute(self, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
+        """Executes a command of the PLC's own program for this unit; end code and data."""
+        return self._fins.execute(command, cpu) if self._fins else (EndCode.NO_UNIT, b"")
+
+    def send(self, command: Command) -> int:
+        """Takes a command of a network instruction; an end code, 0000 if the next servicing sends it."""
+        return self._fins.send(command) if self._fins else EndCode.NOT_IN_NETWORK

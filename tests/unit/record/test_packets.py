@@ -120,3 +120,21 @@ def test_several_may_listen() -> None:
     network.tap = before
     network.tell_unit(UNIT.host, TapKind.SYN, UNIT, SERVER, True)
     assert (len(first), len(second)) == (2, 1)
+
+
+def test_fins_is_told_by_its_port_and_by_the_head_of_its_streams() -> None:
+    dissector, unit, client = Dissector(), Peer("192.168.250.1", 9600), Peer("192.168.250.25", 5000)
+    asked = bytes.fromhex("800002000100001900010101820064000003")
+    told = bytes.fromhex("C00002001900000100010101000012301231 1232")
+    [command] = dissector.dissect(0, TapEvent(TapKind.UDP, unit, client, False, asked))
+    [response] = dissector.dissect(0, TapEvent(TapKind.UDP, unit, client, True, told))
+    assert str(command) == ("192.168.250.25:5000 -> 192.168.250.1:9600  "
+                            "FINS 25 -> 1, service 1: memory area read, D100, 3 elements")
+    assert response.info == "FINS 1 -> 25, service 1: memory area read: normal end, 6 bytes"
+    elsewhere = Peer("192.168.250.1", 9700)
+    stream = bytes.fromhex("46494E530000000C000000000000000000000000") + b"GET "
+    packets = list(dissector.dissect(0, TapEvent(TapKind.DATA, elsewhere, client, False, stream)))
+    assert [packet.info for packet in packets] == [
+        "FINS/TCP: asks for a node", "4 bytes, no FINS/TCP: the message does not begin with FINS"]
+    [part] = dissector.dissect(0, TapEvent(TapKind.DATA, elsewhere, client, True, b"FINS\0\0"))
+    assert part.info == "6 bytes, a FINS/TCP message in part"

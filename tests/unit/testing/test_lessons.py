@@ -30,8 +30,8 @@ def found_by_children(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HOUSE), os.environ.get("PYTHONPATH", "")]))
 
 
-def test_there_are_twelve() -> None:
-    assert [lesson.number for lesson in lessons()] == list(range(1, 13))
+def test_there_are_thirteen() -> None:
+    assert [lesson.number for lesson in lessons()] == list(range(1, 14))
 
 
 @every_lesson
@@ -134,7 +134,7 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not (own.parent / "solution").exists() and not (own.parent / "lesson.md").exists()
     assert re.search(r"Level against edge +begun\n", called()[1])
     assert "Press(CLK := Button);" in called("3", "--solution")[1]
-    assert called("13")[0] == called("--check")[0] == called("--class", "nobody")[0] == 2
+    assert called("14")[0] == called("--check")[0] == called("--class", "nobody")[0] == 2
     (tmp_path / "class").mkdir()
     assert called("--class", "class", "--report", "class/out")[0] == called("--class", "class")[0] == 2
 

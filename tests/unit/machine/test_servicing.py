@@ -1,0 +1,113 @@
+"""FINS and what surrounds it: journals, recordings, forks and fast paths do a run again to the bit."""
+
+from __future__ import annotations
+
+from io import StringIO
+
+import pytest
+from fins_rig import COUNTING, FinsRig, TcpClient, compiled
+
+from fbvm import Plc, Recording, compile_text
+from fbvm.net.journal import Journal, open_journal
+from fbvm.run.replay import Replay
+
+CONVERSATION = [
+    (0x0102, "82 0064 00 0002 1234 5678"), (0x2301, "0001 0001 30 0064 01"), (0x0101, "82 01F4 00 0001"),
+    (0x0702, "26 11 22 13 44 04 00"), (0x0402, ""), (0x0102, "31 000A 03 0001 01"), (0x0401, "FFFF 04"), (0x0620, "01"),
+    (0x0C01, "FFFF"), (0x0401, ""), (0x2302, ""), (0x0701, ""), (0x0103, "82 0000 00 000A 5555"), (0x0403, ""),
+]  # fmt: skip
+
+
+def converse(rig: FinsRig) -> list[tuple[str, str]]:
+    """The same conversation each time: UDP, TCP, a restart of the unit."""
+    answers = []
+    for code, parameters in CONVERSATION:
+        answers.append(rig.command(code, parameters))
+        rig.plc.run(scans=3)
+    client = TcpClient(rig)
+    client.connect()
+    rig.plc.run(scans=2)
+    client.say(b"FINS\0\0")
+    rig.plc.run(scans=2)
+    rig.command(0x0403, unit=0x10)
+    rig.plc.run(scans=10)
+    return answers
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["python", "auto"])
+def test_a_journal_with_fins_is_done_again_to_the_bit(engine: str) -> None:
+    image = compile_text(COUNTING).image
+    assert image
+    file = StringIO()
+    journal = Journal(file)
+    rig = FinsRig(plc=Plc(image, journal=journal))
+    answers = converse(rig)
+    assert [end_code for end_code, _ in answers] == ["0000"] * 13 + ["0401"]
+    journal.close()
+    header, entries = open_journal(StringIO(file.getvalue()).readlines())
+    replay = Replay(header, entries, image, engine=engine)
+    assert replay.run() == "end"
+    assert replay.differs is None
+    assert replay.complete
+    assert replay.plc.memory.snapshot().pages == rig.plc.memory.snapshot().pages
+    assert replay.plc.mode == rig.plc.mode
+
+
+@pytest.mark.slow
+def test_every_scan_of_a_recording_with_fins_is_had_again() -> None:
+    rig = FinsRig(plc=compiled())
+    recording = Recording()
+    recorded = recording.add("plc", rig.plc)
+    seen: dict[int, bytes] = {}
+    rig.plc.watchers.append(lambda plc: seen.__setitem__(plc.scans, plc.memory.map[:]))
+    converse(rig)
+    for plc in recorded.again(recorded.scans):
+        assert plc.memory.map[:] == seen[plc.scans], plc.scans
+    for scan in (5, 20, 40, recorded.scans.stop):
+        at = recorded.at(scan)
+        assert at.scans == scan
+        assert at.read("D100..D101") == ([0x1234, 0x5678] if scan > 4 else [0, 0])
+
+
+def test_the_clock_goes_on_over_a_restart() -> None:
+    rig = FinsRig()
+    rig.command(0x0702, "26 11 22 13 44 04 00")
+    rig.plc.cold_start()
+    rig.plc.run(scans=3)
+    assert rig.command(0x0701)[1].startswith("26 11 22 13 44")
+
+
+def test_the_clock_of_a_plc_is_set_from_outside() -> None:
+    rig = FinsRig()
+    rig.plc.servicing.clock_ns = 86_400_000_000_000 * 31
+    assert rig.command(0x0701) == ("0000", "00 02 01 00 00 00 02")
+
+
+@pytest.mark.slow
+def test_machine_code_and_python_leave_the_same_memory_and_answers() -> None:
+    rigs = {engine: FinsRig(plc=Plc(compiled().image, engine=engine)) for engine in ("python", "native")}
+    found = {engine: converse(rig) for engine, rig in rigs.items()}
+    assert found["python"] == found["native"]
+    assert rigs["python"].plc.memory.map[:] == rigs["native"].plc.memory.map[:]
+
+
+@pytest.mark.slow
+def test_a_request_is_answered_beside_units_that_run_in_machine_code() -> None:
+    """The request switches put the unit's program into machine code, and FINS goes on."""
+    source = """PROGRAM Main
+    VAR Open AT CIO1519.00 : BOOL; Done : BOOL; Port AT D30019 : UINT; Socket AT D30018 : UINT; n : UDINT; END_VAR
+    IF NOT Done THEN Socket := 1; Port := 5001; Open := TRUE; Done := TRUE; END_IF; n := n + 1;
+    END_PROGRAM""".replace("CIO1519", "%CIO1519")
+    rig = FinsRig(plc=Plc(compiled(source).image, engine="native"))
+    rig.plc.run(scans=50)
+    assert rig.plc.read("CIO 1501.15") is True
+    client = TcpClient(rig)
+    client.connect()
+    for value in range(20):
+        assert rig.command(0x0102, f"82 0064 00 0001 {value:04X}") == ("0000", "")
+        assert rig.plc.read("D100") == value
+        assert client.frame("80 00 02 00 01 00 00 EF 00 01 01 01 82 00 64 00 00 01").endswith(f"00 00 00 {value:02X}")
+    assert rig.plc.read("CIO 1523") == 1
+
+
