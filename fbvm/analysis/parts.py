@@ -47,6 +47,12 @@ class Part:
     def _parsed(self) -> tuple[tree.SourceText, list[Diagnostic]]:
         return parse(self.source)
 
+    def copied(self) -> Part:
+        """The same part, with the same tree, which moves apart from this one."""
+        other = Part(Source(self.source.name, self.source.text, first_line=self.source.first_line), self.base)
+        vars(other).update({name: known for name, known in vars(self).items() if name != "source"})
+        return other
+
     @property
     def syntax(self) -> tree.SourceText:
         """What the part declares; parsed at the first use."""
@@ -146,6 +152,13 @@ class File:
             part.base, part.source.first_line = base, line
             base, line = base + len(part.source.text), line + len(part.source.line_starts) - 1
         return made
+
+    def copied(self) -> File:
+        """The same file with the same parts, which changes apart from this one."""
+        other = File(self.name, "")
+        other._source, other.text, other._is_one = self._source, self.text, self._is_one
+        other.parts = [part.copied() for part in self.parts]
+        return other
 
     def part_at(self, offset: int) -> Part:
         """The part in which an offset lies; at the seam of two, the one that begins there."""

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from fbvm.analysis.names import Use, uses
 from fbvm.analysis.parts import File, Part, common_beginning
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import dialect as named_dialect
@@ -87,9 +88,18 @@ class Program:
         """Whether the changes since the last `check` need another one for the errors."""
         self.revision = 0
         """Counts changes of texts and of what is known about them."""
+        self._uses: dict[Part, list[Use]] = {}
+        self._used_at = -1
 
     def _searched(self) -> Libraries:
         return Libraries(self._libraries, preferred=self.dialect.libraries)
+
+    def copied(self) -> Program:
+        """Another program with the same files and settings, to try a change in."""
+        other = Program(libraries=self._libraries, dialect=self.dialect.name, program=self._program, resource=self._resource)
+        for name, file in self.files.items():
+            other.files[name] = file.copied()
+        return other
 
     # --- texts ------------------------------------------------------------------------------------------------------
 
@@ -223,6 +233,21 @@ class Program:
         checked.move(old.source, new.source)
         checked.add(report.diagnostics, before_check)
 
+    # --- names ------------------------------------------------------------------------------------------------------
+
+    def uses(self, part: Part) -> list[Use]:
+        """The names in a part and what they mean, with places in the part; nothing before the first check."""
+        if self._used_at != self.revision:
+            self._uses, self._used_at = {}, self.revision
+        if part not in self._uses:
+            with _recursion():
+                self._uses[part] = uses(self.checked.checker, part) if self.checked is not None else []
+        return self._uses[part]
+
+    def place(self, source: Source) -> tuple[File, int] | None:
+        """The file of a part's text and where that begins in it; None for the text of a library."""
+        return next(((file, part.base) for file in self.files.values() for part in file.parts if part.source is source), None)
+
     # --- diagnostics ------------------------------------------------------------------------------------------------
 
     def diagnostics(self, name: str) -> list[Diagnostic]:
@@ -253,7 +278,7 @@ class Program:
         if message.related is None:
             return message
         source, at, said = message.related
-        found = next(((file, part.base) for file in self.files.values() for part in file.parts if part.source is source), None)
+        found = self.place(source)
         return replace(message, related=(found[0].source, at + found[1], said)) if found else message
 
     def library_errors(self) -> list[Diagnostic]:
