@@ -60,7 +60,7 @@ ORDERS = {
     "units": ("", "etn21", "port"),
     "machine": ("scan", "fast", ""),
     "record": ("trace", "recording", "draw", "export", "page"),
-    "cli": ("shared", "programs", "running", "recordings", "projects", ""),
+    "cli": ("shared", "programs", "running", "recordings", "projects", "editors", ""),
 }
 """The folders of a room, the lowest first; "" is the room itself.  A folder imports from those before it."""
 _VERBS = ORDERS["cli"][1:-1]

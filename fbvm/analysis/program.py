@@ -7,7 +7,7 @@ when that is not enough, because a change concerns others.  Warnings come from `
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -140,7 +140,7 @@ class Program:
         """True if errors and facts are those of the present texts; warnings may be missing."""
         return self.checked is not None and not self._changes and not self._whole
 
-    def check(self, lint: bool = True) -> Iterator[None]:
+    def check(self, lint: bool = True) -> Generator[None, None, None]:
         """Check everything, in steps.  A caller that gives up closes the iterator: the program then knows what it knew before."""
         changes, self._changes = self._changes, []
         before, self._whole = (self._whole, changes), False
