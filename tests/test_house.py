@@ -44,7 +44,7 @@ FLOORS = {
     "syntax": 1, "wire": 1,
     "check": 2, "interchange": 2, "net": 2,
     "code": 3,
-    "engine": 4, "watch": 4,
+    "engine": 4, "watch": 4, "analysis": 4,
     "processor": 5, "units": 5, "machine": 5,
     "record": 6, "step": 6, "run": 6,
     "testing": 7, "live": 7, "dap": 7, "lsp": 7, "prove": 7, "campaign": 7,
@@ -61,7 +61,7 @@ ORDERS = {
     "units": ("", "etn21/fins", "etn21", "port"),
     "machine": ("scan", "servicing", "fast", ""),
     "record": ("trace", "recording", "draw", "export", "page"),
-    "cli": ("shared", "programs", "running", "recordings", "projects", ""),
+    "cli": ("shared", "programs", "running", "recordings", "projects", "editors", ""),
 }
 """The folders of a room, the lowest first; "" is the room itself.  A folder imports from those before it."""
 _VERBS = ORDERS["cli"][1:-1]
@@ -82,7 +82,7 @@ SHOPS = {"testing", "live", "dap", "lsp", "prove", "campaign"}
 BETWEEN_SHOPS = {("testing", "prove"), ("campaign", "prove"), ("campaign", "testing")}
 """Where one may use the other all the same."""
 SEPARATE = {("units", "net"), ("net", "units"), ("units", "engine"), ("engine", "units"), ("watch", "engine"),
-            ("run", "record"), ("record", "run"), ("check", "interchange"), ("code", "interchange"),
+            ("analysis", "engine"), ("run", "record"), ("record", "run"), ("check", "interchange"), ("code", "interchange"),
             *((one, other) for one in SHOPS for other in SHOPS - {one} if (one, other) not in BETWEEN_SHOPS)}  # fmt: skip
 """Neighbours that do not import each other."""
 ONLY_IN = {

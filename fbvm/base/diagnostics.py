@@ -31,6 +31,8 @@ class Source:
     """The whole text; a line ends with LF or CR LF."""
     library: str = ""
     """Name of the library that the text belongs to, "" for the user's own."""
+    first_line: int = 1
+    """The number of the first line, for a text that is a part of a longer one."""
 
     def __post_init__(self) -> None:
         self.text = whole_lines(self.text)
@@ -45,15 +47,16 @@ class Source:
         return starts
 
     def place(self, offset: int) -> tuple[int, int]:
-        """Line and column, both from 1, of a character offset; behind the text those of its end."""
+        """Line (from `first_line`) and column (from 1) of a character offset; behind the text those of its end."""
         offset = min(max(offset, 0), len(self.text))
         row = bisect.bisect_right(self.line_starts, offset) - 1
-        return row + 1, offset - self.line_starts[row] + 1
+        return row + self.first_line, offset - self.line_starts[row] + 1
 
     def line(self, number: int) -> str:
-        """The text of line `number` (from 1) without its end.  Raises IndexError behind the last line."""
-        start = self.line_starts[number - 1]
-        end = self.line_starts[number] if number < len(self.line_starts) else len(self.text)
+        """The text of line `number` (from `first_line`) without its end.  Raises IndexError behind the last line."""
+        row = number - self.first_line
+        start = self.line_starts[row]
+        end = self.line_starts[row + 1] if row + 1 < len(self.line_starts) else len(self.text)
         return self.text[start:end].rstrip("\r\n")
 
 

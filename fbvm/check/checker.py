@@ -4,7 +4,7 @@ This module puts the parts of the check together: its `RULES` say which part has
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from fbvm.check.calls import calls, generics
 from fbvm.check.declarations import globals, interfaces, specs, variables
@@ -47,6 +47,11 @@ class Checker(Context):
 
     def check(self, program: str | None = None, resource: str | None = None) -> None:
         """Check everything that the user declares and what it uses of libraries; choose what the tasks run."""
+        for _ in self.steps(program, resource):
+            pass
+
+    def steps(self, program: str | None = None, resource: str | None = None) -> Iterator[None]:
+        """As `check`, but stops in front of each POU, so that a caller can do something else, or give up, between two of them."""
         configurations = Configurations(self)
         self.resource = configurations.choose(resource, program)
         globals.enroll(self)
@@ -56,6 +61,7 @@ class Checker(Context):
         globals.declare(self)
         while self.project.new_pous:
             self._progress(len(self.bodies), len(self.bodies) + len(self.project.new_pous))
+            yield
             pou = self.project.new_pous.popleft()
             if not pou.source.library and not generics.is_generic(pou, self.project):
                 self.check_body(pou)
@@ -63,9 +69,13 @@ class Checker(Context):
         globals.declare(self)
         if program is None:
             self.var_config.resolve()
-        for start in self.facts.starts:
-            references.check_initial(Scope(self, start.source, start.pou), start)
+        self.check_starts()
         self._report_recursion()
+
+    def check_starts(self, first: int = 0) -> None:
+        """Check the references in initial values, from the one with the number `first` in `Facts.starts` on."""
+        for start in self.facts.starts[first:]:
+            references.check_initial(Scope(self, start.source, start.pou), start)
 
     def _report_recursion(self) -> None:
         """Report POUs that call themselves, directly or through others (7.2)."""

@@ -53,6 +53,9 @@ VERB_GROUPS = {
         "why": "Say why a variable has its value, back through scans.",
         "convert": "Write a trace as a page, a picture, CSV or VCD, or a CSV as a trace.",
     }),
+    "editors": ("For editors", {
+        "lsp": "Tell an editor about programs: mistakes, names, completion.",
+    }),
 }  # fmt: skip
 """The verbs by folder: heading in `fbvm --help`, and the help of each verb.  The module of a verb has the name of the verb."""
 GROUP_OF = {verb: room for room, (_, verbs) in VERB_GROUPS.items() for verb in verbs}

@@ -220,11 +220,12 @@ def project_file(path: Path) -> Path | None:
     return path if path.suffix == ".toml" and path.is_file() else None
 
 
-def read_project(path: Path, *, allow_outside: bool = False) -> Project | list[Diagnostic]:
+def read_project(path: Path, *, allow_outside: bool = False, text: str | None = None) -> Project | list[Diagnostic]:
     """Reads a project file.  Returns the project, or all diagnostics of the file; sources are not read yet.
 
-    Sources and libraries have to be in the folder of the file or below, unless `allow_outside`."""
-    found = read(path, str(path), most_bytes=SETTINGS_BYTES)
+    Sources and libraries have to be in the folder of the file or below, unless `allow_outside`.  `text` is what stands in the
+    file once it is saved; the file itself is not read then."""
+    found = read(path, str(path), most_bytes=SETTINGS_BYTES) if text is None else Source(str(path), text)
     if isinstance(found, Diagnostic):
         return [found]
     reading = Reading(found)

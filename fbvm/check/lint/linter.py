@@ -6,7 +6,7 @@ never at libraries.  `suppression` removes those that a pragma or the caller swi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from fbvm.check.lint import declared
@@ -25,10 +25,17 @@ _RULES: dict[type, Callable[[Body, Any], None]] = {**lint_values.RULES, sfc.Sfc:
 
 def lint(context: Context, program: str | None) -> None:
     """Report what the bodies and declarations of a checked project are to be warned of; `program` is the one to run."""
+    for _ in lint_steps(context, program):
+        pass
+
+
+def lint_steps(context: Context, program: str | None) -> Iterator[None]:
+    """As `lint`, but stops in front of each POU, so that a caller can do something else, or give up, between two of them."""
     facts, report = context.project.facts, context.report
     own = [pou for pou in context.bodies if not pou.source.library and " " not in pou.name]
     uses, writes = declared.Uses(facts), Writes()
     for pou in own:
+        yield
         body = Body(pou, facts, report)
         for node in body.nodes:
             if rule := _RULES.get(type(node)):
@@ -38,6 +45,7 @@ def lint(context: Context, program: str | None) -> None:
         declared.result(body)
         declared.overlaps(report, pou.order)
     for pou in own:
+        yield
         declared.unused(report, pou, uses)
         declared.pins(report, pou, uses)
     writes.finish()

@@ -382,11 +382,11 @@ class Report:
 
     def __init__(self) -> None:
         self.diagnostics: list[Diagnostic] = []
-        self._seen: set[tuple[str, str, int]] = set()
+        self._seen: set[tuple[str, Source, int]] = set()
 
     def add(self, code: str, source: Source, node: tree.Node, message: str, hint: str = "",
             related: tuple[Source, int, str] | None = None) -> None:
-        key = (code, source.name, node.start)
+        key = (code, source, node.start)
         if key not in self._seen:
             self._seen.add(key)
             self.diagnostics.append(Diagnostic(code, source, node.start, node.end, message, hint, related))

@@ -202,6 +202,11 @@ class Libraries:
     def names(self) -> tuple[str, ...]:
         return tuple(self._libraries)
 
+    def path(self, source: Source) -> Path | None:
+        """Where the file of a library's text lies; None for a text of no library."""
+        library = self._libraries.get(source.library)
+        return library.folder / source.name.removeprefix(f"{library.name}/") if library is not None else None
+
     def other_pins(self, owner: str, pou: str) -> dict[str, str]:
         """Other names of the pins of a library's POU, folded, and their own."""
         library = self._libraries.get(owner)

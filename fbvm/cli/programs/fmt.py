@@ -5,26 +5,20 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator
 from difflib import unified_diff
-from functools import cache
 from pathlib import Path
 
 import click
 
-from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source, whole_lines
 from fbvm.base.files import SOURCE_BYTES, read_file, reason, write_file
-from fbvm.base.types import fold
-from fbvm.check.calls.standard import is_known
+from fbvm.check.spelling import OUTSIDE
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.sources import show_diagnostic
 from fbvm.cli.shared.terminal import named, say, say_exactly
 from fbvm.syntax.formatter.formatter import formatted
-from fbvm.syntax.formatter.names import Outside
-from fbvm.syntax.parser import parse
-from fbvm.syntax.text import MARKS, decode, read, refusal
-from fbvm.syntax.tree import Declaration, Pou, TypeDecl
+from fbvm.syntax.text import MARKS, decode, refusal
 
 STREAM = Path("-")
 ENCODINGS = (*MARKS, (b"", "utf-8"), (b"", "cp1252"), (b"", "latin-1"))
@@ -131,24 +125,3 @@ def _difference(source: Source, text: str) -> Iterator[str]:
     before, after = source.text.splitlines(keepends=True), text.splitlines(keepends=True)
     for line in unified_diff(before, after, named(source.name), named(source.name)):
         yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
-
-
-# --- declarations of the libraries ---
-
-
-@cache
-def _library_files() -> dict[str, Path]:
-    return {fold(path.stem): path for path in sorted(data_folder("fblib").rglob("*.st"))}
-
-
-@cache
-def _library_declaration(key: str) -> Declaration | None:
-    path = _library_files().get(key)
-    source = read(path, path.name) if path else None
-    if not isinstance(source, Source):
-        return None
-    found = (d for d in parse(source)[0].declarations if isinstance(d, (Pou, TypeDecl)) and fold(d.name.text) == key)
-    return next(found, None)
-
-
-OUTSIDE = Outside(lambda name: _library_declaration(fold(name)), is_known)

@@ -51,7 +51,7 @@ class FollowOnErrors:
 def _line(source: Source, at: int) -> Range:
     """The line in which a character stands."""
     number = source.place(at)[0]
-    start = source.line_starts[number - 1]
+    start = source.line_starts[number - source.first_line]
     return source, start, start + len(source.line(number)) + 1
 
 

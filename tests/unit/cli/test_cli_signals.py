@@ -65,6 +65,7 @@ VERBS: dict[str, list[list[str]]] = {
     "replay": [["long.journal"]], "step": [[DEMO]], "map": [[]], "serve": [["--port", "0", "--image", "served"]],
     "peer": [["--port", "0"]], "demo": [[]], "new": [["project", ]], "test": [["tests"]], "learn": [["1"]],
     "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["long.fbtrace", "Main.Step"]],
+    "lsp": [[]],
     "convert": [["long.fbtrace", "out.html"], ["long.fbtrace", "out.csv"]],
 }  # fmt: skip
 """Arguments with which each verb has something to do for a while."""

@@ -1,0 +1,26 @@
+"""`fbvm lsp`: the language server."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from fbvm.cli.shared import status
+from fbvm.cli.shared.ending import loading
+
+
+@click.command("lsp")
+@click.option("--stdio", is_flag=True, help="Speak over the standard input and output, which is what it does anyway.")
+def command(stdio: bool) -> None:
+    """Tell an editor about Structured Text, ladder, charts and fbvm.toml, by the Language Server Protocol over standard input
+    and output: mistakes while one types, hover, completion, renaming and so on.
+
+    An editor starts it; `docs/howto` has the lines of configuration for some.  It needs the extra `editor`."""
+    try:
+        with loading():
+            from fbvm.lsp.server import server_with_features
+    except ImportError:
+        raise click.UsageError("pygls is missing: pip install 'fbvm[editor]'") from None
+    server_with_features().start_io()
+    sys.exit(status.GOOD)

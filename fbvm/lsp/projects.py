@@ -1,0 +1,159 @@
+"""Which files are one program: those of a PLC in `fbvm.toml`, else a file with those of its folder that declare what it names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+from urllib.request import url2pathname
+
+from fbvm.analysis.program import Program
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.types import fold
+from fbvm.check.symbols.library import LibraryError
+from fbvm.run.project import FILE, read_project
+from fbvm.syntax.text import read
+
+_DECLARES = re.compile(r"^[ \t]*(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|TYPE\s+|TYPE)\s+(\w+)", re.I | re.M)
+_WORD = re.compile(r"[A-Za-z_]\w*")
+MOST_FILES = 500
+"""Files of a folder without a project file that are looked at."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What an editor says about files without a project file."""
+
+    dialect: str = "standard"
+    libraries: tuple[Path, ...] = ()
+
+
+@dataclass(eq=False)
+class Project:
+    """A program and the files on disk that it consists of."""
+
+    program: Program
+    paths: list[Path]
+    """Its files, which the program knows by `str(path)`."""
+    file: Path | None = None
+    """The project file, None without one."""
+    plc: str = ""
+    """The name of the PLC in the project file."""
+    task: object | None = field(default=None)
+    """The check that is under way."""
+
+
+def path_of(uri: str) -> Path:
+    """The file of a URI; drive letters of Windows are in lower case."""
+    parsed = urlparse(uri)
+    text = url2pathname(unquote(parsed.path)) if parsed.scheme == "file" else f"/{parsed.scheme}/{parsed.path}"
+    return Path(text[:1].lower() + text[1:] if text[1:2] == ":" else text)
+
+
+def project_file_above(path: Path) -> Path | None:
+    """The nearest `fbvm.toml` in the folder of a file or above."""
+    return next((folder / FILE for folder in path.parents if (folder / FILE).is_file()), None)
+
+
+class Projects:
+    """The programs of the files that are open.  `text_of` gives the text that an editor has of a file, None for others."""
+
+    def __init__(self, text_of: Callable[[Path], str | None]) -> None:
+        self._text_of = text_of
+        self.settings = Settings()
+        self.all: list[Project] = []
+        self.wrong: dict[Path, list[Diagnostic]] = {}
+        """Diagnostics of project files and libraries, by file."""
+
+    def of(self, path: Path) -> list[Project]:
+        """The programs that a file belongs to."""
+        return [each for each in self.all if path in each.paths]
+
+    def open(self, path: Path) -> list[Project]:
+        """The programs that a file belongs to, which are begun if there are none yet."""
+        known = self.of(path)
+        if known:
+            return known
+        described = project_file_above(path)
+        begun = self._described(described) if described is not None and not self._is_begun(described) else []
+        self.all += begun
+        if not self.of(path):
+            self.all += self._undescribed(path)
+        return self.of(path)
+
+    def close(self, open_paths: Iterable[Path]) -> list[Project]:
+        """Forget the programs of which no file is open any more; returns these."""
+        kept = set(open_paths)
+        gone = [each for each in self.all if not kept & set(each.paths)]
+        self.all = [each for each in self.all if each not in gone]
+        return gone
+
+    def forget(self, project_file: Path | None = None) -> list[Project]:
+        """Forget the programs of a project file, or all without one, since what says which they are has changed."""
+        gone = [each for each in self.all if project_file is None or each.file in (None, project_file)]
+        self.all = [each for each in self.all if each not in gone]
+        return gone
+
+    def _is_begun(self, described: Path) -> bool:
+        return any(each.file == described for each in self.all)
+
+    def _described(self, described: Path) -> list[Project]:
+        """The programs of a project file, one for each PLC."""
+        read_in = read_project(described, allow_outside=True, text=self._text_of(described))
+        if isinstance(read_in, list):
+            self.wrong[described] = read_in
+            return []
+        self.wrong[described] = []
+        made = []
+        for plc in read_in.plcs:
+            project = self._project(plc.sources, plc.dialect, plc.libraries, plc.program, plc.resource)
+            if project is not None:
+                project.file, project.plc = described, plc.name
+                made.append(project)
+        return made
+
+    def _undescribed(self, path: Path) -> list[Project]:
+        project = self._project(self._together(path), self.settings.dialect, self.settings.libraries, None, None)
+        return [project] if project is not None else []
+
+    def _project(self, paths: Iterable[Path], dialect: str, libraries: tuple[Path, ...], program: str | None,
+                 resource: str | None) -> Project | None:
+        try:
+            made = Program(libraries=libraries, dialect=dialect, program=program, resource=resource)
+        except LibraryError as error:
+            self.wrong[Path(error.described)] = [error.diagnostic]
+            made = Program(dialect=dialect, program=program, resource=resource)
+        known = [path.absolute() for path in paths]
+        for path in known:
+            text = self.text(path)
+            if text is not None:
+                made.replace(str(path), text)
+        return Project(made, [path for path in known if str(path) in made.files])
+
+    def text(self, path: Path) -> str | None:
+        """The text of a file, unsaved or on disk; None for one that cannot be read."""
+        opened = self._text_of(path)
+        if opened is not None:
+            return opened
+        found = read(path, str(path))
+        return found.text if isinstance(found, Source) else None
+
+    def _together(self, path: Path) -> list[Path]:
+        """A file, and the files of its folder that declare what it or one of these names.
+
+        A file that declares a name again is left out: a folder may hold many programs that have nothing to do with each other."""
+        texts = {other: text for other in sorted(path.parent.glob("*.st"))[:MOST_FILES]
+                 if other != path and (text := self.text(other)) is not None}
+        declared = {other: {fold(found[1]) for found in _DECLARES.finditer(text)} for other, text in texts.items()}
+        own = self.text(path) or ""
+        known = {fold(found[1]) for found in _DECLARES.finditer(own)}
+        chosen, words = [path], {fold(word) for word in _WORD.findall(own)}
+        while True:
+            more = [other for other, names in declared.items() if names & (words - known) and not names & known]
+            if not more:
+                return chosen
+            chosen.append(more[0])
+            words |= {fold(word) for word in _WORD.findall(texts[more[0]])}
+            known |= declared.pop(more[0])

@@ -1,0 +1,191 @@
+"""A program that is being edited: after each change its diagnostics are those of a program that was never edited."""
+
+from __future__ import annotations
+
+import random
+import re
+from pathlib import Path
+
+import pytest
+from depth import times
+from lang_corpus import programs
+from rows import each_of
+
+from fbvm.analysis.parts import File, spans
+from fbvm.analysis.program import Program
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.code.compiler import compile_sources
+
+TWO = """\
+FUNCTION_BLOCK Pump
+VAR_INPUT Level : INT; END_VAR
+VAR_OUTPUT Runs : BOOL; END_VAR
+    Runs := Level < 200;
+END_FUNCTION_BLOCK
+
+PROGRAM Main
+VAR P1 : Pump; On AT %QX0.0 : BOOL; END_VAR
+    P1(Level := 100);
+    On := P1.Runs;
+END_PROGRAM
+"""
+
+
+def edited(text: str, *changes: tuple[str, str]) -> Program:
+    """A checked program of one file in which texts were then replaced."""
+    program = Program()
+    program.replace("pump.st", text)
+    program.check_all()
+    for old, new in changes:
+        text = text.replace(old, new, 1)
+        program.replace("pump.st", text)
+    return program
+
+
+def codes(program: Program, name: str = "pump.st") -> list[tuple[str, int]]:
+    return [(each.code, each.line) for each in program.diagnostics(name)]
+
+
+def test_a_mistake_in_a_body_is_found_by_checking_that_body_alone() -> None:
+    program = edited(TWO, ("Level < 200", "Levl < 200"))
+    assert program.check_changes()
+    assert codes(program) == [("S0201", 4)]
+
+
+def test_a_new_pin_concerns_others_and_needs_a_whole_check() -> None:
+    program = edited(TWO, ("Level : INT", "Height : INT"))
+    assert not program.check_changes()
+    program.check_all()
+    assert codes(program) == [("S0201", 4), ("S0402", 9)]
+
+
+def test_a_local_variable_of_a_block_concerns_nobody_else() -> None:
+    program = edited(TWO, ("    Runs :=", "VAR n : INT; m : TON; END_VAR\n    n := 1.5; Runs :="))
+    assert program.check_changes()
+    assert codes(program) == [("S0301", 5)]
+
+
+def test_lines_in_front_move_messages_and_the_line_numbers_in_them() -> None:
+    program = edited(TWO.replace("On := P1.Runs;", "IF On THEN"), ("PROGRAM", "// one\n// two\nPROGRAM"))
+    program.check_all()
+    assert [(each.line, each.message) for each in program.diagnostics("pump.st")] == [
+        (13, "END_IF expected before `END_PROGRAM`: the IF of line 12 is still open")]
+
+
+def test_warnings_come_with_the_whole_check() -> None:
+    program = edited(TWO, ("Runs := Level < 200;", "Runs := Level < 200; ; RETURN; Runs := TRUE;"))
+    assert program.check_changes()
+    assert codes(program) == []
+    program.check_all()
+    assert [code for code, _ in codes(program)] == ["S0592"]
+
+
+def test_a_suppressed_warning_stays_so_in_all_later_parts() -> None:
+    text = TWO.replace("\nPROGRAM", "{warning disable S0290}\nPROGRAM").replace("On AT", "unused : INT; On AT")
+    assert codes(edited(text)) == []
+    assert codes(edited(text.replace("{warning disable S0290}", "//"))) == [("S0290", 8)]
+
+
+def test_a_check_that_is_given_up_changes_nothing() -> None:
+    program = edited(TWO, ("Level : INT", "Height : INT"))
+    steps = program.check()
+    next(steps)
+    steps.close()
+    assert not program.is_current
+    assert codes(program) == []
+    program.check_all()
+    assert codes(program) == [("S0201", 4), ("S0402", 9)]
+
+
+def test_files_see_one_another_and_what_is_removed_is_gone() -> None:
+    program = Program()
+    block, _, main = TWO.partition("PROGRAM")
+    program.replace("block.st", block)
+    program.replace("main.st", "PROGRAM" + main)
+    program.check_all()
+    assert codes(program, "main.st") == []
+    program.remove("block.st")
+    program.check_all()
+    assert codes(program, "main.st") == [("S0204", 2)]
+
+
+@each_of("text, count", [
+    ("FUNCTION A : INT\nEND_FUNCTION\nPROGRAM B\nEND_PROGRAM", 2),
+    ("PROGRAM A (* END_PROGRAM\n(* *) PROGRAM B *)\nEND_PROGRAM\nPROGRAM C\nEND_PROGRAM", 2),
+    ("PROGRAM A\nx := 'END_PROGRAM$'';\nEND_PROGRAM // ;\nTYPE T : INT; END_TYPE;", 2),
+    ("FUNCTION_BLOCK A\nACTION B: END_ACTION\nEND_FUNCTION_BLOCK\nACTION C: END_ACTION\nACTIONS A END_ACTIONS\n", 1),
+    ("CONFIGURATION C\nPROGRAM P : Main;\nVAR_GLOBAL x : INT; END_VAR\nEND_CONFIGURATION\nVAR_GLOBAL y : INT; END_VAR\n", 2),
+    ("FUNCTION_BLOCK open\nVAR END_VAR\nPROGRAM Main\nEND_PROGRAM\nPROGRAM C\nEND_PROGRAM", 2),
+    ("PROGRAM A\nLADDER\nLD 'END_PROGRAM\nEND_LADDER\nEND_PROGRAM\nPROGRAM B\nEND_PROGRAM", 2),
+    ("NAMESPACE A\nNAMESPACE B\nPROGRAM C\nEND_NAMESPACE\nEND_NAMESPACE\nPROGRAM D\nEND_PROGRAM", 2),
+    ("", 1),
+])
+def test_parts_are_the_declarations_of_a_text(text: str, count: int) -> None:
+    found = spans(text)
+    assert len(found) == count
+    assert "".join(text[start:end] for start, end in found) == text
+
+
+def test_only_the_changed_part_is_new() -> None:
+    file = File("a.st", TWO)
+    pairs = file.replace(TWO.replace("200", "300"))
+    assert [(old and old.base, new and new.base) for old, new in pairs] == [(0, 0)]
+    assert [part.base for part in file.parts] == [0, TWO.index("\nPROGRAM")]
+
+
+# --- edited = never edited --------------------------------------------------------------------------------------------
+
+PIECES = ("END_FUNCTION_BLOCK\n", "PROGRAM X\n", "END_PROGRAM", "(*", "*)", "'", ";", "x := 1;", "VAR y : INT; END_VAR\n", "\n",
+          "FUNCTION F : INT F := 1; END_FUNCTION\n", "// ", "LADDER\n", "END_LADDER\n", "ACTION A: x := 1; END_ACTION\n",
+          "TYPE T : INT; END_TYPE\n", "q", "END_VAR", " ")  # fmt: skip
+NEEDS_ALL = re.compile(r"S..9|S0408")
+"""Codes of messages for which the whole program has to be checked: warnings, and calls that come back."""
+
+
+def rows(found: list[Diagnostic]) -> list[object]:
+    return [(d.code, d.start, d.end, d.message, d.hint, d.related and d.related[1:]) for d in found]
+
+
+def fresh(text: str, dialect: str) -> list[Diagnostic]:
+    program = Program(dialect=dialect)
+    program.replace("x.st", text)
+    program.check_all()
+    return program.diagnostics("x.st")
+
+
+def check_edits(seed: int) -> None:
+    """Edit a text of three programs of the corpus at random; compare after each edit."""
+    chosen = random.Random(seed)
+    some = chosen.sample(list(programs()), 3)
+    text, dialect = "\n".join(each.text.strip() for each in some), some[0].dialect
+    program = Program(dialect=dialect)
+    program.replace("x.st", text)
+    program.check_all()
+    for _ in range(8):
+        at = chosen.randrange(len(text) + 1)
+        if chosen.random() < 0.5:
+            text = text[:at] + chosen.choice(PIECES) + text[at:]
+        else:
+            text = text[:at] + text[at + chosen.randrange(1, 12):]
+        program.replace("x.st", text)
+        wanted = fresh(text, dialect)
+        if program.check_changes():
+            errors = [[d for d in found if not NEEDS_ALL.match(d.code)] for found in (program.diagnostics("x.st"), wanted)]
+            assert rows(errors[0]) == rows(errors[1])
+        program.check_all()
+        assert rows(program.diagnostics("x.st")) == rows(wanted)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(times(12)))
+def test_after_any_edits_the_diagnostics_are_those_of_a_fresh_program(seed: int) -> None:
+    check_edits(seed)
+
+
+@pytest.mark.slow
+def test_diagnostics_are_those_of_the_compiler() -> None:
+    texts = [(each.text, each.dialect) for each in programs()]
+    texts += [(path.read_text(encoding="utf-8"), "standard") for path in (Path(__file__).parents[2] / "golden").rglob("*.st")]
+    for text, dialect in texts:
+        wanted = compile_sources([Source("x.st", text)], dialect=dialect).diagnostics
+        assert rows(fresh(text, dialect)) == rows(wanted), text

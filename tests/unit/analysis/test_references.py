@@ -1,0 +1,146 @@
+"""Names: where they are declared, where they stand, and how they are renamed."""
+
+from __future__ import annotations
+
+import pytest
+from editing import at_mark
+from lang_corpus import programs
+from rows import each_of
+
+from fbvm.analysis.declarations import find
+from fbvm.analysis.program import Program
+from fbvm.analysis.references import Refusal, applied, called, callers, declared_at, references, rename, use_at
+
+PLANT = """\
+TYPE
+    Mode : (Off, Filling);
+    Tank : STRUCT Level : INT; State : Mode; END_STRUCT;
+END_TYPE
+
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+    Twice := x * 2;
+END_FUNCTION
+
+FUNCTION_BLOCK Pump
+VAR_INPUT Level : INT; END_VAR
+VAR_OUTPUT Runs : BOOL; END_VAR
+    Runs := LEVEL < 200;
+END_FUNCTION_BLOCK
+
+VAR_GLOBAL Total : INT; END_VAR
+
+PROGRAM Main
+VAR P1 : Pump; T1 : Tank; hidden : INT; END_VAR
+    T1.Level := Twice(x := Total);
+    T1.State := Filling;
+    P1(Level := T1.Level); hidden := 1;
+    IF P1.Runs AND T1.State = Mode#Filling THEN Total := Total + 1; END_IF
+END_PROGRAM
+"""
+
+
+def plant(before: str, word: str) -> tuple[Program, int]:
+    """The plant, and the place of a word that stands behind a piece of its text."""
+    at = PLANT.index(before) + PLANT[PLANT.index(before):].index(word)
+    return at_mark(PLANT[:at] + "‸" + PLANT[at:])
+
+
+@each_of("before, word, line, count", [
+    ("P1(Level", "Level", 12, 3),
+    ("T1.Level := Twice", "Level", 3, 3),
+    ("Twice(x", "Twice", 6, 3),
+    ("Twice(x", "x", 7, 3),
+    ("P1.Runs", "Runs", 13, 3),
+    ("Total := Total", "Total", 17, 4),
+    ("State := Filling", "Filling", 2, 3),
+    ("Mode#Filling", "Mode", 2, 3),
+    ("P1 : Pump", "Pump", 11, 2),
+    ("P1 : Pump", "P1", 20, 3),
+])
+def test_a_name_leads_to_its_declaration_and_to_all_its_places(before: str, word: str, line: int, count: int) -> None:
+    program, offset = plant(before, word)
+    declared = declared_at(program, "pump.st", offset)
+    assert declared is not None
+    placed = program.place(declared.source)
+    assert placed is not None
+    assert placed[0].source.place(placed[1] + declared.node.start)[0] == line
+    assert len(references(program, declared.key)) == count
+
+
+def test_places_know_whether_they_read_or_write() -> None:
+    program, offset = plant("Total := Total", "Total")
+    used = use_at(program, "pump.st", offset)
+    assert used is not None
+    assert [place.role for place in references(program, used[1].key)] == ["declared", "read", "written", "read"]
+
+
+def test_a_pin_of_a_library_leads_into_the_library() -> None:
+    program, offset = at_mark("PROGRAM Main VAR t : TON; b : BOOL; END_VAR t(IN := TRUE); b := t.‸Q; END_PROGRAM")
+    declared = declared_at(program, "pump.st", offset)
+    assert declared is not None
+    assert (declared.source.library, declared.name) == ("iec", "Q")
+
+
+@each_of("before, word, new", [
+    ("P1(Level", "Level", "Height"), ("T1.Level := Twice", "Level", "Fuellstand"), ("Twice(x", "Twice", "Double"),
+    ("Total := Total", "Total", "TOTAL_2"), ("State := Filling", "Filling", "Fill"), ("P1 : Pump", "Pump", "Motor"),
+    ("Mode#Filling", "Mode", "Modes"), ("P1 : Pump", "P1", "P2"),
+])
+def test_a_renamed_program_has_no_errors(before: str, word: str, new: str) -> None:
+    program, offset = plant(before, word)
+    text = applied(rename(program, "pump.st", offset, new), new)["pump.st"]
+    assert new in text
+    program.replace("pump.st", text)
+    program.check_all()
+    assert program.diagnostics("pump.st") == []
+
+
+def test_all_files_are_renamed() -> None:
+    program = Program()
+    head, _, main = PLANT.partition("PROGRAM Main")
+    program.replace("blocks.st", head)
+    program.replace("main.st", "PROGRAM Main" + main)
+    program.check_all()
+    texts = applied(rename(program, "blocks.st", head.index("Pump"), "Motor"), "Motor")
+    assert ("FUNCTION_BLOCK Motor" in texts["blocks.st"], "P1 : Motor" in texts["main.st"]) == (True, True)
+
+
+@each_of("before, word, new, why", [
+    ("P1 : Pump", "P1", "T1", "T1 is declared twice in Main"),
+    ("P1 : Pump", "P1", "IF", "`IF` is a word of the language"),
+    ("P1 : Pump", "P1", "1P", "`1P` is no name"),
+    ("P1 : Pump", "P1", "Total", "x is Pump, but INT is needed here"),
+    ("Total : INT", "Total", "hidden", "`hidden` means something else in a place"),
+    ("T1.State = ", "T1", "INT", "`INT` is a reserved word"),
+])
+def test_a_name_that_clashes_is_refused(before: str, word: str, new: str, why: str) -> None:
+    program, offset = plant(before, word)
+    with pytest.raises(Refusal, match=why):
+        rename(program, "pump.st", offset, new)
+
+
+def test_a_name_of_a_library_is_not_renamed() -> None:
+    program, offset = at_mark("PROGRAM Main VAR t : ‸TON; END_VAR t(); END_PROGRAM")
+    with pytest.raises(Refusal, match="TON belongs to the library iec"):
+        rename(program, "pump.st", offset, "Timer")
+
+
+def test_who_calls_whom() -> None:
+    program, _ = plant("P1 : Pump", "P1")
+    assert [key for key, _ in callers(program, ("pou", "", "PUMP"))] == [("pou", "", "MAIN")]
+    assert sorted(key[2] for key, _ in called(program, ("pou", "", "MAIN"))) == ["PUMP", "TWICE"]
+
+
+@pytest.mark.slow
+def test_every_name_of_the_corpus_has_a_declaration() -> None:
+    lost = []
+    for each in programs():
+        if each.runs:
+            program = Program(dialect=each.dialect)
+            program.replace("x.st", each.text)
+            program.check_all()
+            assert program.checked is not None
+            lost += [(each.name, use.key) for part in program.parts() for use in program.uses(part)
+                     if use.key[0] != "standard" and find(program.checked.checker, use.key) is None]
+    assert lost == []

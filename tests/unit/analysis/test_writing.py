@@ -1,0 +1,133 @@
+"""What helps while one writes: hover, completion, the signature of a call, quick fixes."""
+
+from __future__ import annotations
+
+from editing import at_mark
+from rows import each_of
+
+from fbvm.analysis.calls import signature
+from fbvm.analysis.completion import complete, nearest
+from fbvm.analysis.fixes import applied, fixes
+from fbvm.analysis.hover import hover
+
+HEAD = """\
+TYPE Mode : (Off, Filling); Tank : STRUCT Level : INT; State : Mode; END_STRUCT; END_TYPE
+FUNCTION_BLOCK Pump // moves water
+VAR_INPUT Level : INT := 5; END_VAR
+VAR_OUTPUT Runs : BOOL; END_VAR
+VAR hidden : INT; END_VAR
+    Runs := Level < hidden; hidden := 0;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR
+    // the pump at the river
+    P1 : Pump;
+    T1 : ARRAY [0..3] OF Tank;
+    On AT %QX0.0 : BOOL; // lamp
+    D AT D200 : ARRAY [0..9] OF INT;
+END_VAR
+"""
+
+
+@each_of("line, parts", [
+    ("‸P1();", ["VAR P1 : Pump", "the pump at the river"]),
+    ("P1(Le‸vel := 3);", ["VAR_INPUT Level : INT := 5"]),
+    ("O‸n := TRUE;", ["VAR On AT %QX0.0 : BOOL", "lamp", "outputs of portable programs"]),
+    ("On := %QX0‸.0;", ["%QX0.0", "VAR On AT"]),
+    ("D[1] := AB‸S(-1);", ["ABS(IN : T) : T", "ANY_NUM"]),
+    ("T1[0].State := Fil‸ling;", ["Mode#Filling = 1"]),
+    ("T1[0].Le‸vel := 1;", ["Tank.Level : INT"]),
+    ("On := nobo‸dy;", ["# S0201 unknown name"]),
+    ("LADDER\nLD On\nMO‸V #1 D201\nEND_LADDER", ["MOV"]),
+])
+def test_hover_says_what_stands_there(line: str, parts: list[str]) -> None:
+    program, offset = at_mark(HEAD + line + "\nEND_PROGRAM\n")
+    shown = hover(program, "pump.st", offset)
+    assert shown is not None
+    assert [part for part in parts if part not in shown.markdown] == [], shown.markdown
+
+
+def test_hover_over_a_library_block_shows_its_page() -> None:
+    program, offset = at_mark("PROGRAM Main VAR t : T‸ON; END_VAR t(); END_PROGRAM")
+    shown = hover(program, "pump.st", offset)
+    assert shown is not None and "ET" in shown.markdown and "Library iec" in shown.markdown
+
+
+@each_of("line, first, absent", [
+    ("P1.‸", ["Level", "Runs"], ["hidden"]),
+    ("T1[2].‸", ["Level", "State"], []),
+    ("T1[2].State := Mode#‸", ["Filling", "Off"], []),
+    ("P1(‸", ["Level :=", "Runs =>"], []),
+    ("P1(Level := 3, ‸", ["Runs =>"], ["Level :="]),
+    ("‸", ["D", "On", "P1", "T1"], ["hidden", "END_VAR"]),
+    ("LADDER\n‸\nEND_LADDER", ["*", "*B"], ["IF"]),
+])
+def test_completion_offers_what_fits(line: str, first: list[str], absent: list[str]) -> None:
+    program, offset = at_mark(HEAD + line + "\nEND_PROGRAM\n")
+    offered = [item.label for item in nearest(complete(program, "pump.st", offset))]
+    assert offered[:len(first)] == first
+    assert not set(absent) & set(offered)
+
+
+@each_of("line, some", [
+    ("x : ‸", {"Pump", "Tank", "INT", "TON"}), ("x AT ‸", {"D210", "CIO", "%M"}), ("‸", {"END_VAR"}),
+    ("x : ARRAY [0..1] OF ‸", {"Tank", "WORD"}),
+])
+def test_completion_in_a_section_offers_types_and_free_addresses(line: str, some: set[str]) -> None:
+    program, offset = at_mark(HEAD.removesuffix("END_VAR\n") + line + "\nEND_VAR\nEND_PROGRAM\n")
+    assert some <= {item.label for item in complete(program, "pump.st", offset)}
+
+
+def test_completion_between_declarations_offers_declarations() -> None:
+    program, offset = at_mark("‸")
+    assert "FUNCTION_BLOCK" in {item.label for item in complete(program, "pump.st", offset)}
+
+
+@each_of("line, label, active", [
+    ("P1(‸", "Pump(Level := INT, Runs => BOOL)", 0),
+    ("P1(Level := (1 + 2), ‸", "Pump(Level := INT, Runs => BOOL)", 1),
+    ("P1(Runs => On, Level := ‸", "Pump(Level := INT, Runs => BOOL)", 0),
+    ("D[0] := SEL(On, ‸1, 2);", "SEL(G : BOOL, IN0 : T, IN1 : T) : T  (T: ANY)", 1),
+])
+def test_the_signature_of_a_call_marks_the_present_argument(line: str, label: str, active: int) -> None:
+    program, offset = at_mark(HEAD + line + "\nEND_PROGRAM\n")
+    shown = signature(program, "pump.st", offset)
+    assert shown is not None
+    assert (shown.label, shown.active) == (label, active)
+
+
+@each_of("line, mended", [
+    ("On := P1.‸Run;", "On := P1.Runs;"),
+    ("On := TRUE‸", "On := TRUE;"),
+    ("On ‸= TRUE;", "On := TRUE;"),
+    ("‸Onn := TRUE;", "On := TRUE;"),
+    ("IF On ‸== TRUE THEN On := FALSE; END_IF", "IF On = TRUE THEN On := FALSE; END_IF"),
+    ("D[0] := ‸1.5;", None),
+    ("IF On THEN On := FALSE;‸", "IF On THEN On := FALSE;\nEND_IF;"),
+])
+def test_a_hint_becomes_a_quick_fix_that_helps(line: str, mended: str | None) -> None:
+    program, offset = at_mark(HEAD + line + "\nEND_PROGRAM\n")
+    assert len(program.diagnostics("pump.st")) > 0
+    found = fixes(program, "pump.st", offset, offset + 1)
+    texts = [applied(program.files["pump.st"].text, fix.edits) for fix in found]
+    if mended is None:
+        assert texts == []
+    else:
+        assert HEAD + mended + "\nEND_PROGRAM\n" in texts, [fix.title for fix in found]
+
+
+def test_an_unknown_name_is_declared_with_a_type_that_fits() -> None:
+    program, offset = at_mark(HEAD + "D[0] := ‸speed;\nEND_PROGRAM\n")
+    assert [fix.title for fix in fixes(program, "pump.st", offset, offset)] == ["Declare speed : INT"]
+
+
+def test_a_warning_can_be_mended_or_suppressed() -> None:
+    text = "PROGRAM Main\nVAR\n    ‸unused : INT;\n    b AT %QX0.0 : BOOL;\nEND_VAR\nb := TRUE;\nEND_PROGRAM\n"
+    program, offset = at_mark(text)
+    found = fixes(program, "pump.st", offset, offset)
+    assert [fix.title for fix in found] == ["Remove unused", "Suppress S0290 on this line"]
+    for fix in found:
+        program, _ = at_mark(text)
+        program.replace("pump.st", applied(program.files["pump.st"].text, fix.edits))
+        program.check_all()
+        assert program.diagnostics("pump.st") == []
