@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fbvm.base.types import fold
 from fbvm.code.image import Site
-from fbvm.machine.breakpoints import find_line
+from fbvm.machine.source_lines import find_line
 from fbvm.record.trace.events import Statement
 from fbvm.step.session import Session
 from fbvm.watch.conditions import Condition, ConditionError, parse_condition, split_condition
