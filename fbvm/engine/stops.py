@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from fbvm.base.areas import NOW, SCANS
@@ -149,7 +149,7 @@ class StopTable:
     `at` is the address of the buffer that machine code reads."""
 
     def __init__(self, memory: Memory, sites: int) -> None:
-        self._memory = memory
+        self.memory = memory
         self._watched: list[Watchpoint] = []
         self._rows_of_lines: list[LineStop] = []
         self._lines: dict[int, list[LineStop]] = {}
@@ -178,7 +178,7 @@ class StopTable:
         rows = list(rows)
         for row in rows:
             if isinstance(row, Watchpoint) and row not in self._watched:
-                row.begin(self._memory)
+                row.begin(self.memory)
         self._watched = [row for row in rows if isinstance(row, Watchpoint)]
         ctypes.memset(self.table, WATCHING if self._watched else 0, len(self.table))
         self._lines = {}
@@ -190,10 +190,13 @@ class StopTable:
         self._rows = (ctypes.c_uint8 * (ROW_BYTES * sum(len(row.chunks) for row in self._watched) or 1))()
         self._write_rows()
 
-    def begin(self) -> None:
-        """From now on a change is a difference from what the memory is now."""
+    def begin(self, passes: Mapping[LineStop | Watchpoint, int]) -> None:
+        """From now on a change is a difference from what the memory is now; rows count on from `passes`, or from 0."""
         for row in self._watched:
-            row.begin(self._memory)
+            row.begin(self.memory)
+            row.passes = passes.get(row, 0)
+        for line in self._rows_of_lines:
+            line.passes = passes.get(line, 0)
         self._write_rows()
 
     def hit(self, site: int, statement: bool, base: int | None = None) -> bool:
@@ -204,7 +207,7 @@ class StopTable:
         found: list[LineStop | Watchpoint] = []
         changed = False
         for row in self._watched:
-            now = row.seen(self._memory)
+            now = row.seen(self.memory)
             if now != row.last:
                 changed = True
                 found += [row] * row.changed(now)
@@ -223,7 +226,7 @@ class StopTable:
         text = line.message(base)
         if text is None:
             return True
-        self.told.append(Told(site, int(self._memory.read(SCANS, "i64")), int(self._memory.read(NOW, "i64")), text))
+        self.told.append(Told(site, int(self.memory.read(SCANS, "i64")), int(self.memory.read(NOW, "i64")), text))
         return False
 
     @property

@@ -5,7 +5,7 @@ on.  Runs keep the speed of machine code, which looks into a table; only the sca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol, cast
 
@@ -231,9 +231,18 @@ class BreakpointRows:
 
     # --- looking ------------------------------------------------------------------------------------------------------
 
-    def begin(self) -> None:
-        """From now on a change is a difference from what the memory is now."""
-        self._stops.begin()
+    def use(self, memory: Memory) -> None:
+        """Looks at another memory of the same program from now on; only where no machine code runs with these breakpoints."""
+        self._stops.memory = memory
+
+    def begin(self, passes: Mapping[Breakpoint, int] | None = None) -> None:
+        """From now on a change is a difference from what the memory is now; passes count on from `passes`, or from 0."""
+        self._stops.begin({self._rows[said]: count for said, count in (passes or {}).items() if said in self._rows})
+
+    @property
+    def passes(self) -> dict[Breakpoint, int]:
+        """How often each was passed, with its condition TRUE."""
+        return {said: row.passes for said, row in self._rows.items()}
 
     def look(self, site: int, is_statement: bool, base: int | None = None) -> bool:
         """True if one is reached: before a statement or rung, or (`is_statement` False) behind a write; site -1 is the end of a

@@ -17,10 +17,9 @@ class Position:
 
 @dataclass(frozen=True)
 class Reached:
-    """Breakpoints that were reached, and where: the PLC, the position, and the site of the statement that stopped or wrote (NO_SITE
-    for none).
+    """Breakpoints that were reached, and where: the PLC, the position, and the site of the statement that stopped or wrote.
 
-    `reasons` has a line for each of `breakpoints`, or one for something else that stopped it, whose `kind` is then that of an
+    The site is NO_SITE for none.  `reasons` has a line for each of `breakpoints`, or one for something else that stopped it, whose `kind` is then that of an
     exception filter."""
 
     plc: str

@@ -90,10 +90,8 @@ class Player(ABC):
         self._stop: Stop = lambda number, statement: False
         self._listener: MomentListener | None = None
 
-    @property
-    @abstractmethod
-    def memory(self) -> Memory:
-        """The memory at this moment."""
+    memory: Memory
+    """The memory at this moment."""
 
     @property
     @abstractmethod
@@ -151,6 +149,7 @@ class ScanReplay(Player):
     def __init__(self, plc: Plc) -> None:
         super().__init__(ProgramFacts.of(plc))
         self.plc = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
+        self.memory = self.plc.memory
         self._engine = self.plc.engine = ObservedEngine(plc.image, self.plc.memory, self._event, self.plc.engine)
         self.plc.phases.append(lambda plc, phase: self._over(phase))
         self._actions: Mapping[int, Sequence[Action]] = {}
@@ -172,10 +171,6 @@ class ScanReplay(Player):
         with suppress(Paused):
             self.plc.scan()
         return self.statement is not None
-
-    @property
-    def memory(self) -> Memory:
-        return self.plc.memory
 
     @property
     def now_ns(self) -> int:

@@ -226,9 +226,9 @@ class World:
     def _again(self, name: str, scan: int) -> None:
         """Puts the PLCs before a scan of one of them: by its state if it is alone and has no units, else as new PLCs."""
         live = self._live[name]
-        live.near.clear()
         if len(self._live) == 1 and not live.plc.units and not live.plc.watchers and scan >= live.recorded.scans.start:
             live.plc.restore(self.state(name, scan))
+            live.near.clear()
             live.timed = {at: done for at, done in live.timed.items() if at < scan}
             return
         self._build({one: row.actions for one, row in self._live.items()})
