@@ -187,7 +187,7 @@ class Debugger:
         else:
             session.go_to(here)
             session.back()
-        self._follow_focus()
+        self.follow_focus()
 
     # --- forwards
 
@@ -297,10 +297,10 @@ class Debugger:
     def _stand(self, position: Position) -> Reached | None:
         """Goes to a position of the focus, and with the other PLCs to where they are at that time."""
         self.session.go_to(position)
-        self._follow_focus()
+        self.follow_focus()
         return self._trapped()
 
-    def _follow_focus(self) -> None:
+    def follow_focus(self) -> None:
         """Lets the other PLCs stand where they are at the time of the focus."""
         world = self.here.world
         if world is None or len(self.plcs) == 1:

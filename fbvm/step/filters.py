@@ -30,7 +30,8 @@ class Filter(NamedTuple):
 FILTERS = (
     Filter("trap", "Traps", "an index outside its array, a division by zero, ...", True),
     Filter("watchdog", "Watchdog", "a scan has used up its statements, or its watch cycle time", True),
-    Filter("modbus", "Modbus exception replies", "a reply with an exception code passed the network", False, "the code, such as 2"),
+    Filter("modbus", "Modbus exception replies", "a reply with an exception code passed the network", False,
+           "the code, such as 2"),
     Filter("response", "Response codes that are not 0", "an Ethernet unit ended a request with a response code", True,
            "the code, such as 16#0302"),
     Filter("warning", "Warnings of the run", "what the program asks and the PLC does not do", False),
@@ -41,7 +42,7 @@ WATCHDOG_CODES = ("R0103", "R0112")
 
 @dataclass
 class BetweenScans:
-    """The filters "modbus" and "response" of one PLC.  `wanted` has those that are on, with the codes that count, none for all."""
+    """The filters "modbus" and "response" of one PLC.  `wanted` has those that are on, with their codes, none for all."""
 
     wanted: Mapping[str, frozenset[int]]
     found: str = ""

@@ -40,7 +40,7 @@ class RecordingPlayer(Player):
     def phase(self, moment: Moment, phase: Phase) -> None:
         """Called at the end of a phase."""
         self._moment, self.memory = moment, moment.memory
-        if phase is Phase.REFRESH:
+        if phase is not Phase.INPUTS:
             self._trap = self._trap_in(moment.scans)
         self._over(phase)
 

@@ -19,8 +19,8 @@ class Position:
 class Reached:
     """Breakpoints that were reached, and where: the PLC, the position, and the site of the statement that stopped or wrote.
 
-    The site is NO_SITE for none.  `reasons` has a line for each of `breakpoints`, or one for something else that stopped it, whose `kind` is then that of an
-    exception filter."""
+    The site is NO_SITE for none.  `reasons` has a line for each of `breakpoints`, or one for something else that stopped the run,
+    whose `kind` is then the name of an exception filter."""
 
     plc: str
     position: Position

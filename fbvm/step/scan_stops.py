@@ -50,7 +50,7 @@ class ScanStops:
 
     def look(self, scan: int, *, after: int = -1, before: int = END, state: State | None = None, ends: Ends | None = None,
              last: bool = False, passes: Mapping[Breakpoint, int] | None = None) -> Looked:  # fmt: skip
-        """Plays a scan and looks for the first position behind statement `after` and before statement `before`, or the `last` one.
+        """Plays a scan and looks for the first position, or the `last` one, behind statement `after` and before `before`.
 
         `state` is what breakpoints had seen before; without, changes count from statement `after` on, and passes from `passes`.
         The session's player stands where a position was reached or the move ended, else at the end of the program."""
