@@ -27,6 +27,7 @@ VERB_GROUPS = {
         "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
         "run": "Run a program, in virtual time or over real TCP.",
         "step": "Step through the scans of a program, forth and back.",
+        "dap": "Debug programs from an editor, forth and back.",
         "replay": "Do a run again from its journal.",
         "serve": "Serve the memory of a PLC by Modbus TCP, through its server program.",
         "map": "Print under which addresses Modbus clients find words and bits.",

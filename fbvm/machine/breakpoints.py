@@ -5,38 +5,44 @@ on.  Runs keep the speed of machine code, which looks into a table; only the sca
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol, cast
 
-from fbvm.base.digits import whole_number
 from fbvm.base.memory import Memory
-from fbvm.base.types import fold
 from fbvm.code.image import Image, Site
-from fbvm.code.shapes import statements
-from fbvm.engine.choice.stoppable import STATEMENTS, StoppableEngine
+from fbvm.engine.choice.stoppable import StoppableEngine
 from fbvm.engine.choice.tiers import Engine, choice_of, substitutes_of
 from fbvm.engine.observation import NO_SITE
-from fbvm.engine.stops import LineStop, StopTable, Test, Watchpoint
+from fbvm.engine.stops import LineStop, LineTest, State, StopTable, Test, Told, Watchpoint
 from fbvm.engine.trap import Trap
+from fbvm.machine.messages import parse_message
+from fbvm.machine.passes import parse_passes
+from fbvm.machine.source_lines import Lines, find_lines
 from fbvm.watch.changes import changed
 from fbvm.watch.conditions import Condition, parse_condition
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
+from fbvm.watch.scopes import Scope, instances, place_of
 from fbvm.watch.values import Value, show
 
 
-class Stoppable(Protocol):
-    """What breakpoints see of their PLC; a `Plc` has it."""
+class Inspected(Protocol):
+    """What breakpoints see of their PLC; a `Plc` has it, and so has one that is past."""
 
-    image: Image
     memory: Memory
-    engine: Engine
-    scans: int
 
     def find(self, text: str) -> Place | Span: ...
 
     def read(self, where: str | Place | Span) -> Value: ...
+
+
+class Stoppable(Inspected, Protocol):
+    """A PLC that stops at breakpoints."""
+
+    image: Image
+    engine: Engine
+    scans: int
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,10 @@ class Breakpoint:
     """The line ("main.st:12"), the variable or address, or the condition."""
     when: str = ""
     """A further condition, such as "D100 > 5"; "" for none."""
+    hits: str = ""
+    """At which passes it stops, as `parse_passes` takes it; "" for all."""
+    message: str = ""
+    """What a log point tells instead of stopping; "" for a breakpoint."""
 
     def __str__(self) -> str:
         return self.where + (f" when {self.when}" if self.when else "")
@@ -80,23 +90,26 @@ class Halt:
     """The breakpoints that stopped it, in the order in which they were set."""
     frames: tuple[Frame, ...]
     """The bodies in execution, the innermost first."""
+    task: int = 0
+    """The number of the task in the image."""
+    statement: int = 0
+    """How many statements and rungs this task has begun before in this scan."""
 
     def __str__(self) -> str:
         place = str(self.site) if self.site else f"end of {self.frames[-1].pou}"
         return f"{place}, scan {self.scan}: {'; '.join(self.reasons)}"
 
 
-class Breakpoints:
-    """The breakpoints of a PLC, in the order in which they were set."""
+class BreakpointRows:
+    """The breakpoints of a PLC with this image, in the order in which they were set, and whether one is reached.
 
-    def __init__(self, plc: Stoppable) -> None:
-        self._plc = plc
+    `plc` is what conditions read."""
+
+    def __init__(self, plc: Inspected, image: Image) -> None:
+        self._inspected, self._image = plc, image
         self._rows: dict[Breakpoint, LineStop | Watchpoint] = {}
-        self._stops = StopTable(plc.memory, len(plc.image.sites))
-        self._stoppable: StoppableEngine | None = None
-        self._stands_in: tuple[object, object] = None, None
-        self.halted: Halt | None = None
-        """Where the scan stands, if one does."""
+        self._stops = StopTable(plc.memory, len(image.sites))
+        self._names = Names.of(image, image.layout.areas)
 
     def __iter__(self) -> Iterator[Breakpoint]:
         return iter(self._rows)
@@ -104,39 +117,49 @@ class Breakpoints:
     def __len__(self) -> int:
         return len(self._rows)
 
-    @property
-    def armed(self) -> bool:
-        """True if a scan could stop, or stands."""
-        return bool(self._rows) or self.halted is not None
-
     # --- setting ------------------------------------------------------------------------------------------------------
 
-    def line(self, where: str, when: str = "") -> Breakpoint:
+    def line(self, where: str, when: str = "", hits: str = "", message: str = "") -> Breakpoint:
         """Stops before a statement.
 
-        `where` is `pump.st:12` (the next statement if that line has none) or the name of a POU (its first statement); `when` is
-        a condition as `Plc.run` takes it.  Raises ValueError if there is no such line or POU, or if the PLC is observed."""
-        found, sites = find_line(self._plc.image, where)
-        condition = self._condition(when)
-        return self._put(Breakpoint("line", found, when), LineStop(sites, self._test(condition)))
+        `where` is `pump.st:12` (the next statement if that line has none), the name of a POU (its first statement), `Main#3` for
+        a rung or `Main.P1` for one instance; `when` is a condition as `Plc.run` takes it, in which variables of the POU need no
+        path; `hits` says at which passes it stops (see `parse_passes`).  With a `message` such as "n is {n}" it does not stop:
+        `take_told` returns what it told.  Raises ValueError if there is no such line or POU, or if the PLC is observed."""
+        lines = find_lines(self._image, where)
+        test = self._line_test(lines, when)
+        if lines.base is not None:
+            test = _of_instance(lines.base, test)
+        row = LineStop(lines.sites, test, parse_passes(hits), self._message(lines, message))
+        return self._put(Breakpoint("line", lines.where, when, hits, message), row)
 
-    def change(self, where: str, when: str = "") -> Breakpoint:
+    def change(self, where: str, when: str = "", hits: str = "") -> Breakpoint:
         """Stops behind the statement that changed a variable, an address or a range of addresses (as `Plc.find` takes them).
 
         A change between two scans is found at the first statement of the second.  Raises UnknownPlace, ValueError for what
         lies behind a reference or if the PLC is observed."""
-        found = self._plc.find(where)
+        found = self._inspected.find(where)
         condition = self._condition(when)
         extents, mask = _extents(found)
-        row = Watchpoint(extents, mask, test=self._test(condition), read=lambda: self._plc.read(found))
-        return self._put(Breakpoint("change", where, when), row)
+        row = Watchpoint(extents, mask, test=self._test(condition), read=lambda: self._inspected.read(found),
+                         wanted=parse_passes(hits))  # fmt: skip
+        return self._put(Breakpoint("change", where, when, hits), row)
 
-    def condition(self, when: str) -> Breakpoint:
+    def condition(self, when: str, hits: str = "") -> Breakpoint:
         """Stops behind the statement that makes a condition TRUE: `n > 5 AND D100 = 0`.  Raises ValueError as `change` does."""
         condition = self._condition(when)
         assert condition is not None
         extents: list[tuple[int, int]] = [run for place in condition.places for run in _extents(place)[0]]
-        return self._put(Breakpoint("condition", when), Watchpoint(extents, test=self._test(condition), edge=True))
+        row = Watchpoint(extents, test=self._test(condition), edge=True, wanted=parse_passes(hits))
+        return self._put(Breakpoint("condition", when, "", hits), row)
+
+    def put(self, breakpoint: Breakpoint) -> Breakpoint:
+        """Sets the same breakpoint as on another PLC with this image.  Raises as the method for its kind."""
+        if breakpoint.kind == "line":
+            return self.line(breakpoint.where, breakpoint.when, breakpoint.hits, breakpoint.message)
+        if breakpoint.kind == "change":
+            return self.change(breakpoint.where, breakpoint.when, breakpoint.hits)
+        return self.condition(breakpoint.where, breakpoint.hits)
 
     def remove(self, breakpoint: Breakpoint) -> None:
         """Removes a breakpoint.  Raises KeyError if it is not set."""
@@ -149,16 +172,150 @@ class Breakpoints:
         self._stops.put(())
 
     def _put(self, breakpoint: Breakpoint, row: LineStop | Watchpoint) -> Breakpoint:
-        choice_of(self._plc.engine)
         self._rows[breakpoint] = row
         self._stops.put(self._rows.values())
         return breakpoint
 
     def _condition(self, text: str) -> Condition | None:
-        return parse_condition(text, self._plc.find) if text else None
+        return parse_condition(text, self._inspected.find) if text else None
 
     def _test(self, condition: Condition | None) -> Test | None:
-        return (lambda: condition.holds(self._plc.read)) if condition else None
+        return (lambda: condition.holds(self._inspected.read)) if condition else None
+
+    # --- names inside a POU -------------------------------------------------------------------------------------------
+
+    def _scope(self, base: int | None) -> Scope:
+        """The names inside the instance that begins at a byte."""
+        return Scope(self._inspected.find, place_of(self._inspected.find, self._names.instance(base)) if base else None)
+
+    def _known_base(self, lines: Lines) -> tuple[bool, int | None]:
+        """Whether one instance is known to be meant, and where it begins: 0 for a POU that has none."""
+        pous = {self._image.sites[site].pou for site in lines.sites}
+        if lines.base is not None:
+            return True, lines.base
+        found = instances(self._image.symbols, next(iter(pous)), 2) if len(pous) == 1 else []
+        return len(found) < 2 and len(pous) == 1, found[0].offset if len(found) == 1 else 0
+
+    def _line_test(self, lines: Lines, when: str) -> LineTest | None:
+        """The test of a condition in which variables of the POU need no path."""
+        if not when:
+            return None
+        is_known, only = self._known_base(lines)
+        some = instances(self._image.symbols, self._image.sites[min(lines.sites)].pou, 1)
+        tried = Scope(self._inspected.find, some[0] if some else None)
+        parse_condition(when, tried.find)  # says at once what is wrong with it
+        parsed: dict[int, Condition] = {}
+
+        def test(base: int | None) -> bool | None:
+            at = only if is_known else base
+            if at is None:
+                return None
+            if at not in parsed:
+                parsed[at] = parse_condition(when, self._scope(at).find)
+            return parsed[at].holds(self._inspected.read)
+
+        return test
+
+    def _message(self, lines: Lines, text: str) -> Callable[[int | None], str | None] | None:
+        """A function that says the message of a log point in an instance."""
+        if not text:
+            return None
+        message = parse_message(text)
+        is_known, only = self._known_base(lines)
+
+        def said(base: int | None) -> str | None:
+            at = only if is_known or not message.names else base
+            return None if at is None else message.text(self._scope(at).find, self._inspected.read)
+
+        return said
+
+    # --- looking ------------------------------------------------------------------------------------------------------
+
+    def use(self, memory: Memory) -> None:
+        """Looks at another memory of the same program from now on; only where no machine code runs with these breakpoints."""
+        self._stops.memory = memory
+
+    def begin(self, passes: Mapping[Breakpoint, int] | None = None) -> None:
+        """From now on a change is a difference from what the memory is now; passes count on from `passes`, or from 0."""
+        self._stops.begin({self._rows[said]: count for said, count in (passes or {}).items() if said in self._rows})
+
+    @property
+    def passes(self) -> dict[Breakpoint, int]:
+        """How often each was passed, with its condition TRUE."""
+        return {said: row.passes for said, row in self._rows.items()}
+
+    def look(self, site: int, is_statement: bool, base: int | None = None) -> bool:
+        """True if one is reached: before a statement or rung, or (`is_statement` False) behind a write; site -1 is the end of a
+        program.  `base` is the byte at which the instance of the body begins."""
+        return self._stops.hit(site, is_statement, base)
+
+    @property
+    def reached(self) -> list[Breakpoint]:
+        """Those that were reached at the last look, in the order in which they were set."""
+        return [said for said, row in self._rows.items() if row in self._stops.reasons]
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why, a line for each of `reached`."""
+        return [self._reason(said, self._rows[said]) for said in self.reached]
+
+    @property
+    def state(self) -> State:
+        """What was seen so far, for `restore`, here or with the same breakpoints on another PLC."""
+        return self._stops.state
+
+    def restore(self, state: State) -> None:
+        """Undoes all looks since a state, because the memory goes back, too."""
+        self._stops.back(state)
+
+    def take_told(self) -> list[Told]:
+        """What log points told since the last call, the oldest first."""
+        told, self._stops.told[:] = self._stops.told[:], []
+        return told
+
+    def _reason(self, said: Breakpoint, row: LineStop | Watchpoint) -> str:
+        if isinstance(row, Watchpoint) and said.kind == "change":
+            whole = self._inspected.find(said.where)
+            found, before, after = changed(whole, cast(Value, row.before), cast(Value, row.value))
+            name = said.where if found is whole else found.name
+            return f"{name} was {self._shown(found, before)}, is {self._shown(found, after)}"
+        return f"{said.where} holds" if said.kind == "condition" else f"breakpoint {said}"
+
+    def _shown(self, found: Place | Span, value: Value) -> str:
+        return show(found.type, self._names.name_references(found.type, value)) if isinstance(found, Place) else str(value)
+
+
+def _of_instance(base: int, test: LineTest | None) -> LineTest:
+    """The test that also wants one instance."""
+
+    def of_instance(here: int | None) -> bool | None:
+        if here is None:
+            return None
+        return here == base and (test is None or test(here) is True)
+
+    return of_instance
+
+
+class Breakpoints(BreakpointRows):
+    """The breakpoints of a PLC that runs, at which its scans stand still."""
+
+    def __init__(self, plc: Stoppable) -> None:
+        super().__init__(plc, plc.image)
+        self._plc = plc
+        self._stoppable: StoppableEngine | None = None
+        self._stands_in: tuple[object, object] = None, None
+        self._task = 0
+        self.halted: Halt | None = None
+        """Where the scan stands, if one does."""
+
+    @property
+    def armed(self) -> bool:
+        """True if a scan could stop, or stands."""
+        return bool(self._rows) or self.halted is not None
+
+    def _put(self, breakpoint: Breakpoint, row: LineStop | Watchpoint) -> Breakpoint:
+        choice_of(self._plc.engine)
+        return super()._put(breakpoint, row)
 
     # --- running, for the PLC -----------------------------------------------------------------------------------------
 
@@ -169,7 +326,7 @@ class Breakpoints:
             stoppable = self._stoppable
             trap = stoppable.go_on()
         else:
-            stoppable = self.stoppable(engine)
+            stoppable, self._task = self.stoppable(engine), task_index
             stoppable.allow(engine.allowance)
             trap = stoppable.run(task_index)
         if stoppable.seen:
@@ -195,83 +352,8 @@ class Breakpoints:
         for call in reversed(stoppable.calls):
             frames.append(Frame(image.bodies[call.body].name, call.base, None if at == NO_SITE else image.sites[at]))
             at = call.site
-        rows = [(said, row) for said, row in self._rows.items() if row in self._stops.reasons]
-        reasons = [self._reason(said, row) for said, row in rows]
-        return Halt(self._plc.scans, frames[0].site, tuple(reasons), tuple(said for said, _ in rows), tuple(frames))
-
-    def _reason(self, said: Breakpoint, row: LineStop | Watchpoint) -> str:
-        if isinstance(row, Watchpoint) and said.kind == "change":
-            whole = self._plc.find(said.where)
-            found, before, after = changed(whole, cast(Value, row.before), cast(Value, row.value))
-            name = said.where if found is whole else found.name
-            return f"{name} was {self._shown(found, before)}, is {self._shown(found, after)}"
-        return f"{said.where} holds" if said.kind == "condition" else f"breakpoint {said}"
-
-    def _shown(self, found: Place | Span, value: Value) -> str:
-        image = self._plc.image
-        names = Names.of(image, self._plc.memory.areas)
-        return show(found.type, names.name_references(found.type, value)) if isinstance(found, Place) else str(value)
-
-
-def find_line(image: Image, where: str) -> tuple[str, frozenset[int]]:
-    """The line that `where` means, as `FILE:LINE`, and the numbers of the sites at which a breakpoint there stops.
-
-    `where` is `FILE:LINE` (the next line with a statement, if that one has none; of the file's path its last parts are enough)
-    or the name of a POU (the line of its first statement).  Of several statements on one line the first one counts, in each
-    POU that has some there.  Raises ValueError, whose message names the files or POUs that there are."""
-    file, colon, number = where.rpartition(":")
-    statements = _statements(image)
-    if colon and number.strip().isdecimal():
-        inside = _of_file(statements, file.strip())
-        line = _line_from(inside, whole_number(number), where)
-    else:
-        inside = _of_pou(statements, where.strip())
-        line = min(site.line for site in inside.values())
-    sites = _first_of_each_pou({number: site for number, site in inside.items() if site.line == line})
-    return f"{image.sites[sites[0]].file}:{line}", frozenset(sites)
-
-
-def _of_pou(statements: dict[int, Site], name: str) -> dict[int, Site]:
-    """The statements of the POU of that name.  Raises ValueError if there are none."""
-    inside = {number: site for number, site in statements.items() if fold(site.pou) == fold(name)}
-    if not inside:
-        pous = ", ".join(sorted({site.pou for site in statements.values() if site.pou}))
-        raise ValueError(f"{name!r} is neither FILE:LINE nor a POU with statements; POUs are {pous or 'none'}")
-    return inside
-
-
-def _of_file(statements: dict[int, Site], path: str) -> dict[int, Site]:
-    """The statements of the files whose paths end as `path` does, or with which `path` ends.  Raises ValueError."""
-    inside = {number: site for number, site in statements.items()
-              if f"/{site.file}".endswith(f"/{path}") or f"/{path}".endswith(f"/{site.file}")}  # fmt: skip
-    if not inside:
-        files = ", ".join(sorted({site.file for site in statements.values()}))
-        raise ValueError(f"no statement is in {path!r}; files are {files or 'none'}")
-    return inside
-
-
-def _line_from(statements: dict[int, Site], line: int, where: str) -> int:
-    """The first line from `line` on that has a statement.  Raises ValueError behind the last one."""
-    lines = {site.line for site in statements.values()}
-    following = [other for other in lines if other >= line]
-    if not following:
-        raise ValueError(f"{where}: the last statement of {where.rpartition(':')[0]} is on line {max(lines)}")
-    return min(following)
-
-
-def _first_of_each_pou(statements: dict[int, Site]) -> list[int]:
-    """Of statements on one line the first one of each POU, by the numbers of their sites."""
-    columns: dict[tuple[str, str], int] = {}
-    for site in statements.values():
-        pou = site.file, site.pou
-        columns[pou] = min(site.column, columns.get(pou, site.column))
-    return [number for number, site in statements.items() if site.column == columns[site.file, site.pou]]
-
-
-def _statements(image: Image) -> dict[int, Site]:
-    """The places of all statements, by the numbers of their sites."""
-    return {node[2]: image.sites[node[2]] for body in image.bodies for node in statements(body.code)
-            if node[0] == "observe" and node[1] in STATEMENTS}  # fmt: skip
+        return Halt(self._plc.scans, frames[0].site, tuple(self.reasons), tuple(self.reached), tuple(frames), self._task,
+                    stoppable.statement)  # fmt: skip
 
 
 def _extents(found: Place | Span) -> tuple[list[tuple[int, int]], int]:

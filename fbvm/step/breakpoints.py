@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from fbvm.base.types import fold
 from fbvm.code.image import Site
-from fbvm.machine.breakpoints import find_line
+from fbvm.machine.source_lines import find_line
 from fbvm.record.trace.events import Statement
-from fbvm.step.session import Session
+from fbvm.step.stepping import Stepping
 from fbvm.watch.conditions import Condition, ConditionError, parse_condition, split_condition
 
 Reached = Callable[[Statement | None], bool]
@@ -33,12 +33,12 @@ class Watched:
     condition: Condition | None = None
 
 
-def parse_breakpoint(text: str, session: Session, here: Site | None) -> Breakpoint:
+def parse_breakpoint(text: str, session: Stepping, here: Site | None) -> Breakpoint:
     """The breakpoint that a text names: `15`, `pump.st:15`, `Pump`, `Pump IF Main.Count > 5`, `Main.Count > 5`.
 
     `here` is the current statement, in whose file a line number alone is.  Raises ValueError for a line behind the last
     statement, ConditionError for a text that is no condition."""
-    image = session.plc.image
+    image = session.facts.image
     where, when = split_condition(text)
     if where.isdecimal():
         where = f"{here.file if here else image.sites[0].file}:{where}"

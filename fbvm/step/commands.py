@@ -19,8 +19,8 @@ from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.recorder import signals_at
 from fbvm.step.breakpoints import Breakpoint, Reached, Watched, any_reached, first_reached, parse_breakpoint
 from fbvm.step.scan_replay import Action
-from fbvm.step.session import Session
 from fbvm.step.session_events import SessionEvents
+from fbvm.step.stepping import Stepping
 from fbvm.step.stop_report import StopReport
 from fbvm.watch.conditions import ConditionError, parse_condition, split_condition
 from fbvm.watch.names import is_single
@@ -94,7 +94,7 @@ class Commands:
 
     `report` makes the texts, `packets` returns the packets of the network so far.  `ended` is True after `quit`."""
 
-    def __init__(self, session: Session, report: StopReport, packets: Callable[[], list[Packet]] = list) -> None:
+    def __init__(self, session: Stepping, report: StopReport, packets: Callable[[], list[Packet]] = list) -> None:
         self.session, self.report = session, report
         self.watches: list[Watched] = []
         self.breakpoints: list[Breakpoint] = []
@@ -155,7 +155,7 @@ class Commands:
         self.session.goto(_count(rest, least=0))
 
     def _run(self, rest: str) -> Iterator[str]:
-        cycle_ns, here = self.session.plc.cycle_ns, self.session.statement
+        cycle_ns, here = self.session.facts.cycle_ns, self.session.statement
         if re.fullmatch(r"(?:T#)?[\d.]+\s*[a-zA-Z]\w*", rest, re.I):
             scans = max(1, -(-parse_time_ns(rest) // cycle_ns))
             if self.breakpoints:
@@ -297,7 +297,7 @@ class Commands:
         return self.report.calls()
 
     def _net(self, rest: str) -> Iterator[str]:
-        end_ns, cycle_ns = self.session.now_ns, self.session.plc.cycle_ns
+        end_ns, cycle_ns = self.session.now_ns, self.session.facts.cycle_ns
         start_ns = end_ns - _count(rest) * cycle_ns
         for row in self._packets():
             if start_ns <= row.now_ns < end_ns:
@@ -340,7 +340,7 @@ class Commands:
         return completed(self.session, takes, re.split(r"[\s,(]", rest)[-1], list(COMMANDS_BY_WORD))
 
 
-def completed(session: Session, takes: str, word: str, words: Mapping[str, object] | list[str]) -> list[str]:
+def completed(session: Stepping, takes: str, word: str, words: Mapping[str, object] | list[str]) -> list[str]:
     """Completions of a word: paths of the program, or for `help` names of commands."""
     if takes == "command":
         return [each for each in words if each.startswith(word)]
@@ -354,7 +354,7 @@ def completed(session: Session, takes: str, word: str, words: Mapping[str, objec
             return []
         names = [field.name for field in getattr(getattr(place, "type", None), "fields", {}).values()]
     else:
-        names = [field.name for field in session.plc.image.symbols.values()]
+        names = [field.name for field in session.facts.image.symbols.values()]
     return [f"{front}{dot}{name}" for name in names if fold(name).startswith(fold(last))]
 
 
@@ -366,7 +366,7 @@ def _count(text: str, least: int = 1) -> int:
     return whole_number(text)
 
 
-def _place(session: Session, text: str) -> Place:
+def _place(session: Stepping, text: str) -> Place:
     found = session.find(text) if text else None
     if not isinstance(found, Place) or not is_single(found):
         raise CommandError("name one variable, not a block, an array or a range" if found else "name something")

@@ -6,6 +6,7 @@ The second PLC starts in the state before that scan.  It has no units: the I/O r
 from __future__ import annotations
 
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,7 +19,9 @@ from fbvm.record.draw.power import PowerFlow
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartRecorder
 from fbvm.record.trace.events import Event, Frame, ObservedEngine, Statement
-from fbvm.watch.paths import Place, Span
+from fbvm.step.facts import ProgramFacts
+from fbvm.watch import places
+from fbvm.watch.paths import Place, Span, find
 from fbvm.watch.values import Value
 
 Action = Callable[[Plc], None]
@@ -46,37 +49,110 @@ class PastMoment:
         return self.plc.read(where)
 
 
+class Moment(Protocol):
+    """The memory of a PLC during scan number `scans`, at time `now_ns`."""
+
+    @property
+    def memory(self) -> Memory: ...
+    @property
+    def scans(self) -> int: ...
+    @property
+    def now_ns(self) -> int: ...
+    def read(self, where: str | Place | Span) -> Value: ...
+
+
 class MomentListener(Protocol):
     """Receives the phases and events of a scan until execution stops."""
 
-    def phase(self, moment: PastMoment, phase: Phase) -> None: ...
-    def event(self, moment: PastMoment, event: Event) -> None: ...
+    def phase(self, moment: Moment, phase: Phase) -> None: ...
+    def event(self, moment: Moment, event: Event) -> None: ...
 
 
-class _Paused(Exception):
+class Paused(Exception):
     """Leaves a scan before its end."""
 
 
-class ScanReplay:
-    """Executes scans of the program of `plc` on a PLC of its own, `self.plc`.
+class Player(ABC):
+    """Plays scans that are past, up to any of their statements.
 
-    After `play` execution has stopped before `statement`; None is the end of the program, or a `trap`."""
+    After `play` it stands before `statement`; None is the end of the program, or a `trap`."""
 
-    def __init__(self, plc: Plc) -> None:
-        self.plc = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
-        self._engine = self.plc.engine = ObservedEngine(plc.image, self.plc.memory, self._event, self.plc.engine)
-        self.plc.phases.append(self._phase)
+    def __init__(self, facts: ProgramFacts) -> None:
+        self.facts = facts
         self.statement: Statement | None = None
         self.count = 0
         """Statements of the scan that have been executed."""
-        self.values = RungValues(plc.image, self.plc.memory.areas)
-        self.power = PowerFlow(plc.image.rungs, lambda scan: True, self.values.keep)
+        self.values = RungValues(facts.image, facts.areas)
+        self.power = PowerFlow(facts.rungs, lambda scan: True, self.values.keep)
         """The rungs that the scan has executed, with their power."""
-        self.chart_recorder = ChartRecorder(plc.image.charts, lambda scan: True)
+        self.chart_recorder = ChartRecorder(facts.charts, lambda scan: True)
         """The charts that the scan has executed."""
         self._stop: Stop = lambda number, statement: False
-        self._actions: Mapping[int, Sequence[Action]] = {}
         self._listener: MomentListener | None = None
+
+    memory: Memory
+    """The memory at this moment."""
+
+    @property
+    @abstractmethod
+    def now_ns(self) -> int:
+        """The time of this scan."""
+
+    @property
+    @abstractmethod
+    def trap(self) -> Trap | None:
+        """The trap that ended the program in this scan."""
+
+    @property
+    @abstractmethod
+    def moment(self) -> Moment:
+        """The state at this moment, for listeners."""
+
+    def find(self, text: str) -> Place | Span:
+        """The place or span of places that `text` names.  Raises UnknownPlace."""
+        return find(self.facts.symbols, self.facts.areas, text)
+
+    def read(self, where: str | Place | Span) -> Value:
+        """A value at this moment.  Raises UnknownPlace."""
+        return places.read_found(self.memory, self.find(where) if isinstance(where, str) else where)
+
+    def _begin(self, stop: Stop, listener: MomentListener | None) -> None:
+        self.statement, self.count = None, 0
+        self.power = PowerFlow(self.facts.rungs, lambda scan: True, self.values.keep)
+        self.chart_recorder = ChartRecorder(self.facts.charts, lambda scan: True)
+        self._stop, self._listener = stop, listener
+
+    def _over(self, phase: Phase) -> None:
+        """Called at the end of a phase; leaves the scan at the end of its program."""
+        if phase is not Phase.REFRESH and self._listener:
+            self._listener.phase(self.moment, phase)
+        if phase is not Phase.INPUTS:
+            raise Paused
+
+    def _see(self, event: Event) -> None:
+        """Called for each event; leaves the scan before the statement at which it stops."""
+        moment = self.moment
+        self.power.event(moment, event)
+        self.chart_recorder.event(moment, event)
+        if isinstance(event, Statement):
+            if self._stop(self.count, event):
+                self.statement = event
+                raise Paused
+            self.count += 1
+        if self._listener:
+            self._listener.event(moment, event)
+
+
+class ScanReplay(Player):
+    """Executes scans of the program of `plc` on a PLC of its own, `self.plc`."""
+
+    def __init__(self, plc: Plc) -> None:
+        super().__init__(ProgramFacts.of(plc))
+        self.plc = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
+        self.memory = self.plc.memory
+        self._engine = self.plc.engine = ObservedEngine(plc.image, self.plc.memory, self._event, self.plc.engine)
+        self.plc.phases.append(lambda plc, phase: self._over(phase))
+        self._actions: Mapping[int, Sequence[Action]] = {}
 
     def play(self, state: State, actions: Mapping[int, Sequence[Action]], stop: Stop,
              listener: MomentListener | None = None) -> bool:  # fmt: skip
@@ -85,43 +161,34 @@ class ScanReplay:
         `actions` are carried out before the statements with their numbers, those of number 0 before the scan.  `listener`
         receives the events up to there."""
         self.plc.restore(state)
-        self.statement, self.count = None, 0
-        self.power = PowerFlow(self.plc.image.rungs, lambda scan: True, self.values.keep)
-        self.chart_recorder = ChartRecorder(self.plc.image.charts, lambda scan: True)
-        self._stop, self._actions, self._listener = stop, actions, listener
+        self._begin(stop, listener)
+        self._actions = actions
         self._engine.stands_still = any(actions)  # they change the memory in the middle of the scan
         if self.plc.trap:
             return False
         for action in actions.get(0, ()):
             action(self.plc)
-        with suppress(_Paused):
+        with suppress(Paused):
             self.plc.scan()
         return self.statement is not None
 
     @property
+    def now_ns(self) -> int:
+        return self.plc.now_ns
+
+    @property
     def trap(self) -> Trap | None:
-        """The trap that ended the program in this scan."""
         return self.plc.trap
 
-    def _phase(self, plc: Plc, phase: Phase) -> None:
-        if phase is not Phase.REFRESH and self._listener:
-            self._listener.phase(PastMoment(plc, plc.scans, plc.now_ns), phase)
-        if phase is not Phase.INPUTS:
-            raise _Paused
+    @property
+    def moment(self) -> PastMoment:
+        return PastMoment(self.plc, self.plc.scans, self.plc.now_ns)
 
     def _event(self, event: Event) -> None:
-        self.power.event(self.plc, event)
-        self.chart_recorder.event(self.plc, event)
-        if isinstance(event, Statement):
-            if self.count:
-                for action in self._actions.get(self.count, ()):
-                    action(self.plc)
-            if self._stop(self.count, event):
-                self.statement = event
-                raise _Paused
-            self.count += 1
-        if self._listener:
-            self._listener.event(PastMoment(self.plc, self.plc.scans, self.plc.now_ns), event)
+        if self.count and isinstance(event, Statement):
+            for action in self._actions.get(self.count, ()):
+                action(self.plc)
+        self._see(event)
 
 
 class ActionInjector:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from fbvm.code.image import Site
-from fbvm.machine.plc import Plc
 from fbvm.record.draw.why import Follower
 from fbvm.record.trace.outline import outer_statements
-from fbvm.step.session import Session
+from fbvm.step.scan_replay import Moment
+from fbvm.step.stepping import Stepping
 from fbvm.step.stop_report import StopReport
 from fbvm.watch.names import Names
 
@@ -14,19 +14,19 @@ from fbvm.watch.names import Names
 class SessionEvents:
     """The events up to the position of the session."""
 
-    def __init__(self, session: Session, report: StopReport) -> None:
+    def __init__(self, session: Stepping, report: StopReport) -> None:
         self._session, self._report = session, report
         self.names: Names = session.names
-        self.sites = session.plc.image.sites
-        self.outer = outer_statements(session.plc.image)
+        self.sites = session.facts.image.sites
+        self.outer = outer_statements(session.facts.image)
 
     @property
     def scans(self) -> range:
         return range(self._session.here.scan + 1)
 
-    def at(self, scan: int) -> Plc:
-        """The PLC of the session; `why` asks for the current scan only."""
-        return self._session.plc
+    def at(self, scan: int) -> Moment:
+        """The moment at which the session stands; `why` asks for the current scan only."""
+        return self._session.player.moment
 
     def follow(self, follower: Follower, scans: range | None = None) -> None:
         """Reports the phases and events of some scans, or of all, to `follower`."""

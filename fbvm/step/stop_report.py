@@ -10,7 +10,7 @@ from fbvm.record.draw.ladder_text import ladder_text
 from fbvm.record.draw.sfc_recorder import active_steps
 from fbvm.record.draw.sfc_text import ChartState, sfc_text
 from fbvm.record.trace.events import Frame
-from fbvm.step.session import Session
+from fbvm.step.stepping import Stepping
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, show, show_time
@@ -26,10 +26,10 @@ WIDE = 32
 class StopReport:
     """Makes texts about the current position of a session; `texts` are the sources by name."""
 
-    def __init__(self, session: Session, texts: Mapping[str, str]) -> None:
+    def __init__(self, session: Stepping, texts: Mapping[str, str]) -> None:
         self._session = session
         self._lines = {name: text.split("\n") for name, text in texts.items()}
-        self.sites = session.plc.image.sites
+        self.sites = session.facts.image.sites
 
     def site(self) -> Site | None:
         """The statement that is executed next, or that a trap has ended."""
@@ -55,7 +55,7 @@ class StopReport:
 
     def instance(self, frame: Frame) -> str:
         """The path of an instance; a function has only its name."""
-        return self._session.names.instance(frame.base) or self._session.plc.image.bodies[frame.body].name
+        return self._session.names.instance(frame.base) or self._session.facts.body_name(frame.body)
 
     def around(self, lines: int = AROUND) -> Iterator[str]:
         """The source around the next statement, whose line is marked with >; `lines` before and behind it."""
@@ -79,7 +79,7 @@ class StopReport:
 
     def rung(self, number: int | None) -> Iterator[str]:
         """The drawing of rung `number` of this POU; without a number of the last and the next rung.  Raises ValueError."""
-        statement, image = self._session.statement, self._session.plc.image
+        statement, image = self._session.statement, self._session.facts.image
         mine = [rung for rung in image.rungs if statement and rung.body == statement.frame.body]
         if not mine or statement is None:
             raise ValueError("there are no rungs here")
@@ -96,14 +96,14 @@ class StopReport:
 
     def chart(self) -> Iterator[str]:
         """The drawing of the chart of this POU with its active steps.  Raises ValueError if the POU is no chart."""
-        statement, image = self._session.statement, self._session.plc.image
+        statement, image = self._session.statement, self._session.facts.image
         here = image.bodies[statement.frame.body].name if statement else ""
         for chart in image.charts:
             name = image.bodies[chart.body].name
             if statement and here in (name, f"{name}.{here.rpartition('.')[2]}"):
                 base = statement.frame.base
                 tested = [made.tested for made in self._session.charts if made.picture is chart and made.base == base]
-                active = active_steps(chart, base, self._session.plc)
+                active = active_steps(chart, base, self._session.player.moment)
                 yield from sfc_text(chart, WIDEST_RUNG, ChartState(active, tested[-1] if tested else {}))
                 return
         raise ValueError("there is no chart here")
@@ -124,7 +124,7 @@ class StopReport:
             return
         frame, site = statement.frame, statement.site
         while frame.caller is not None:
-            yield f"  {short(self.sites[site]):<20} {self.instance(frame)} ({self._session.plc.image.bodies[frame.body].name})"
+            yield f"  {short(self.sites[site]):<20} {self.instance(frame)} ({self._session.facts.body_name(frame.body)})"
             frame, site = frame.caller, frame.site
 
     def value(self, text: str) -> str:
@@ -143,9 +143,8 @@ class StopReport:
         text = f"{name} = {show(place.type, value)}"
         if place.area and isinstance(value, int) and not isinstance(value, bool):
             text += f" ({show(place.type, value, hexadecimal=True)})"
-        for attached in self._session.units.units:
-            if place.area and (said := getattr(attached.unit, "descriptions", {}).get(name)):
-                text += f"   {said}"
+        if place.area and (said := self._session.facts.described.get(name)):
+            text += f"   {said}"
         return text
 
 

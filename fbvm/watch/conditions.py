@@ -39,6 +39,15 @@ class Condition:
             return False
 
 
+def parse_expression(text: str, find: Find) -> Term:
+    """The expression that `text` writes, of any type.  Raises ConditionError."""
+    parser = _Parser(text, find)
+    term = parser.level(0).resolved()
+    if parser.kind:
+        raise ConditionError(f"{parser.word!r} is not expected in {text!r}")
+    return term
+
+
 def parse_condition(text: str, find: Find) -> Condition:
     """The condition that `text` writes.  `find` finds places by name.  Raises ConditionError for a text that is no condition, or
     a comparison that can never hold."""

@@ -59,7 +59,7 @@ def command(
         image = with_e_banks(image, e_banks_in([*watched, *(given.name for given in settings)]))
         debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
         texts = source_texts(image, {str(path): path for path in files}, libraries)
-    session = Session(debugged.make)
+    session = Session.of(debugged.make)
     commands = Commands(session, StopReport(session, texts), lambda: debugged.packets)
     try:
         for given in settings:

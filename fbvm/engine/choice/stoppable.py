@@ -59,6 +59,12 @@ class StoppableEngine:
         self.seen: Observation | None = None
         self.calls: list[Call] = []
         """The bodies in execution where a run stands, the innermost last."""
+        self._begun = self._generated = 0
+
+    @property
+    def statement(self) -> int:
+        """How many statements and rungs the run had begun when it stopped, without those of calls that the compiler has added."""
+        return self._begun - (self.seen is not None and self.seen[0] in STATEMENTS)
 
     @property
     def native(self) -> bool:
@@ -121,6 +127,7 @@ class StoppableEngine:
         """Does what `run` does on the observed Python build."""
         before = int(self._memory.read(BUDGET, "i64"))
         self._steps, self.calls = self._python.observe(task_index), []
+        self._begun = self._generated = 0
         trap = self.go_on()
         self._executed += before - int(self._memory.read(BUDGET, "i64"))
         if self._code and self._executed >= STATEMENTS_TO_PAY:
@@ -147,13 +154,16 @@ class StoppableEngine:
         kind, site, detail = seen
         if kind == "call":
             body, base = detail
+            self._generated += bool(self._generated) or bool(self.calls) and site == NO_SITE
             self.calls.append(Call(body, base, site))
         elif kind == "return":
-            if site == NO_SITE and self._stops.hit(NO_SITE, False):
+            if site == NO_SITE and not self._generated and self._stops.hit(NO_SITE, False):
                 return True  # before the program is taken off: the run stands at its end
+            self._generated -= bool(self._generated)
             self.calls.pop()
         elif kind == "write":
             return self._stops.hit(site, False)
         elif kind in STATEMENTS:
-            return self._stops.hit(site, True)
+            self._begun += not self._generated
+            return self._stops.hit(site, True, self.calls[-1].base)
         return False

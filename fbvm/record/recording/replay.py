@@ -128,13 +128,18 @@ class Replay:
         plc.cycle_ns = self._recorded.plc.cycle_ns
 
     def scan(self) -> None:
-        """Executes one scan with its inputs."""
-        self._enter()
+        """Executes one scan with its inputs, or goes on with one that stands at a breakpoint."""
         plc, number = self.plc, self.plc.scans
-        inputs = self._recorded.inputs(number)
-        if inputs and inputs.scan == number:
-            self._apply(inputs)
-        plc.scan(self._recorded.now_ns(number))
+        if plc.halted:
+            plc.scan()
+        else:
+            self._enter()
+            inputs = self._recorded.inputs(number)
+            if inputs and inputs.scan == number:
+                self._apply(inputs)
+            plc.scan(self._recorded.now_ns(number))
+        if plc.halted:
+            return
         self._results.clear()
         plc.engine.allowance = WHOLE_BUDGET
 

@@ -36,6 +36,11 @@ class RecordedScans(ScanSource):
         self.described, self.meanings = descriptions(plc), meanings(plc)
 
     @property
+    def recorded(self) -> PlcRecording:
+        """The recording that the scans are of."""
+        return self._recorded
+
+    @property
     def scans(self) -> range:
         """Numbers from the first to the last scan that there is, one that was interrupted among them."""
         scans = self._recorded.begun

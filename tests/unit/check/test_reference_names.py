@@ -109,7 +109,7 @@ def test_why_and_stepping_say_it(trace: Trace) -> None:
     place = trace.find("Main.element")
     assert isinstance(place, Place)
     assert cause_text(trace, why(trace, place, 2)).startswith("Main.element = -> Main.a[2] since scan 2")
-    session = Session(made)
+    session = Session.of(made)
     words = StopReport(session, {})
     session.scan()
     session.mark()

@@ -25,7 +25,7 @@ CONTROL_C, CONTROL_D = "\x03", "\x04"
 def commands() -> Commands:
     image = compile_text(TEXT).image
     assert image is not None
-    session = Session(lambda: Plc(image))
+    session = Session.of(lambda: Plc(image))
     return Commands(session, StopReport(session, {}))
 
 

@@ -19,7 +19,7 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.record.recording import recording as recording_module
 from fbvm.record.recording.recording import Recording
-from fbvm.step import session as session_module
+from fbvm.step import world as world_module
 from fbvm.step.commands import COMMANDS, CommandError, Commands, ExpectationError
 from fbvm.step.session import Position, Session
 from fbvm.step.stop_report import StopReport
@@ -53,7 +53,7 @@ def made(text: str = TEXT) -> Commands:
     compilation = compile_text(text)
     assert compilation.image is not None
     image = compilation.image
-    session = Session(lambda: Plc(image))
+    session = Session.of(lambda: Plc(image))
     return Commands(session, StopReport(session, {image.sites[0].file: text}))
 
 
@@ -117,12 +117,12 @@ def test_a_place_is_the_same_however_one_got_there(moves: list[str], button: int
 @pytest.mark.slow
 @each_of("room", [64 << 20, 100_000])
 def test_any_scan_is_there_however_long_ago(room: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session_module, "Recording", lambda: Recording(limit_bytes=room))
+    monkeypatch.setattr(world_module, "Recording", lambda: Recording(limit_bytes=room))
     monkeypatch.setattr(recording_module, "AGAIN_NS", 1_000_000)
     commands = made()
     said(commands, "scan 100", "Main.R := 7", "step", "Main.N := 1000", "scan 900")
     session = commands.session
-    assert (session._recorded.scans.start > 0) == (room < 1 << 20)
+    assert (session.world.recorded("plc").scans.start > 0) == (room < 1 << 20)
     for scan, number in ((1000, 1899), (40, 40), (100, 100), (101, 1000), (700, 1599), (3, 3), (999, 1898)):
         session.goto(scan)
         assert (session.here, session.read("Main.N"), session.read("Main.R")) == (Position(scan), number, 7 * (scan >= 100))
@@ -414,7 +414,7 @@ def demo() -> Callable[[], Plc]:
 
 @pytest.mark.slow
 def test_back_goes_back_with_unit_and_network(demo: Callable[[], Plc]) -> None:
-    session = Session(demo)
+    session = Session.of(demo)
     assert session.run(lambda statement: session.read("Main.Done") is True, 100)
     assert session.read("D200..D202") == [100, 101, 102]
     session.goto(3)

@@ -1,0 +1,235 @@
+"""What a debugger opens, from the arguments of `launch`: programs, projects, recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.base.dialects import DIALECTS
+from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
+from fbvm.cli.shared.networks import build_network, mailbox_names
+from fbvm.cli.shared.options import Mapping as Mapped
+from fbvm.cli.shared.options import mapping
+from fbvm.code.compiler import compile_files
+from fbvm.code.image import Image
+from fbvm.dap.target import LaunchError, Target, checked
+from fbvm.machine.backplane import usual_units
+from fbvm.machine.plc import Plc
+from fbvm.net.loop import LoopNetwork
+from fbvm.record.trace.packets import Dissector, Packet
+from fbvm.record.trace.source_texts import source_texts
+from fbvm.run.plant import ENDLESS, Plant
+from fbvm.run.project import FILE, Project, project_file, read_project
+from fbvm.run.running import TimedWrite
+from fbvm.step.position import Position
+from fbvm.step.session import Session
+from fbvm.step.world import Debugged, World
+from fbvm.watch.places import parse_for
+from fbvm.watch.values import parse_time_ns
+from fbvm.wire.tap import TapEvent
+
+LAUNCH: dict[str, tuple[type, ...]] = {
+    "program": (str, list), "project": (str,), "plc": (str,), "main": (str,), "resource": (str,), "libraries": (list,),
+    "dialect": (str,), "cycle": (str,), "timing": (str,), "seed": (int,), "engine": (str,), "map": (list,), "set": (list,),
+    "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,),
+}  # fmt: skip
+"""The keys of a launch configuration, and what their values are; `docs/guides/debugger.md` describes each."""
+
+
+def open_launch(arguments: Mapping[str, Any]) -> Target:
+    """What `launch` asks for.  Raises LaunchError."""
+    given = checked(arguments, LAUNCH, "launch")
+    chosen = [key for key in ("program", "project") if key in given]
+    if len(chosen) != 1:
+        raise LaunchError("launch has either program (a file, a list of files or a folder) or project (an fbvm.toml)")
+    folder = Path(given.get("cwd", "."))
+    try:
+        if chosen[0] == "program" and not (isinstance(given["program"], str) and _is_project(folder / given["program"])):
+            return _program(given, folder)
+        return _project(given, folder / given[chosen[0]])
+    except (click.ClickException, LookupError, TypeError, ValueError, OSError) as error:
+        said = error.format_message() if isinstance(error, click.ClickException) else str(error)
+        raise LaunchError(said) from None
+
+
+def _is_project(path: Path) -> bool:
+    return path.suffix == ".toml" or (path.is_dir() and project_file(path) is not None)
+
+
+def _sources(given: Mapping[str, Any], folder: Path) -> list[Path]:
+    named = given["program"] if isinstance(given["program"], list) else [given["program"]]
+    found: list[Path] = []
+    for name in named:
+        path = folder / str(name)
+        found += sorted(path.glob("*.st")) if path.is_dir() else [path]
+    if not found:
+        raise LaunchError(f"there are no sources in {given['program']}")
+    for path in found:
+        if not path.is_file():
+            raise LaunchError(f"there is no file {path}")
+    return found
+
+
+def _program(given: Mapping[str, Any], folder: Path) -> Target:
+    """A program on a PLC with its units and a network in memory."""
+    if given.get("dialect", "standard") not in DIALECTS:
+        raise LaunchError(f"there is no dialect {given['dialect']!r}; there are {', '.join(DIALECTS)}")
+    files, libraries = _sources(given, folder), [folder / str(path) for path in given.get("libraries", ())]
+    compilation = compile_files(files, program=given.get("main"), libraries=libraries, runnable=True, drawn=True,
+                                resource=given.get("resource"), dialect=given.get("dialect", "standard"))  # fmt: skip
+    image = _image(compilation.image, compilation.diagnostics)
+    sets = [_SetRow.of(row) for row in given.get("set", ())]
+    image = with_e_banks(image, e_banks_in([row.name for row in sets] + list(given.get("force", {}))))
+    cycle_ns = _time_ns(given.get("cycle", "10ms"))
+    mappings = tuple(mapping(str(row)) for row in given.get("map", ()))
+    timing, seed = given.get("timing", "exact"), given.get("seed", 0)
+    if timing not in ("exact", "real"):
+        raise LaunchError(f"timing is exact or real, not {timing!r}")
+    tapped = _Tapped()
+
+    def make() -> list[Debugged]:
+        plc = Plc(image, cycle_ns, engine=given.get("engine", "auto"))
+        network = network_in_memory(mappings, seed)
+        tapped.listen(network)
+        for unit in usual_units(mailbox_names(image), timing, seed):
+            plc.attach(unit, network)
+        return [Debugged("plc", plc, [row.of_plc(plc) for row in sets])]
+
+    texts = source_texts(image, {str(path): path for path in files}, libraries)
+    return _target(given, World(make), texts, {str(path): path for path in files}, tapped, cycle_ns,
+                   _said(compilation.diagnostics))  # fmt: skip
+
+
+def network_in_memory(mappings: Iterable[Mapped], seed: int) -> LoopNetwork:
+    """A network in memory with a Modbus server at each mapped endpoint.  Raises LaunchError for one outside."""
+    rows = tuple(mappings)
+    for row in rows:
+        if row.host is not None:
+            raise LaunchError(f"the debugger's network stays in memory: map {row.endpoint}=peer")
+    network = build_network("loop", rows, seed)
+    assert isinstance(network, LoopNetwork)
+    return network
+
+
+def _project(given: Mapping[str, Any], path: Path) -> Target:
+    """The PLCs of a project, which share one time and one network in memory."""
+    own = {"main", "resource", "libraries", "dialect", "cycle", "engine", "timing", "map"} & set(given)
+    if own:
+        raise LaunchError(f"{', '.join(sorted(own))}: with a project its file says that")
+    file = project_file(path) if path.is_dir() else path
+    if file is None or not file.is_file():
+        raise LaunchError(f"there is no {FILE} in {path}" if path.is_dir() else f"there is no file {path}")
+    project = read_project(file)
+    if not isinstance(project, Project):
+        raise LaunchError(f"{file.name} has errors", _said(project))
+    tapped, sets = _Tapped(), [_SetRow.of(row) for row in given.get("set", ())]
+
+    def plant() -> Plant:
+        made = Plant(project, net="loop", for_ns=ENDLESS)
+        if errors(made.diagnostics):
+            raise LaunchError("the program has errors", _said(made.diagnostics))
+        return made
+
+    first = plant()
+    names = [name for kind in first.kinds for name in kind.names]
+    chosen = given.get("plc", names[0])
+    if chosen not in names:
+        raise LaunchError(f"there is no PLC {chosen}; there is {', '.join(names)}")
+    notes = _said(first.diagnostics)
+    first.close()
+
+    def make() -> list[Debugged]:
+        made = plant()
+        assert isinstance(made.network, LoopNetwork)
+        tapped.listen(made.network)
+        rows = [Debugged(name, run.plc, list(run.writes)) for kind in made.kinds
+                for name, run in zip(kind.names, kind.runs, strict=True)]  # fmt: skip
+        for row in rows:
+            if row.name == chosen:
+                row.writes = [*row.writes, *(one.of_plc(row.plc) for one in sets)]
+        return rows
+
+    world = World(make)
+    texts: dict[str, str] = {}
+    for kind in first.kinds:
+        files = {str(path): path for path in kind.row.sources}
+        texts |= source_texts(kind.runs[0].plc.image, files, kind.row.libraries)
+    paths = {str(path): path for kind in first.kinds for path in kind.row.sources}
+    target = _target(given, world, texts, paths, tapped, world[chosen].cycle_ns, notes)
+    target.sessions = {name: target.sessions[name] for name in [chosen, *(name for name in names if name != chosen)]}
+    return target
+
+
+def _target(given: Mapping[str, Any], world: World, texts: Mapping[str, str], paths: Mapping[str, Path], tapped: _Tapped,
+            cycle_ns: int, notes: str) -> Target:  # fmt: skip
+    sessions = {name: Session(world, name) for name in world.names}
+    first = next(iter(sessions.values())) if "plc" not in given else sessions[given["plc"]]
+    for name, value in given.get("force", {}).items():
+        place = first.find(name)
+        parsed = parse_for(place, _text(value))
+        first.act(lambda plc, name=name, parsed=parsed: plc.force(name, parsed))  # type: ignore[misc]
+    until = None
+    if "for" in given or "scans" in given:
+        bounds = [given["scans"]] if "scans" in given else []
+        until = min([*bounds, *([-(-_time_ns(given["for"]) // cycle_ns)] if "for" in given else [])])
+    assert first.here == Position()
+    return Target(sessions, texts, paths, lambda: tapped.packets, until, given.get("stopOnEntry"), [notes] if notes else [])
+
+
+class _Tapped:
+    """The packets of the network that was made last."""
+
+    def __init__(self) -> None:
+        self.packets: list[Packet] = []
+
+    def listen(self, network: LoopNetwork) -> None:
+        """Dissects what passes a network from now on."""
+        self.packets, dissector = [], Dissector(once=True)
+
+        def tap(now_ns: int, unit: str, event: TapEvent) -> None:
+            self.packets.extend(dissector.dissect(now_ns, event))
+
+        network.tap = tap
+
+
+class _SetRow:
+    """A row of `set`: a name, a value as a text, and when it is written."""
+
+    def __init__(self, name: str, value: str, at_ns: int) -> None:
+        self.name, self.value, self.at_ns = name, value, at_ns
+
+    @classmethod
+    def of(cls, row: Any) -> _SetRow:
+        """The row of an object.  Raises LaunchError."""
+        if not isinstance(row, dict) or not {"name", "value"} <= set(row) <= {"name", "value", "at"}:
+            raise LaunchError(f'a row of set is {{"name": ..., "value": ..., "at": "50ms"}}, not {row!r}')
+        return cls(str(row["name"]), _text(row["value"]), _time_ns(row["at"]) if "at" in row else 0)
+
+    def of_plc(self, plc: Plc) -> TimedWrite:
+        """What is written into a PLC."""
+        place = plc.find(self.name)
+        return TimedWrite(place, parse_for(place, self.value), self.at_ns)
+
+
+def _text(value: object) -> str:
+    """A JSON value as a literal of a program."""
+    return str(value).upper() if isinstance(value, bool) else str(value)
+
+
+def _time_ns(text: object) -> int:
+    return parse_time_ns(str(text))
+
+
+def _image(image: Image | None, diagnostics: Iterable[Diagnostic]) -> Image:
+    """The image.  Raises LaunchError with what the compiler says if there is none."""
+    if image is None:
+        raise LaunchError("the program has errors", _said(diagnostics))
+    return image
+
+
+def _said(diagnostics: Iterable[Diagnostic]) -> str:
+    return "\n".join(diagnostic.render() for diagnostic in diagnostics)

@@ -1,0 +1,133 @@
+"""What is typed: expressions, the commands of `fbvm step`, completions, and values for hovers and lines."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from fbvm.base.types import fold
+from fbvm.dap.session import Arguments, Body, DebugSession, Refusal
+from fbvm.dap.variables import text_of, variable
+from fbvm.step.commands import COMMANDS_BY_WORD, CommandError, completed
+from fbvm.watch.conditions import ConditionError, parse_expression
+from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.scopes import Scope
+from fbvm.watch.values import show
+
+_WORD = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[[^\]]*\])*")
+_SILENT = re.compile(r"\(\*.*?\*\)|//.*|'[^']*'|\"[^\"]*\"")
+KEPT_BACK = {"quit", "break", "unbreak"}
+"""Commands that an editor has of its own."""
+
+
+def evaluate(debug: DebugSession, arguments: Arguments) -> Body:
+    """evaluate: an expression, or in any context a command of the stepping language; a name goes before a command."""
+    text = str(arguments.get("expression", "")).strip()
+    if not text:
+        raise Refusal("there is nothing to evaluate")
+    frame = debug.frame_of(arguments)
+    debug.hexadecimal = bool((arguments.get("format") or {}).get("hex"))
+    scope = debug.scope(frame)
+    plc = frame.plc if frame else None
+    try:
+        return _value(debug, scope, plc, text, arguments.get("context") == "clipboard")
+    except (ConditionError, UnknownPlace) as error:
+        word = text.partition(" ")[0].lower()
+        if word in COMMANDS_BY_WORD and arguments.get("context") != "hover":
+            return _command(debug, plc, text)
+        if arguments.get("context") == "repl" and re.search(r":=|(?<![<>])=", text):
+            return _command(debug, plc, text)
+        raise Refusal(str(error)) from None
+
+
+def _value(debug: DebugSession, scope: Scope, plc: str | None, text: str, is_bare: bool) -> Body:
+    session = debug.plc(plc)
+    try:
+        found = scope.find(text)
+    except UnknownPlace:
+        found = None
+    if isinstance(found, Place):
+        row = variable(debug, session, found, found.name, bare=is_bare)
+        return {"result": row.pop("value"), **{key: row[key] for key in row if key not in ("name", "evaluateName")}}
+    if isinstance(found, Span):
+        values = [text_of(debug, session, place) for place in found.places]
+        return {"result": "[" + ", ".join(values) + "]", "variablesReference": 0}
+    term = parse_expression(text, scope.find)
+    try:
+        value = term.value(session.player.read)
+    except (ArithmeticError, TypeError) as error:
+        raise ConditionError(f"{text} cannot be computed: {error}") from None
+    shown = show(term.type, value) if term.type else str(value).upper() if isinstance(value, bool) else str(value)
+    return {"result": shown, "type": term.described, "variablesReference": 0}
+
+
+def _command(debug: DebugSession, plc: str | None, text: str) -> Body:
+    """A line of the language of `fbvm step`."""
+    command = COMMANDS_BY_WORD.get(text.partition(" ")[0].lower())
+    if command and command.name in KEPT_BACK:
+        raise Refusal(f"{command.name}: the editor has that of its own")
+    commands = debug.commands(plc)
+    before = commands.session.here
+    try:
+        lines = list(commands.run(text))
+    except CommandError as error:
+        raise Refusal(str(error)) from None
+    if commands.session.here != before or (command is None or command.name in CHANGING):
+        debug.moved_by_command = commands.session.here != before
+        debug.running.forget()
+    return {"result": "\n".join(lines), "variablesReference": 0}
+
+
+CHANGING = {"write", "force", "unforce", "mode", "power"}
+
+
+def completions(debug: DebugSession, arguments: Arguments) -> Body:
+    """completions: names in the words of `--until`, members behind a dot, and commands at the beginning of a line."""
+    text = str(arguments.get("text", ""))
+    column = int(arguments.get("column") or len(text) + 1) - (1 if debug.client.get("columnsStartAt1", True) else 0)
+    before = text[: max(0, column)]
+    word = re.split(r"[\s,(=<>+*/-]", before)[-1]
+    frame = debug.frame_of(arguments)
+    session = debug.plc(frame.plc if frame else None)
+    found = dict.fromkeys(completed(session, "place", word, []), "variable")
+    instance = debug.scope(frame).instance
+    if instance is not None:
+        inside = completed(session, "place", f"{instance.name}.{word}", [])
+        found |= {name[len(instance.name) + 1 :]: "variable" for name in inside}
+    if before.strip() == word and "." not in word:
+        found |= {name: "keyword" for name, each in COMMANDS_BY_WORD.items()
+                  if name == each.name and name.startswith(fold(word).lower()) and name not in KEPT_BACK}  # fmt: skip
+    start = len(before) - len(word) + (1 if debug.client.get("columnsStartAt1", True) else 0)
+    rows = [{"label": name, "text": name, "type": kind, "start": start, "length": len(word)} for name, kind in found.items()]
+    return {"targets": [row for row in rows if "$" not in str(row["label"])]}
+
+
+def inline_values(debug: DebugSession, arguments: Arguments) -> Body:
+    """fbvm/inlineValues: for the lines of a source the values of the variables that they name, in a frame."""
+    frame = debug.frame_of(arguments)
+    name = debug.sources.name_of(arguments.get("source") or {})
+    if name is None:
+        return {"values": []}
+    session, scope = debug.plc(frame.plc if frame else None), debug.scope(frame)
+    first = debug.sources.line(int(arguments.get("startLine") or 1))
+    last = debug.sources.line(int(arguments.get("endLine") or arguments.get("startLine") or 1))
+    rows: list[Body] = []
+    for line in range(first, min(last, debug.sources.line_count(name)) + 1):
+        text = _SILENT.sub(lambda match: " " * len(match[0]), debug.sources.line_text(name, line))
+        seen: set[str] = set()
+        for match in _WORD.finditer(text):
+            try:
+                found = scope.find(match[0])
+            except UnknownPlace:
+                continue
+            if isinstance(found, Place) and found.name not in seen and not _is_block(found):
+                seen.add(found.name)
+                rows.append({"line": debug.sources.client_line(line),
+                             "column": debug.sources.client_column(name, line, match.start() + 1), "expression": found.name,
+                             "text": f"{match[0]} = {text_of(debug, session, replace(found))}"})  # fmt: skip
+    return {"values": rows}
+
+
+def _is_block(place: Place) -> bool:
+    return getattr(place.type, "block", False) is True
+

@@ -1,0 +1,58 @@
+"""What a stepping session knows of a program, whether it runs or only its recording is there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from fbvm.base.areas import Area
+from fbvm.base.types import Field, StructType, fold
+from fbvm.code.image import Image, RungPicture, SfcPicture, Site
+from fbvm.machine.plc import Plc
+from fbvm.record.trace.writer import descriptions, meanings
+from fbvm.watch.names import Names
+
+
+@dataclass(frozen=True)
+class ProgramFacts:
+    """Sites, bodies (name and kind each), rungs, charts, variables and areas of a program, and what its units call their words.
+
+    `described` has a text for each address of a unit, `meanings` what values of such words mean."""
+
+    image: Image
+    areas: Mapping[str, Area]
+    names: Names
+    cycle_ns: int
+    described: Mapping[str, str]
+    meanings: Mapping[str, Mapping[int, str]]
+
+    @classmethod
+    def of(cls, plc: Plc) -> ProgramFacts:
+        """The facts of the program of a PLC and of its units."""
+        names = Names.of(plc.image, plc.memory.areas)
+        return cls(plc.image, plc.memory.areas, names, plc.cycle_ns, descriptions(plc), meanings(plc))
+
+    @property
+    def sites(self) -> Sequence[Site]:
+        return self.image.sites
+
+    @property
+    def rungs(self) -> Sequence[RungPicture]:
+        return self.image.rungs
+
+    @property
+    def charts(self) -> Sequence[SfcPicture]:
+        return self.image.charts
+
+    @property
+    def symbols(self) -> Mapping[str, Field]:
+        return self.image.symbols
+
+    def body_name(self, body: int) -> str:
+        """The name of the POU that is body number `body`."""
+        return self.image.bodies[body].name
+
+    def block(self, body: int) -> StructType | None:
+        """The type of the instances of a body, None for a function."""
+        found = self.image.types.get(fold(self.body_name(body)))
+        return found if isinstance(found, StructType) else None

@@ -1,0 +1,105 @@
+"""What stops a run between two scans: a Modbus exception reply, a response code of an Ethernet unit that is not 0."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fbvm.machine.plc import Plc
+from fbvm.record.trace.packets import add_tap
+from fbvm.watch.paths import Place
+from fbvm.wire.modbus import Adu, Splitter, decode_reply
+from fbvm.wire.tap import DATA, TapEvent
+
+RESPONSE_CODE = "Response Code"
+"""How units call the word of their response code."""
+
+
+class Filter(NamedTuple):
+    """An exception filter: its name, what people read, what stops there, and whether it is on at first."""
+
+    name: str
+    label: str
+    description: str
+    default: bool
+    condition: str = ""
+    """What a condition may be, "" if there is none."""
+
+
+FILTERS = (
+    Filter("trap", "Traps", "an index outside its array, a division by zero, ...", True),
+    Filter("watchdog", "Watchdog", "a scan has used up its statements, or its watch cycle time", True),
+    Filter("modbus", "Modbus exception replies", "a reply with an exception code passed the network", False,
+           "the code, such as 2"),
+    Filter("response", "Response codes that are not 0", "an Ethernet unit ended a request with a response code", True,
+           "the code, such as 16#0302"),
+    Filter("warning", "Warnings of the run", "what the program asks and the PLC does not do", False),
+)  # fmt: skip
+"""Traps stop a run whether or not their filters are on: nothing continues behind one."""
+WATCHDOG_CODES = ("R0103", "R0112")
+
+
+@dataclass
+class BetweenScans:
+    """The filters "modbus" and "response" of one PLC.  `wanted` has those that are on, with their codes, none for all."""
+
+    wanted: Mapping[str, frozenset[int]]
+    found: str = ""
+    kind: str = ""
+
+    def attached(self, plc: Plc) -> None:
+        """Listens to the networks of a PLC."""
+        self._streams: dict[tuple[object, object], Splitter] = {}
+        self._passed: list[str] = []
+        self._codes = {place.name: place for place in _response_codes(plc)}
+        self._before = {name: plc.read(place) for name, place in self._codes.items()}
+        if "modbus" in self.wanted:
+            for network in {id(attached.network): attached.network for attached in plc.units}.values():
+                add_tap(network, self._tap)
+
+    def checked(self, plc: Plc) -> bool:
+        """Called after each scan: True if an exception reply has passed in it, or a response code has come."""
+        passed, self._passed = self._passed, []
+        if passed:
+            self.found, self.kind = passed[0], "modbus"
+            return True
+        now = {name: plc.read(place) for name, place in self._codes.items()}
+        before, self._before = self._before, now
+        if "response" not in self.wanted or now == before:
+            return False
+        codes = self.wanted["response"]
+        for name, value in now.items():
+            if isinstance(value, int) and value and value != before[name] and (not codes or value in codes):
+                meaning = _meaning(plc, name, value)
+                self.found, self.kind = f"{name} {RESPONSE_CODE} is 16#{value:04X}{meaning}", "response"
+                return True
+        return False
+
+    def _tap(self, now_ns: int, unit: str, event: TapEvent) -> None:
+        if event.kind is not DATA:
+            return
+        stream = self._streams.setdefault((event.local, event.remote) if event.out else (event.remote, event.local), Splitter())
+        for frame in stream.feed(event.data) if not stream.broken else ():
+            if isinstance(frame, Adu) and frame.pdu and frame.pdu[0] & 0x80:
+                reply = decode_reply(frame.pdu)
+                codes = self.wanted["modbus"]
+                if reply.exception and (not codes or reply.exception in codes):
+                    self._passed.append(f"Modbus {frame.transaction}, unit {frame.unit}: {reply}")
+
+
+def _response_codes(plc: Plc) -> Iterable[Place]:
+    """The words of response codes of all units of a PLC."""
+    for attached in plc.units:
+        for address, name in getattr(attached.unit, "descriptions", {}).items():
+            if name.startswith(RESPONSE_CODE) and isinstance(found := plc.find(address), Place):
+                yield found
+
+
+def _meaning(plc: Plc, address: str, value: int) -> str:
+    for attached in plc.units:
+        if text := getattr(attached.unit, "meanings", {}).get(address, {}).get(value):
+            return f": {text}"
+    return ""
+
+

@@ -1,0 +1,81 @@
+"""Names as they are written inside a POU: its own variables first, then those of the whole program, then addresses."""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from fbvm.base.types import ArrayType, Field, StructType, fold
+from fbvm.watch.paths import Place, Span, UnknownPlace, element
+
+Find = Callable[[str], Place | Span]
+_FIRST = re.compile(r"\s*([^\W\d]\w*)(?!\w*\s*#)")
+_PATH = re.compile(r"\s*(?:THIS\s*\^?\s*\.\s*)?(.*)", re.I | re.S)
+
+
+class Scope:
+    """Finds names from inside an instance: `n` is `Main.P1.n` there.
+
+    `find` finds what is no variable of the instance; `instance` is its place, None outside of all (then only `find` counts)."""
+
+    def __init__(self, find: Find, instance: Place | None = None) -> None:
+        self._find, self.instance = find, instance
+
+    def find(self, text: str) -> Place | Span:
+        """The place or span of places that `text` names here.  Raises UnknownPlace."""
+        if self.instance is not None and (rest := self.own(text)):
+            return self._find(f"{self.instance.name}.{rest}")
+        return self._find(text)
+
+    def own(self, text: str) -> str:
+        """`text` without THIS before it, if it begins with a variable of the instance, else ""."""
+        kind = self.instance.type if self.instance is not None else None
+        match = _PATH.match(text)
+        rest = match[1] if match else text
+        first = _FIRST.match(rest)
+        return rest if first and isinstance(kind, StructType) and kind.member(first[1]) else ""
+
+
+def instances(symbols: Mapping[str, Field], pou: str, most: int) -> list[Place]:
+    """The first `most` instances of a program or function block, those nearest to the top first."""
+    found: list[Place] = []
+    waiting = deque(Place(field.name, field.type, field.offset) for field in symbols.values() if not field.reference)
+    holds: dict[int, bool] = {}
+    while waiting and len(found) < most:
+        place = waiting.popleft()
+        kind = place.type
+        if isinstance(kind, ArrayType) and _holds(kind, fold(pou), holds):
+            waiting.extend(element(place, kind, number) for number in range(min(kind.count, most)))
+        elif isinstance(kind, StructType) and kind.block:
+            if fold(kind.name) == fold(pou):
+                found.append(place)
+            for field in kind.fields.values():
+                if not field.reference and _holds(field.type, fold(pou), holds):
+                    offset = field.offset if field.absolute else place.offset + field.offset
+                    waiting.append(replace(place, name=f"{place.name}.{field.name}", type=field.type, offset=offset))
+    return found
+
+
+def _holds(kind: object, pou: str, known: dict[int, bool]) -> bool:
+    """True if a value of a type is or has an instance of a POU."""
+    if isinstance(kind, ArrayType):
+        return _holds(kind.element, pou, known)
+    if not isinstance(kind, StructType) or not kind.block:
+        return False
+    if id(kind) not in known:
+        known[id(kind)] = fold(kind.name) == pou or any(
+            _holds(field.type, pou, known) for field in kind.fields.values() if not field.reference)
+    return known[id(kind)]
+
+
+def place_of(find: Find, path: str) -> Place | None:
+    """The place of an instance by its path, None for "" and for what is no place."""
+    if not path:
+        return None
+    try:
+        found = find(path)
+    except UnknownPlace:
+        return None
+    return found if isinstance(found, Place) else None

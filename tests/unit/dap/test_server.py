@@ -1,0 +1,145 @@
+"""The debugger as editors start it: over stdin and stdout, and over a connection."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fbvm.dap.framing import Framer, FramingError, encode
+from fbvm.dap.server import serve
+from fbvm.dap.target import LaunchError, Target
+from fbvm.net.streams import connect
+
+Message = dict[str, Any]
+TEXT = "PROGRAM Main\nVAR n : INT; END_VAR\nn := n + 1;\nIF n = 500 THEN n := 0; END_IF\nEND_PROGRAM\n"
+FBVM = [sys.executable, "-m", "fbvm"]
+
+
+class Wire:
+    """A client over bytes; `transcript` has what passed."""
+
+    def __init__(self, read: Callable[[], bytes], write: Callable[[bytes], object]) -> None:
+        self._read, self._write, self._framer = read, write, Framer()
+        self._waiting: Iterator[Message] = iter(())
+        self._sequence = 0
+
+    def send(self, command: str, **arguments: Any) -> None:
+        self._sequence += 1
+        self._write(encode({"seq": self._sequence, "type": "request", "command": command, "arguments": arguments}))
+
+    def next(self) -> Message:
+        while True:
+            for message in self._waiting:
+                return message
+            data = self._read()
+            assert data, "the adapter has gone"
+            self._waiting = self._framer.feed(data)
+
+    def until(self, name: str) -> Message:
+        """The next message that is an event or the answer to a command of that name."""
+        while True:
+            message = self.next()
+            if name in (message.get("event"), message.get("command")):
+                assert message.get("success", True), message
+                return message
+
+
+def a_session(wire: Wire, file: Path) -> None:
+    wire.send("initialize", adapterID="fbvm")
+    wire.until("initialized")
+    wire.send("launch", program=str(file))
+    wire.send("setBreakpoints", source={"path": str(file)}, breakpoints=[{"line": 4, "condition": "n = 400"}])
+    assert wire.until("setBreakpoints")["body"]["breakpoints"][0]["verified"]
+    wire.send("configurationDone")
+    assert wire.until("stopped")["body"]["reason"] == "breakpoint"
+    for _ in range(2):
+        wire.send("stepBack", threadId=1)
+        assert wire.until("stopped")["body"]["reason"] == "step"
+    wire.send("evaluate", expression="Main.n")
+    assert wire.until("evaluate")["body"]["result"] == "399"
+    wire.send("setBreakpoints", source={"path": str(file)}, breakpoints=[])
+    wire.send("continue", threadId=1)
+    wire.until("continue")
+    wire.send("pause", threadId=1)
+    assert wire.until("stopped")["body"]["reason"] == "pause"
+    wire.send("disconnect")
+    wire.until("disconnect")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "count.st"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.mark.slow
+def test_over_stdin_and_stdout(file: Path) -> None:
+    with subprocess.Popen([*FBVM, "dap"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0) as process:
+        assert process.stdin and process.stdout
+        output, pipe = process.stdout, process.stdin
+        a_session(Wire(lambda: output.read(65536), pipe.write), file)
+        assert process.wait(timeout=20) == 0 and output.read() == b""
+
+
+@pytest.mark.slow
+def test_over_a_connection_and_through_connect(file: Path) -> None:
+    with subprocess.Popen([*FBVM, "dap", "--listen", "0"], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        port = int(process.stdout.readline().rpartition(":")[2])
+        try:
+            with connect("127.0.0.1", port) as stream:
+                a_session(Wire(stream.receive, stream.send), file)
+            with subprocess.Popen([*FBVM, "dap", "--connect", str(port)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                  bufsize=0) as bridge:  # fmt: skip
+                assert bridge.stdin and bridge.stdout
+                output, pipe = bridge.stdout, bridge.stdin
+                a_session(Wire(lambda: output.read(65536), pipe.write), file)
+                pipe.close()
+                assert bridge.wait(timeout=20) == 0
+        finally:
+            process.terminate()
+
+
+@pytest.mark.slow
+def test_garbage_ends_the_adapter_with_a_sentence_and_nothing_on_stdout() -> None:
+    head = b"Content-Length: "
+    for data in (b"hello\r\n\r\n", head + b"x\r\n\r\n", head + b"5\r\n\r\n{bad}", head + b"99\r\n\r\n{"):
+        done = subprocess.run([*FBVM, "dap"], input=data, capture_output=True, timeout=30)
+        assert done.stdout == b"" and done.returncode == 2 and b"Traceback" not in done.stderr and done.stderr.strip()
+
+
+def nothing(how: str, arguments: object) -> Target:
+    raise LaunchError("nothing")
+
+
+def served(*pieces: bytes) -> tuple[str, list[Message]]:
+    """What the server says of some bytes, and what it answers."""
+    waiting, sent = [*pieces, b""], bytearray()
+    said = serve(nothing, lambda: waiting.pop(0), sent.extend)
+    return said, list(Framer().feed(bytes(sent)))
+
+
+def test_messages_may_come_in_any_pieces() -> None:
+    whole = encode({"seq": 1, "type": "request", "command": "initialize", "arguments": {"adapterID": "ü"}})
+    for cut in range(1, len(whole), 7):
+        said, answers = served(whole[:cut], whole[cut:])
+        assert said == "" and [row["seq"] for row in answers] == [1, 2]
+
+
+def test_a_client_that_goes_in_the_middle_of_a_message_is_told_of() -> None:
+    assert served(b"Content-Length: 10\r\n\r\n{")[0] == "the client is gone in the middle of a message"
+    assert served()[0] == ""
+
+
+@pytest.mark.parametrize("data", [b"x" * 5000, b"Content-Length: 99999999999\r\n\r\n", b"A: b\r\n\r\n",
+                                  b"Content-Length: 2\r\n\r\n[]"])  # fmt: skip
+def test_bytes_that_are_no_messages_are_refused(data: bytes) -> None:
+    with pytest.raises(FramingError):
+        list(Framer().feed(data))
+    assert served(data)[0]

@@ -1,0 +1,270 @@
+"""The debugger: breakpoints at full speed, forth and back, that stand where stepping stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+from depth import times
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fbvm.code.compiler import compile_text
+from fbvm.machine.breakpoints import Breakpoint
+from fbvm.machine.plc import Plc
+from fbvm.run.running import TimedWrite
+from fbvm.step.debugger import Debugger, Move
+from fbvm.step.position import Position, Reached, Said
+from fbvm.step.session import Session
+from fbvm.step.world import Debugged, World
+
+TEXT = """\
+FUNCTION_BLOCK Twice
+VAR_INPUT A : INT; END_VAR
+VAR_OUTPUT Q : INT; END_VAR
+    Q := A;
+    Q := Q * 2;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR
+    Button AT CIO 0.00 : BOOL;
+    N, R : INT;
+    T, U : Twice;
+END_VAR
+    N := N + 1;
+    T(A := N);
+    U(A := T.Q);
+    IF Button THEN
+        R := 100 / (N - 5);
+    END_IF;
+END_PROGRAM
+"""
+
+
+def debugger(text: str = TEXT, writes: Sequence[tuple[str, object, int]] = (), said: list[Said] | None = None,
+             names: Sequence[str] = ("plc",)) -> Debugger:  # fmt: skip
+    image = compile_text(text).image
+    assert image is not None
+
+    def make() -> list[Debugged]:
+        plcs = [Plc(image) for _ in names]
+        rows = [TimedWrite(plcs[0].find(name), value, at_ns) for name, value, at_ns in writes]
+        return [Debugged(name, plc, rows) for name, plc in zip(names, plcs, strict=True)]
+
+    world = World(make)
+    return Debugger({name: Session(world, name) for name in names}, (said if said is not None else []).append)
+
+
+def done(move: Move) -> Reached | None:
+    """Does a whole move."""
+    while True:
+        try:
+            next(move)
+        except StopIteration as end:
+            reached: Reached | None = end.value
+            return reached
+
+
+def where(found: Debugger) -> tuple[int, int | None]:
+    """Scan and line at which the debugger stands."""
+    session = found.session
+    return session.here.scan, session.facts.sites[session.statement.site].line if session.statement else None
+
+
+def line(where: str, when: str = "", hits: str = "", message: str = "") -> Breakpoint:
+    return Breakpoint("line", where, when, hits, message)
+
+
+def test_a_stop_at_full_speed_is_a_position_of_stepping() -> None:
+    found = debugger()
+    found.here.put([line("text.st:5", "Main.N = 300")])
+    reached = done(found.resume())
+    assert reached and reached.position == Position(299, 3) and where(found) == (299, 5)
+    done(found.into())
+    found.session.back()
+    assert found.session.here == reached.position
+
+
+def test_what_the_guarded_run_says_of_a_halt_is_where_the_session_finds_it() -> None:
+    image = compile_text(TEXT).image
+    assert image is not None
+    plc = Plc(image)
+    plc.breakpoints.change("Main.U.Q")
+    assert plc.run(scans=5) == "break" and plc.halted
+    found = debugger()
+    found.here.put([Breakpoint("change", "Main.U.Q")])
+    reached = done(found.resume())
+    assert reached and reached.position.step == plc.halted.statement and plc.halted.task == 0
+    assert reached.reasons == plc.halted.reasons
+
+
+def test_variables_of_the_block_need_no_path_in_a_condition() -> None:
+    found = debugger()
+    found.here.put([line("text.st:5", "A = 8")])
+    done(found.resume())
+    assert where(found) == (1 + 2, 5) and found.session.read("Main.T.A") == 4 * 1
+    assert found.session.names.instance(found.session.statement.frame.base) == "Main.U" if found.session.statement else False
+
+
+def test_one_instance_stops_and_the_other_does_not() -> None:
+    found = debugger()
+    found.here.put([line("Main.U")])
+    for _ in range(2):
+        done(found.resume())
+        statement = found.session.statement
+        assert statement and found.session.names.instance(statement.frame.base) == "Main.U"
+    assert where(found) == (1, 4)
+
+
+def test_reverse_goes_to_the_last_change_and_then_to_the_beginning() -> None:
+    found = debugger(writes=[("CIO 0.00", True, 70_000_000)])
+    done(found.scan(2000))
+    found.here.put([Breakpoint("change", "Main.R")])
+    reached = done(found.reverse())
+    assert reached and reached.reasons[0].startswith("Main.R was 1, is 0") and reached.position.scan == 105
+    assert done(found.reverse()) and found.session.here.scan < 105
+    found.here.put([])
+    assert done(found.reverse()) is None and found.session.here == Position(0, 0)
+
+
+def test_a_hit_count_belongs_to_the_past() -> None:
+    found = debugger()
+    found.here.put([line("text.st:5", hits="7")])
+    done(found.resume())
+    assert where(found) == (3, 5)
+    found.session.goto(1)
+    done(found.resume())
+    assert where(found) == (3, 5)
+    found.session.goto(50)
+    assert done(found.reverse()) and where(found) == (3, 5)
+
+
+def test_log_points_speak_once_a_scan_however_often_it_is_done_again() -> None:
+    said: list[Said] = []
+    found = debugger(said=said)
+    found.here.put([line("text.st:14", message="n {N} {{x}} {D5:x}"), line("text.st:16", "N MOD 4 = 0")])
+    done(found.resume())
+    assert [(one.scan, one.text) for one in said] == [(scan, f"n {scan + 1} {{x}} 16#0000") for scan in range(4)]
+    found.session.goto(0)
+    done(found.resume())
+    assert len(said) == 4
+    done(found.resume())
+    assert [one.scan for one in said] == list(range(8))
+
+
+def test_a_change_between_two_scans_is_not_laid_on_a_statement() -> None:
+    found = debugger(writes=[("D200", 9, 50_000_000)])
+    found.here.put([Breakpoint("change", "D200")])
+    reached = done(found.resume())
+    assert reached and reached.position == Position(5, 0)
+    assert reached.reasons == ("D200 was 0, is 9 by the I/O refresh or from outside, between two scans",)
+
+
+def test_a_trap_ends_the_run_and_can_be_gone_back_from() -> None:
+    found = debugger(writes=[("CIO 0.00", True, 0)])
+    reached = done(found.resume())
+    assert reached and reached.kind == "trap" and reached.position.scan == 4
+    found.back_over()
+    assert where(found) == (4, 17)
+
+
+def test_steps_stop_at_breakpoints_in_what_they_pass_over() -> None:
+    found = debugger()
+    found.here.put([line("text.st:5")])
+    done(found.over())
+    assert done(found.over()) and where(found) == (0, 5)
+    found.here.put([])
+    done(found.over(1))
+    assert where(found) == (0, 15)
+    found.back_over()
+    assert where(found) == (0, 14)
+
+
+def test_a_scan_is_left_by_way_of_its_refresh_and_stops_on_the_way_count() -> None:
+    found = debugger()
+    found.here.put([line("text.st:16", "N = 3")])
+    assert done(found.scan(10)) and where(found) == (2, 16)
+    found.here.put([])
+    assert done(found.scan(10)) is None and where(found) == (12, 13)
+
+
+def test_two_plcs_have_one_time() -> None:
+    found = debugger(names=("a", "b"))
+    found.plcs["b"].put([line("text.st:16", "N = 40")])
+    reached = done(found.resume())
+    assert reached and reached.plc == "b" and found.focus == "b"
+    assert found.plcs["a"].session.here == Position(40, 0)
+    found.choose("a")
+    assert found.session.read("Main.N") == 40
+    assert done(found.reverse()) is None or found.session.here.scan <= 40
+
+
+def test_a_run_that_is_given_up_stands_between_two_scans() -> None:
+    found = debugger()
+    move = found.resume()
+    for _ in range(3):
+        next(move)
+    move.close()
+    found.pause()
+    here = found.session.here
+    assert here.step == 0 and here.scan > 0
+    assert found.session.read("Main.N") == here.scan
+
+
+def test_a_change_in_the_past_is_met_again() -> None:
+    found = debugger()
+    done(found.scan(3))
+    done(found.into())
+    session = found.session
+    session.act(lambda plc: plc.write("Main.R", 77))
+    found.forget()
+    found.here.put([Breakpoint("change", "Main.R")])
+    done(found.scan(20))
+    reached = done(found.reverse())
+    assert reached and reached.reasons[0].startswith("Main.R was 0, is 77") and reached.position == Position(3, 1)
+
+
+MOVES = ("into", "over", "out", "scan", "resume", "back", "back over", "reverse", "goto", "write")
+
+
+STOPS = (line("text.st:5"), line("text.st:5", "A > 6"), line("Main.T", hits="3"), Breakpoint("change", "Main.R"),
+         Breakpoint("condition", "Main.N > 4"))  # fmt: skip
+
+
+def move(found: Debugger, what: str) -> None:
+    session = found.session
+    if what == "back":
+        session.back()
+    elif what == "back over":
+        found.back_over()
+    elif what == "goto":
+        session.goto(max(0, session.here.scan - 3))
+    elif what == "write":
+        session.act(lambda plc: plc.write("CIO 0.00", not plc.read("CIO 0.00")))
+        found.forget()
+    else:
+        done({"into": found.into, "over": found.over, "out": lambda: found.over(1), "scan": lambda: found.scan(2),
+              "resume": lambda: found.resume(session.here.scan + 20), "reverse": found.reverse}[what]())  # fmt: skip
+
+
+@pytest.mark.slow
+@given(moves=st.lists(st.sampled_from(MOVES), min_size=1, max_size=14),
+       stops=st.lists(st.sampled_from(STOPS), max_size=2))  # fmt: skip
+@settings(max_examples=times(60), deadline=None)
+def test_any_moves_end_in_the_memory_that_a_plain_run_has_there(moves: list[str], stops: list[Breakpoint]) -> None:
+    found = debugger()
+    found.here.put(stops)
+    for each in moves:
+        move(found, each)
+        session = found.session
+        here, memory, statement = session.here, bytes(session.memory.u8), session.statement
+        again = debugger()
+        again.session.world._live["plc"].actions = dict(session.world._live["plc"].actions)
+        again.session.goto(here.scan)
+        while again.session.here < here and not again.session.trap:
+            again.session.step()
+        assert again.session.here == here
+        assert (again.session.statement and again.session.statement.site) == (statement and statement.site)
+        assert bytes(again.session.memory.u8) == memory
+
+
