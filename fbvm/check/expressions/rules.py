@@ -22,5 +22,6 @@ RULES: dict[type, Callable[..., Type | None]] = {
     tree.ArrayInit: aggregates.aggregate, tree.StructInit: aggregates.aggregate,
     tree.Unary: operators.unary, tree.Binary: operators.binary,
     ladder.Edge: rungs.edge, ladder.Element: rungs.contact, ladder.Memory: rungs.memory, ladder.Words: rungs.words,
+    ladder.Contents: rungs.contents,
 }
 """`rule(scope, expr, want)` gives the type of an expression, or None after a diagnostic."""

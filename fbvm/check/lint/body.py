@@ -35,7 +35,7 @@ class Body:
 
     def below(self, node: tree.Node) -> Nodes:
         """The nodes directly below one; of a call that means an operator, those of the operator."""
-        if isinstance(node, tree.Call) and (meaning := self.facts.rewritten.get(node)) is not None:
+        if isinstance(node, tree.Call | ladder.Contents) and (meaning := self.facts.rewritten.get(node)) is not None:
             return (meaning,)
         return _BELOW[type(node)](node)
 
@@ -118,5 +118,6 @@ _BELOW: dict[type, Callable[[Any], Nodes]] = {
     ladder.Ladder: lambda n: n.body, ladder.Rung: lambda n: n.body, sfc.Sfc: lambda n: n.body,
     ladder.Edge: lambda n: (n.of, n.memory), ladder.Element: lambda n: (n.value,),
     ladder.Memory: lambda n: (n.address,), ladder.Words: lambda n: (n.of,),
+    ladder.Contents: lambda n: (n.of,),
 }
 """For each kind of node of a body the nodes directly below it, in the order of the text."""

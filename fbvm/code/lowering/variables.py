@@ -74,15 +74,21 @@ def _index(body: BodyContext, expr: tree.Index, kind: Type) -> Place:
     return arrays.element(body, expr, kind)
 
 
-def _words(body: BodyContext, expr: ladder.Words, kind: Type) -> Place:
+def _words(body: BodyContext, expr: ladder.Words | ladder.Contents, kind: Type) -> Place:
     return Place(body.place(expr.of).address, kind)
+
+
+def _contents(body: BodyContext, expr: ladder.Contents) -> Node:
+    meaning = body.facts.rewritten.get(expr)
+    return loaded(body, expr) if meaning is None else body.value(meaning)
 
 
 PLACES: PlaceRules = {
     tree.Direct: _direct, tree.Member: _member, tree.Part: _part, tree.Deref: _dereferenced, tree.Index: _index,
-    ladder.Memory: plc_addresses.place_at, ladder.Words: _words,
+    ladder.Memory: plc_addresses.place_at, ladder.Words: _words, ladder.Contents: _words,
 }
 VALUES: ValueRules = {
     tree.Member: member_value,
     **dict.fromkeys((tree.NameRef, tree.Direct, tree.Part, tree.Deref, tree.Index, ladder.Memory, ladder.Words), loaded),
+    ladder.Contents: _contents,
 }

@@ -46,7 +46,7 @@ class BitLogic:
         if how == "LD":
             if context.condition is not None:
                 context.saved.append(context.condition)
-            if len(context.saved) > DEEPEST:
+            if len(context.waiting()) > DEEPEST:
                 raise StepRefused(f"more than {DEEPEST} conditions are saved", "")
             context.condition = contact
         else:
@@ -67,7 +67,7 @@ class BitLogic:
         elif bit not in context.branches:
             raise StepRefused(f"nothing was written to {bit} in this rung", f"OUT {bit} comes first")
         else:
-            context.condition = context.temporary(f"${bit}")
+            self.join("LD", context.temporary(context.branches[bit]))
 
     def _branch_point(self) -> str:
         """The TR bit that is the operand of the step; "" if the operand is no TR bit."""
@@ -107,13 +107,11 @@ class BitLogic:
         context = self.context
         if whole_number(bit[2:]) >= BRANCH_POINTS:
             raise StepRefused(f"there is no {bit}", f"TR0 to TR{BRANCH_POINTS - 1} are there")
-        if bit in context.branches:
-            raise StepRefused(f"{bit} is written twice in this rung",
-                              f"each branch point has one of its own, TR0 to TR{BRANCH_POINTS - 1}")
-        context.branches.add(bit)
         assert context.condition is not None
         context.evaluate_saved()
-        kept = context.temporary(f"${bit}")
+        kept = context.temporary(f"${bit}" if bit not in context.branches else context.name(bit))
+        context.branches[bit] = kept.text
+        context.used.add(kept.text)
         context.emit(context.assign(kept, context.element(context.condition)), always=True)
         context.condition = kept
 

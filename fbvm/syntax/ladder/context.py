@@ -72,8 +72,8 @@ class RungContext:
         """Conditions that wait for AND LD, OR LD or an instruction with several inputs, the last one on top."""
         self.used: set[str] = set()
         """Names of the variables that keep conditions which an output has used."""
-        self.branches: set[str] = set()
-        """TR bits that the rung has written."""
+        self.branches: dict[str, str] = {}
+        """TR bits that the rung has written, each with the variable of its last value: a later one has a variable of its own."""
         self.step = 0
         self._computed: dict[str, tuple[Statement, Expr]] = {}
         self._position = 0
@@ -226,6 +226,10 @@ class RungContext:
         self.emit(self.assign(kept, self.element(self.condition)), always=True)
         self.condition = kept
         return kept
+
+    def waiting(self) -> list[Expr]:
+        """The saved conditions that no output has used: only these have to be joined by AND LD, OR LD or an instruction."""
+        return [one for one in self.saved if not isinstance(one, NameRef) or one.text not in self.used]
 
     def evaluate_saved(self) -> None:
         """Assign the saved conditions to variables, so that they are evaluated in the order of writing."""

@@ -18,7 +18,6 @@ from fbvm.syntax.ladder.stops import with_one_stop, without_stops
 from fbvm.syntax.ladder.symbols import declaration, number
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.tree import NameRef
 from fbvm.syntax.tree.ladder import Ladder, Rung
 
 
@@ -88,7 +87,7 @@ class LadderLowering:
         if is_input(text.lines[-1].row):
             context.report("S0110", last.start, last.end, "the rung ends with a condition that nothing uses",
                            "an output or another instruction must follow")
-        elif any(not isinstance(one, NameRef) or one.text not in context.used for one in context.saved):
+        elif context.waiting():
             context.report("S0110", last.start, last.end, "a condition is left that no AND LD, OR LD or output has used",
                            "a block that begins with LD is joined to the one before by AND LD or OR LD")
 

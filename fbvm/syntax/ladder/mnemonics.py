@@ -63,6 +63,13 @@ class RungText:
     """The line SECTION in front of it."""
     symbols: list[Symbol] = field(default_factory=list)
     """Rows of a table of symbols in front of it."""
+    is_guessed: bool = False
+    """Whether it begins only because an instruction at the bus bar follows an output."""
+
+    @property
+    def is_continued(self) -> bool:
+        """Whether its blocks are too few for another AND LD or OR LD, so that it belongs to the rung before."""
+        return self.is_guessed and not self.declared and bool(self.lines) and blocks(self.lines) < 2
 
     @property
     def is_empty(self) -> bool:
@@ -75,12 +82,11 @@ class RungText:
         return closes(self.lines) or self.damaged and not is_input(self.lines[-1].row)
 
     @property
-    def wants_more(self) -> bool:
-        """Whether the last instruction has fewer operands than it takes."""
-        if not self.lines:
-            return False
-        line = self.lines[-1]
-        return len(line.step.operands) < (line.row.least if line.row.does != ".call" else 0)
+    def missing(self) -> int:
+        """How many operands the last instruction has less than it takes."""
+        if not self.lines or self.lines[-1].row.does == ".call":
+            return 0
+        return max(self.lines[-1].row.least - len(self.lines[-1].step.operands), 0)
 
 
 ALONE = (".end", ".jump_end", ".for", ".next", ".step", ".subroutine", ".return")
@@ -108,7 +114,7 @@ def read_rungs(text: str, start: int, end: int, report: Report) -> list[RungText
             continue
         for at, line in lines:
             try:
-                tokens = _tokens(text, at, at + len(line), rungs[-1].wants_more)
+                tokens = _tokens(text, at, at + len(line), rungs[-1].missing)
                 Automaton(_LineReader(text, rungs), tokens, text, "mnemonics").run(_stuck)
             except Refusal as refusal:
                 report("S0109", *refusal.args)
@@ -181,7 +187,17 @@ def _stuck(automaton: Automaton) -> ErrorRecovery:
     raise Refusal(automaton.before.start, automaton.before.end, "this is no instruction", "")
 
 
-def _tokens(text: str, at: int, end: int, more: bool) -> Iterator[Token]:
+_COLUMN = re.compile(r" *\t[ \t]*([^ \t\r\n][^\r\n]*?)[ \t\r]*$", re.M)
+"""What stands in further columns behind the operands, in rows that were copied from a window: a value, a comment."""
+
+
+def _wanted(mnemonic: str) -> int | None:
+    """The number of operands of an instruction; None if it has any number."""
+    row = instruction_set().rows[spelling(mnemonic)]
+    return None if row.does == ".call" else len(row.operands)
+
+
+def _tokens(text: str, at: int, end: int, more: int) -> Iterator[Token]:
     """The tokens of one line; which terminal is tried depends on the position in the line.  If the instruction in front wants
     `more` operands, a line without a mnemonic has them."""
     patterns = _patterns()
@@ -201,13 +217,23 @@ def _tokens(text: str, at: int, end: int, more: bool) -> Iterator[Token]:
         at = found.end()
         return token
 
+    def take_number() -> Token | None:
+        nonlocal at
+        number = patterns["STEP_NUMBER"].match(text, at, end)
+        behind = patterns["PREFIX"].match(text, number.end(), end) if number else None
+        place = behind.end() if behind else number.end() if number else at
+        if number and (len(number[0].strip()) > 4 or instruction_set().pattern.match(text, place, end)):
+            at = number.end()
+            return Token("STEP_NUMBER", number[0], number.start(), at)
+        return None
+
     if token := take("NOTE") or take("SYMBOL") or take("SECTION"):
         yield token
     elif token := take("RUNG"):
         yield token
         yield from filter(None, (take("RUNG_NUMBER"), take("RUNG_COMMENT")))
     else:
-        begin, head = at, [token for token in (take("STEP_NUMBER"), take("PREFIX")) if token]
+        begin, head = at, [token for token in (take_number(), take("PREFIX")) if token]
         known = instruction_set().pattern.match(text, at, end)
         if known:
             yield from (*head, Token("MNEMONIC", known[0], at, known.end()))
@@ -218,8 +244,13 @@ def _tokens(text: str, at: int, end: int, more: bool) -> Iterator[Token]:
             yield from filter(None, (*head, take("MNEMONIC")))
         if token := take("CODE"):
             yield token
+        wanted = _wanted(known[0]) if known else more or None
         while token := take("PIN") or take("OPERAND"):
             yield token
+            wanted = wanted and wanted - 1
+            if wanted == 0 and (column := _COLUMN.match(text, at, end)):
+                yield Token("REMARK", f"// {column[1]}", column.start(1), column.end())
+                break
     if remark:
         yield Token("REMARK", remark[0], remark.start(), remark.end())
     yield Token("$END", "", end, end)
@@ -255,7 +286,7 @@ class _LineReader:
         self._fresh(token).section = token.text.strip()
 
     def symbol(self, token: Token) -> None:
-        name, address, kind, *rest = token.text.rstrip("; \t").split(",")
+        name, address, kind, *rest = token.text.rstrip("; \t\r").split(",")
         comment = ",".join(rest).strip(", ").strip('"')
         self._fresh(token).symbols.append(
             Symbol(token.start, token.end, name, address.strip(), kind.strip().upper(), comment))
@@ -263,7 +294,7 @@ class _LineReader:
     def more(self, operand: Token, operands: list[Token], remark: Token | None) -> None:
         """Operands of the instruction in front, as printed listings have them on lines of their own."""
         rung = self.rungs[-1]
-        if not rung.wants_more:
+        if not rung.missing:
             raise Refusal(operand.start, operand.end, "this is no instruction", "operands stand behind their instruction")
         line = rung.lines[-1]
         given, step = [operand, *operands], line.step
@@ -298,8 +329,11 @@ class _LineReader:
                           f"{row.mnemonic} has the function code {row.code or 'none'}, not {code.text[1:-1]}",
                           "leave the code out, or write the mnemonic that belongs to it")
         instruction(written, mnemonic.text, mnemonic.start - len(written), mnemonic.end)
+        operands = _joined(operands, len(row.operands)) if row.does != ".call" else operands
         if not (operands and _is_branch(operands[0].text)):
             self._begin(row, mnemonic)
+        if row.does in (".and_block", ".or_block") and self.rungs[-1].is_continued:
+            self._go_on()
         step = Step(mnemonic.start - len(written), operands[-1].end if operands else mnemonic.end, written, row.mnemonic,
                     tuple(operand.text for operand in operands))
         self.rungs[-1].lines.append(Line(row, step, [(o.start, o.end) for o in operands],
@@ -316,12 +350,37 @@ class _LineReader:
             if operand.text.endswith(",") and at + 1 < len(operands) and len(operand.text) > 1:
                 raise Refusal(operand.end - 1, operand.end, "`,` separates no operands", "a space stands between them")
 
+    def _go_on(self) -> None:
+        """Append the last rung to the one before: a block that AND LD or OR LD joins stands behind its output."""
+        behind = self.rungs.pop()
+        rung = self.rungs[-1]
+        rung.notes += [(len(rung.lines) + at, note) for at, note in behind.notes]
+        rung.lines += behind.lines
+        rung.damaged |= behind.damaged
+
     def _begin(self, row: Instruction, mnemonic: Token) -> None:
         """Begin another rung if this instruction does."""
         rung = self.rungs[-1]
         apart = rung.lines and (row.does in ALONE or rung.lines[-1].row.does in ALONE)
         if rung.picture or rung.lines and (apart or not rung.declared) and row.inputs == 0 and rung.may_end:
-            self.rungs.append(RungText(mnemonic.start))
+            self.rungs.append(RungText(mnemonic.start, is_guessed=not rung.picture and not apart))
+
+
+def _joined(operands: list[Token], wanted: int) -> list[Token]:
+    """The operands, of which there are `wanted`: an area and its number, as in `TIM 000`, are one."""
+    made: list[Token] = []
+    left = len(operands) - wanted
+    for operand in operands:
+        before = made[-1] if made else None
+        if left > 0 and before and before.text.upper() in ("TIM", "CNT", "HR", "AR", "DM") and _NUMBER.fullmatch(operand.text):
+            made[-1] = Token("OPERAND", before.text + operand.text, before.start, operand.end)
+            left -= 1
+        else:
+            made.append(operand)
+    return made
+
+
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def is_input(row: Instruction) -> bool:
@@ -331,8 +390,11 @@ def is_input(row: Instruction) -> bool:
 
 def closes(lines: list[Line]) -> bool:
     """Whether a rung may end behind these lines: the last one is an output, and no condition is left over."""
-    if is_input(lines[-1].row):
-        return False
+    return not is_input(lines[-1].row) and blocks(lines) <= 1
+
+
+def blocks(lines: list[Line]) -> int:
+    """How many blocks behind these lines are not joined yet, or used by an instruction with several inputs."""
     left = 0
     for line in lines:
         row = line.row
@@ -342,7 +404,7 @@ def closes(lines: list[Line]) -> bool:
             left -= 1
         elif row.inputs > 1:
             left -= row.inputs - 1
-    return left <= 1
+    return left
 
 
 def _is_branch(operand: str) -> bool:

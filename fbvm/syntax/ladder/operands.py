@@ -23,7 +23,7 @@ from fbvm.base.areas import (
 from fbvm.base.digits import whole_number
 from fbvm.syntax import tree
 from fbvm.syntax.tree import Argument, Binary, Call, Direct, Expr, Index, Literal, Member, Name, NameRef
-from fbvm.syntax.tree.ladder import Memory, Words
+from fbvm.syntax.tree.ladder import Contents, Memory, Words
 
 SYMBOLS = {
     "P_GE": "CF000", "P_NE": "CF001", "P_LE": "CF002", "P_ER": "CF003", "P_CY": "CF004", "P_GT": "CF005", "P_EQ": "CF006",
@@ -36,7 +36,10 @@ _TYPES = {"w": "WORD", "W": "WORD", "d": "DWORD", "q": "LWORD", "n": "UINT"}
 _REALS = {"r": "REAL", "l": "LREAL"}
 _BITS = {"WORD": 16, "DWORD": 32, "LWORD": 64, "UINT": 16}
 _OLD = re.compile(r"\d{5,6}")
-_SYMBOL = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*|\[\d+\])*")
+_SYMBOL = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*|\[\d+\])*")
+_C_SERIES = re.compile(r"(TIM|CNT|HR|AR|DM)(\d+)(\.\d+)?", re.I)
+"""Addresses as programs for the C series have them."""
+_AREAS_OF_C_SERIES = {"TIM": "T", "CNT": "C", "HR": "H", "AR": "A", "DM": "D"}
 _REAL = re.compile(r"[+-]\d+[.,]\d+(?:[Ee][+-]?\d+)?")
 _TASK = re.compile(r"TK\d+", re.I)
 _REGISTER = re.compile(r"([ID]R)(\d+)", re.I)
@@ -224,6 +227,19 @@ class Operands:
     # --- symbols ---
 
     def _symbol(self, text: str, wanted: str, start: int, end: int) -> Expr:
+        place = self._place(text, start, end)
+        if wanted in "aA":
+            return Words(start, end, place)
+        if wanted not in "wdqnrl":
+            return place
+        kind = _REALS.get(wanted) or _TYPES[wanted]
+        converted = self._place(text, start, end)
+        if wanted not in _REALS:
+            converted = self._called(f"TO_{kind}", start, end, converted)
+        return Contents(start, end, place, kind, converted)
+
+    def _place(self, text: str, start: int, end: int) -> Expr:
+        """A symbol with its members and elements."""
         first, *rest = re.findall(r"\w+|\[\d+\]", text)
         place: Expr = NameRef(start, end, first)
         for part in rest:
@@ -231,11 +247,7 @@ class Operands:
                 place = Index(start, end, place, (Literal(start, end, "int", whole_number(part[1:-1]), None, part[1:-1]),))
             else:
                 place = Member(start, end, place, Name(start, end, part))
-        if wanted in "aA":
-            return Words(start, end, place)
-        if wanted not in "wdqn":
-            return place
-        return Call(start, end, NameRef(start, end, f"TO_{_TYPES[wanted]}"), (Argument(start, end, "", None, place),))
+        return place
 
 
 def _number(text: str, bits: int) -> int:
@@ -266,11 +278,16 @@ def _check_decimal(text: str, wanted: str, role: str) -> None:
 
 def _is_address(text: str) -> bool:
     """Whether a word that could be a symbol is an address such as D100 or W5."""
-    return bool(re.fullmatch(r"(?:CIO|DM|D|W|H|A|T|C|E[0-9A-F]_)\d+", text, re.I))
+    return bool(_C_SERIES.fullmatch(text) or re.fullmatch(r"(?:CIO|DM|D|W|H|A|T|C|E[0-9A-F]_)\d+", text, re.I))
 
 
 def _address(text: str, wanted: str) -> Address:
     """The address that a text means for an operand of the kind `wanted`.  Raises OperandError."""
+    if older := _C_SERIES.fullmatch(text):
+        number, bit = older[2], older[3] or ""
+        if wanted in "bB" and older[1].upper() in ("HR", "AR") and not bit:
+            number, bit = number[:-2] or "0", f".{number[-2:]}"
+        text = f"{_AREAS_OF_C_SERIES[older[1].upper()]}{number}{bit}"
     if _OLD.fullmatch(text) and wanted in "bB":
         text = f"{whole_number(text[:-2])}.{text[-2:]}"
     if wanted in "bBv" and re.fullmatch(r"[TC]\d+", text, re.I):

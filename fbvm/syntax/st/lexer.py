@@ -268,9 +268,6 @@ class Lexer:
                         "rungs stand between LADDER and END_LADDER", False)
             return None, drawn.end()
         if word := lex.foreign_word.match(text, at):
-            self.report("S0102", at, word.end(),
-                        f"`{_short(word[0])}` is no name: of letters only A to Z can be part of one",
-                        "comments and strings may have any character")
             return Token("NAME", word[0], at, word.end()), word.end()
         if written := next((row for row in _WRITTEN if row[0].match(text, at)), None):
             return self._meant(at, *written)

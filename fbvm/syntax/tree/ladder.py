@@ -47,6 +47,16 @@ class Words(Expr):
 
 
 @_node
+class Contents(Expr):
+    """What an instruction reads at a variable as a number of its own width, of the type `kind`: instructions of ladder know
+    addresses, not types.  `converted` is the value where the variable itself has that width, or less without an address."""
+
+    of: Expr
+    kind: str
+    converted: Expr
+
+
+@_node
 class Step(Node):
     """One instruction as a programming tool writes it: `prefix` is made of `!`, `@` and `%`, `operands` are as written."""
 

@@ -121,6 +121,7 @@ class _Reader:
 
     def step(self, number: int, prefix: str, mnemonic: str, operands: tuple[str, ...]) -> None:
         if operands and operands[0].upper() in self.kept and mnemonic == "LD":
+            self.stack.append(self.now)
             self.now, self.lost = _Condition(self.kept[operands[0].upper()], Series()), False
             return
         join = joined(mnemonic)

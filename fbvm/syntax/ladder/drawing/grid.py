@@ -23,17 +23,17 @@ _CONTACT = re.compile(r"[┤┫┥┨|\]]([^─━|┤┫\[\]├┣-]{0,8}?)[├
 _COIL = re.compile(r"\(([^()]{0,8})\)")
 _KNOWN = re.compile(rf" ?(?:{_MARK}) ?")
 _COIL_KNOWN = re.compile(r" ?[!@%]{0,2}(?:[/↑↓PN]|S|R|SET|RSET|)(?: ?)")
-_OPERAND = r"[A-Za-z_%][\w.]*(?:\[\d+\][\w.]*)*|\d+\.\d+"
+_OPERAND = r"(?:[^\W\d]|%)[\w.]*(?:\[\d+\][\w.]*)*|\d+\.\d+"
 _NAMED = {False: re.compile(rf"[\[\]|┤┫](?: ?(/)| ?([PN↑↓])(?= )|) ?({_OPERAND}) ?[\]\[|├┣]"),
           True: re.compile(rf"\((?: ?(/)| ?([PNSR↑↓]|SET|RSET)(?= )|) ?({_OPERAND}) ?\)")}
 """Contacts and coils with their operand inside: `[ a ]`, `[/a]`, `( b )`, `(S b)`."""
 _BRACKETS = re.compile(r"\[[^\[\]|]*\w[^\[\]|]*\]")
 _LINK = re.compile(r"[►▶>](\d+)")
-_TITLE = re.compile(r"([A-Za-z_]\w*) ?: ?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)")
-_NAME = re.compile(r" *([A-Za-z_]\w*) *")
-_HEAD = re.compile(r" *(?:([A-Za-z_]\w*) +([A-Za-z_]\w*) +(\w+)|([A-Za-z_]\w*)) *")
+_TITLE = re.compile(r"([^\W\d]\w*) ?: ?([^\W\d]\w*(?:\.[^\W\d]\w*)*)")
+_NAME = re.compile(r" *([^\W\d]\w*) *")
+_HEAD = re.compile(r" *(?:([^\W\d]\w*) +([^\W\d]\w*) +(\w+)|([^\W\d]\w*)) *")
 """The first row of a block: its type, alone or between two pins."""
-_UPPER_SIDE = re.compile(r"[─━═-]*( ?[A-Za-z_][\w .:\[\]]*)?[─━═-]*[┐┓╗╮┒┑+]")
+_UPPER_SIDE = re.compile(r"[─━═-]*( ?[^\W\d][\w .:\[\]]*)?[─━═-]*[┐┓╗╮┒┑+]")
 """The upper side of a box behind its left corner, perhaps with a title."""
 _STUB = frozenset("─━-╶╴╺╸")
 _BOX_TEXT = re.compile(r" ?[A-Za-z0-9@%!&#+]")
