@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fbvm.base.types import ELEMENTARY, EnumType, base, families, machine
+from fbvm.base.types import ELEMENTARY, EnumType, StringType, base, families, machine
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 
 BIT, TEXT = "bit", "text"
@@ -21,20 +21,23 @@ WORD = "u16"
 class Cell:
     """A value in the memory: its first byte and its code.  `bit` is that of a BOOL which shares its byte, else None.
 
-    A text is no value at one place: `signal` is then the number of its signal."""
+    Of a text `signal` is the number of its signal, and `size` how many bytes it is made of; 0 if they may lie anywhere."""
 
     code: str
     offset: int
     bit: int | None = None
-    signal: int | None = None
+    signal: int = -1
+    size: int = 0
 
 
 def cell_of(signal: Signal, number: int) -> Cell:
     """The cell of signal number `number`."""
     place, kind = signal.place, base(signal.place.type)
     code = machine(kind)
-    if place.hops or code not in SIZES and code != "b" or families(kind) & {"ANY_DATE", "ANY_CHAR"}:
+    if place.hops or code == "ref":
         return Cell(TEXT, -1, signal=number)
+    if isinstance(kind, StringType) or families(kind) & {"ANY_DATE", "ANY_CHAR"}:
+        return Cell(TEXT, place.offset, signal=number, size=place.type.size)
     return Cell(BIT, place.offset, place.bit) if code == "b" else Cell(code, place.offset)
 
 

@@ -56,6 +56,22 @@ class Column:
     """The latest scans in which it changed."""
 
 
+class Texts:
+    """The texts of one signal, numbered in the order in which they came; `values` are those of the scans of this block."""
+
+    def __init__(self, cell: Cell, first: str) -> None:
+        self.numbers = {first: 0}
+        self.values = array("I")
+        self._signal, self._latest = cell.signal, 0
+        self._lines = set(range(cell.offset // LINE, (cell.offset + cell.size - 1) // LINE + 1)) if cell.size else None
+
+    def add(self, moment: Moment, moved: set[int], text: Callable[[int, Moment], str]) -> None:
+        """Adds the text at the end of a scan in which some lines of memory changed."""
+        if self._lines is None or not self._lines.isdisjoint(moved):
+            self._latest = self.numbers.setdefault(text(self._signal, moment), len(self.numbers))
+        self.values.append(self._latest)
+
+
 class Columns:
     """Collects the ends of scans, one after another.
 
@@ -67,8 +83,8 @@ class Columns:
         self.blocks: list[int] = []
         """How many scans each block has."""
         self.first = 0
-        self.texts: dict[int, dict[str, int]] = {}
-        """The texts of each column of texts, numbered."""
+        self.texts: dict[int, Texts] = {}
+        """What there is besides of columns of texts."""
         self.constants: dict[str, dict[int, int]] = {}
         """Words that are not 0 in the first scan, by area and address."""
         self.words: dict[str, dict[int, int]] = {}
@@ -83,7 +99,8 @@ class Columns:
         self._lines: dict[int, tuple[bytes, list[int], list[bytes]]] = {}
         """Of each line that changed in this block: what it was before, places of scans in the block, what it was from then on."""
         self._times = array("q")
-        self._numbered_texts: dict[int, array[int]] = {}
+        self._moved: set[int] = set()
+        """The lines that changed in this scan."""
         self._scan = 0
 
     def __len__(self) -> int:
@@ -104,10 +121,9 @@ class Columns:
             page = memory[number * PAGE_BYTES:(number + 1) * PAGE_BYTES]
             if page != known:
                 self._page(number, known, page)
-        for number, values in self._numbered_texts.items():
-            texts, signal = self.texts[number], self.columns[number].cell.signal
-            assert signal is not None
-            values.append(texts.setdefault(self._text(signal, moment), len(texts)))
+        for texts in self.texts.values():
+            texts.add(moment, self._moved, self._text)
+        self._moved.clear()
         self._times.append(moment.now_ns)
         if len(self._times) >= BLOCK_SCANS or len(self._lines) * LINE * len(self._times) > MOST_HELD_BYTES:
             self._end_block()
@@ -128,9 +144,7 @@ class Columns:
         for cell in self._wanted:
             if cell.code == TEXT:
                 number = self._new_column(cell, bytes(4))
-                assert cell.signal is not None
-                self.texts[number] = {self._text(cell.signal, moment): 0}
-                self._numbered_texts[number] = array("I")
+                self.texts[number] = Texts(cell, self._text(cell.signal, moment))
             else:
                 self._new_column(cell, _element(memory, cell))
         for area in self._areas:
@@ -143,7 +157,7 @@ class Columns:
     def _new_column(self, cell: Cell, initial: bytes) -> int:
         self._numbers[cell] = number = len(self.columns)
         self.columns.append(Column(cell, initial))
-        if cell.offset >= 0:
+        if cell.offset >= 0 and cell.code != TEXT:
             for at in range(cell.offset, cell.offset + SIZES[cell.code]):
                 self._at.setdefault(at, []).append(number)
         return number
@@ -155,6 +169,7 @@ class Columns:
         for at in range(0, PAGE_BYTES, LINE):
             line = page[at:at + LINE]
             if line != (before := known[at:at + LINE]):
+                self._moved.add(first + at // LINE)
                 _, places, lines = self._lines.setdefault(first + at // LINE, (before, [], []))
                 places.append(len(self._times))
                 lines.append(line)
@@ -167,11 +182,12 @@ class Columns:
             for at in line.changed:
                 self._word(number * LINE + at, before)
                 touched.update(self._at.get(number * LINE + at, ()))
-        for number in sorted(touched | set(self._numbered_texts)):
+        for number in sorted(touched | set(self.texts)):
             self._end_column(number, self._values(number, lines, count))
         self.blocks.append(count)
         self._times, self._lines = array("q"), {}
-        self._numbered_texts = {number: array("I") for number in self._numbered_texts}
+        for texts in self.texts.values():
+            texts.values = array("I")
 
     def _word(self, at: int, before: bytes) -> None:
         """Makes a column for the word of an area in which byte `at` lies, if there is none."""
@@ -191,7 +207,7 @@ class Columns:
         if number == 0:
             return self._times.tobytes()
         if cell.code == TEXT:
-            return self._numbered_texts[number].tobytes()
+            return self.texts[number].values.tobytes()
         size = SIZES[cell.code]
         if size == 1:
             column = self._bytes(cell.offset, lines, count)

@@ -27,7 +27,7 @@ from fbvm.record.trace.signals import chosen_signals
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import UnknownPlace
 
-MOST_ROWS = 40_000
+MOST_ROWS = 32_000
 """Rows of statements and phases that a page carries, about; a program of 400 statements has some 800 rows a scan."""
 PROBED_SCANS = 4
 """The last scans, whose rows say about how many a scan has."""
@@ -90,15 +90,16 @@ def page_data(source: ScanSource, names: Sequence[str] = (), scans: range | None
     signals = _shown_signals(source, names, pinned)
     cells = [cell_of(signal, number) for number, signal in enumerate(signals)]
     watched = frozenset(cell for cell, signal in zip(cells, signals, strict=True) if names or signal.place.name in pinned)
-    columns = Columns(cells, list(source.areas.values()), lambda number, moment: text_of(source, signals[number], moment), watched)
+    areas = list(source.areas.values())
+    columns = Columns(cells, areas, lambda number, moment: text_of(source, signals[number], moment), watched)
     ends, held = _Ends(columns), source.scans
     wanted = held if scans is None else range(max(held.start, scans.start), min(held.stop, scans.stop))
     source.follow_ends(ends, wanted)
     ends.end()
     columns.end()
-    numbers = {cell: columns.number(cell) for cell in cells} if columns.columns else {}
-    kept = [(signal, numbers[cell]) for signal, cell in zip(signals, cells, strict=True) if numbers and (
-            names or len(signals) <= FEW_SIGNALS or columns.columns[numbers[cell]].entries or signal.place.name in pinned)]  # fmt: skip
+    every = bool(names) or len(signals) <= FEW_SIGNALS
+    kept = [(signal, number) for signal, number in zip(signals, map(columns.number, cells), strict=False)
+            if every or columns.columns[number].entries or signal.place.name in pinned] if len(columns) else []  # fmt: skip
     insides = Insides(source, [signal for signal, _ in kept])
     changes = sorted({scan for column in columns.columns for scan in column.changed})
     windows = _windows(source, insides, wanted, inside, changes)
@@ -175,7 +176,7 @@ def _column(columns: Columns, number: int) -> dict[str, Any]:
     if not column.entries:
         row["value"] = column.initial.hex()
     if column.cell.code == TEXT:
-        row["texts"] = list(columns.texts[number])
+        row["texts"] = list(columns.texts[number].numbers)
     return row
 
 

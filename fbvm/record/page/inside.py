@@ -136,6 +136,7 @@ class Window:
         """The scan before it only tells what was before."""
         self._power = PowerFlow(source.rungs, lambda scan: True)
         self._chart_recorder = ChartRecorder(source.charts, lambda scan: True)
+        self._has_pictures = bool(source.rungs or source.charts)
         self._known: list[str] = []
         self._memory: Snapshot | None = None
         self._statement: tuple[int, Frame] | None = None
@@ -166,14 +167,15 @@ class Window:
 
     def event(self, moment: Moment, event: Event) -> None:
         """Records a statement, its writes, the state of a contact."""
-        self._power.event(moment, event)
-        self._chart_recorder.event(moment, event)
-        if isinstance(event, Contact):
-            self._add(moment.scans, [self._insides.site(event.site), self._insides.instance(event.frame.base), POWER,
-                                     str(int(event.value))])  # fmt: skip
-        elif isinstance(event, Statement):
+        if self._has_pictures:
+            self._power.event(moment, event)
+            self._chart_recorder.event(moment, event)
+        if isinstance(event, Statement):
             self._statement, self._row = (event.site, event.frame), None
             self._open(moment, event.site, event.frame)
+        elif isinstance(event, Contact):
+            self._add(moment.scans, [self._insides.site(event.site), self._insides.instance(event.frame.base), POWER,
+                                     str(int(event.value))])  # fmt: skip
         elif isinstance(event, Write) and event.old != event.value:
             if self._statement != (event.site, event.frame) or self._row is None:
                 self._statement = event.site, event.frame

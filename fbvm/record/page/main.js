@@ -16,7 +16,7 @@ function start(data, bytes) {
   const panels = {scan: new ScanPanel(run, state, move), memory: new MemoryPanel(run, state, move),
                   frames: new FramesPanel(run, state, move)};
   const where = document.getElementById("where");
-  let waiting = false, choose = true, shown = null, naming = 0;
+  let waiting = false, choose = true, shown = null, naming = 0, took = 0;
 
   /** Changes the state and has everything drawn anew with the next picture. */
   function move(change) {
@@ -36,6 +36,7 @@ function start(data, bytes) {
   }
 
   function draw() {
+    const begun = performance.now();
     waiting = false;
     if (choose) chart.choose();
     const moved = choose || shown !== `${state.scan} ${state.row} ${state.chosen}`, later = chart.values(moved), isRough = chart.draw();
@@ -53,6 +54,7 @@ function start(data, bytes) {
     clearTimeout(naming);
     naming = setTimeout(() => history.replaceState(null, "", `#${state.scan}`), 200);
     if (isRough || later) move({});
+    took = performance.now() - begun;
   }
 
   /** A step inside the scan; behind the last one comes the next scan. */
@@ -103,6 +105,8 @@ function start(data, bytes) {
   document.getElementById("flow").hidden = !data.pictures;
   const wanted = parseInt(location.hash.slice(1), 10);
   move({scan: Number.isFinite(wanted) ? wanted : data.pinned.length ? run.last : run.first});
+  draw();
+  window.fbvm = {move, count: run.count, drawn: () => took, opened: performance.now()};  // for measuring
 }
 
 try {
