@@ -187,6 +187,8 @@ class Image:
     """The sequential function charts as they are drawn."""
     counters: int = 0
     """Counters beside the memory that its code counts in; see `fbvm.engine.counted`."""
+    marks: int = 0
+    """Bytes beside the memory in which its code notes power; see `fbvm.engine.powered`."""
 
     @cached_property
     def fingerprint(self) -> str:

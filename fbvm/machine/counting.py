@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from operator import sub
 
-from fbvm.engine.choice.tiers import add_counts, choice_of, counts_of, engine_for, python_of, substitutes_of
+from fbvm.engine.choice.tiers import add_counts, counts_of
 from fbvm.engine.counted import Counted, counted
+from fbvm.machine.instrumented import instrumented
 from fbvm.machine.plc import Plc
 
 
@@ -48,11 +49,6 @@ class Counting:
 @contextmanager
 def counting(plc: Plc) -> Iterator[Counting]:
     """Counts what `plc` executes inside the `with` block.  Raises ValueError if somebody looks into every scan of `plc`."""
-    program, made = plc.engine, counted(plc.image)
-    plc.engine = engine_for(made.image, plc.memory, choice_of(program))
-    for body, function in substitutes_of(program).items():
-        python_of(plc.engine).substitute(body, function)
-    try:
-        yield Counting(made, plc.engine)
-    finally:
-        plc.engine = program
+    made = counted(plc.image)
+    with instrumented(plc, made.image) as engine:
+        yield Counting(made, engine)

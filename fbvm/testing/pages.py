@@ -44,7 +44,6 @@ def write_page(path: Path, title: str, recorded: PlcRecording, subject: Subject,
 
     pinned = [place.name for place in asked]
     data = page_data(source, (), source.scans[-MOST_SCANS:], title, prefix=subject.prefix, pinned=pinned)
-    data["failure"] = failure
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_file(path, page(data))
+    write_file(path, page(data, failure))
     return True

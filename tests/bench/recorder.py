@@ -12,16 +12,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 
-from fbvm.code.compiler import compile_files  # noqa: E402
+from fbvm.code.compiler import compile_files, compile_text  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
 from fbvm.machine.counting import counting  # noqa: E402
 from fbvm.machine.plc import Phase, Plc  # noqa: E402
+from fbvm.machine.power import powering  # noqa: E402
 from fbvm.record.page.data import page_data  # noqa: E402
 from fbvm.record.page.page import page  # noqa: E402
 from fbvm.record.recording.recording import Recording  # noqa: E402
@@ -36,6 +38,7 @@ WARM = 100
 """Scans before the clock starts."""
 NATIVE_SCANS, PYTHON_SCANS, OBSERVED_SCANS, TIMES = 20_000, 500, 100, 5
 LEAST_SCANS = 200
+RUNGS = 100
 
 
 class Listener:
@@ -62,6 +65,31 @@ def scan_us(plc: Plc, scans: int) -> float:
     """Microseconds a scan, the best of some runs."""
     plc.run(scans=WARM)
     return min(seconds(lambda: plc.run(scans=scans)) for _ in range(TIMES)) / scans * 1e6
+
+
+def ladder(rungs: int) -> str:
+    """A program of so many rungs: a self-hold with two conditions, and the timer that it starts."""
+    made = ["PROGRAM Main", "VAR", *(f"    t{n} : TON; run{n} : BOOL;" for n in range(rungs)), "END_VAR"]
+    for n in range(rungs):
+        made += ["LADDER", f"    LD W{n}.00", f"    OR run{n}", f"    ANDNOT W{n}.01", f"    AND W{n}.02", f"    OUT run{n}",
+                 "END_LADDER", f"    t{n}(IN := run{n}, PT := T#50ms);"]  # fmt: skip
+    return "\n".join([*made, "END_PROGRAM", ""])
+
+
+def power_us() -> None:
+    """What it costs to note the power in the rungs of a ladder program."""
+    image = compile_text(ladder(RUNGS)).image
+    assert image is not None
+    found: dict[str, float] = {}
+    for noted in (False, True):
+        plc = Plc(image, engine="native")
+        for n in range(RUNGS):
+            plc.write(f"W{n}", [0, 1, 4, 5][n % 4])
+        with powering(plc) if noted else nullcontext():
+            found[f"{noted}"] = scan_us(plc, NATIVE_SCANS)
+    row(f"a scan of {RUNGS} rungs, native", f"{found['False']:.2f} us")
+    row("  the same with power noted", f"{found['True']:.2f} us")
+    row("  with power / without", f"{found['True'] / found['False']:.2f}", "<= 1.3")
 
 
 def scan_counted_us(image: Image, engine: str) -> float:
@@ -153,6 +181,7 @@ def main() -> None:
     image = compile_files([PROGRAM], runnable=True).image
     assert image is not None
     scans_of_each_build(image)
+    power_us()
     shown(image, LEAST_SCANS)
     recorded(image, scans)
 

@@ -17,6 +17,7 @@ from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.native.engine import NativeEngine
+from fbvm.engine.powered import UNMARKED
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.trap import Trap
 
@@ -99,6 +100,23 @@ def add_counts(engine: object, counts: Sequence[int]) -> None:
             engine.counted[number] += count
 
 
+def marks_of(engine: object) -> bytes:
+    """The notes of power of an engine whose image has them: of those tiers that have been running the last one counts."""
+    tiers = engine.tiers if isinstance(engine, TieredEngine) else [engine]
+    found = b""
+    for tier in tiers:
+        if isinstance(tier, PythonEngine | NativeEngine):
+            found = bytes(old if new == UNMARKED[0] else new for old, new in zip(found or tier.marks, tier.marks, strict=True))
+    return found
+
+
+def forget_marks(engine: object) -> None:
+    """Forgets all notes of power."""
+    for tier in engine.tiers if isinstance(engine, TieredEngine) else [engine]:
+        if isinstance(tier, PythonEngine | NativeEngine):
+            tier.marks[:] = UNMARKED * len(tier.marks)
+
+
 def image_of(engine: object, plain: Image) -> Image:
     """The image that an engine runs, which may be one with counters; `plain` for an engine that has none."""
     return engine.image if isinstance(engine, PythonEngine | NativeEngine | TieredEngine) else plain
@@ -151,8 +169,14 @@ class TieredEngine:
     @property
     def counts(self) -> list[int]:
         """How often each counter of the image was reached, on all tiers together."""
-        tiers = {id(engine): engine for engine in (self._python, self.first, self._fast) if engine}.values()
-        return [sum(counts) for counts in zip(*(engine.counts for engine in tiers), strict=True)]
+        return [sum(counts) for counts in zip(*(engine.counts for engine in self.tiers), strict=True)]
+
+    @property
+    def tiers(self) -> list[PythonEngine | NativeEngine]:
+        """The engines that have run, the one that runs now at the end."""
+        now = self._fast or self._engine
+        found = {id(engine): engine for engine in (self._python, self.first, self._fast) if engine}
+        return sorted(found.values(), key=lambda engine: engine is now)
 
     @property
     def native(self) -> bool:

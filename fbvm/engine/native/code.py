@@ -32,6 +32,7 @@ class Code:
         self.points: tuple[Point, ...] = ()
         self.kept_bytes, self.context_bytes = 0, 0
         self.counting: list[object] = []
+        self.marks_at = 0
         self._tasks = [f"task{number}" for number in range(len(image.tasks))]
         self._linked: dict[int, Linked] = {}
         self._waiting = False
@@ -106,7 +107,7 @@ class Code:
                 self.points = tuple((code, site, tuple((kind, value) for kind, value in shown))
                                     for code, site, shown in facts["points"])
                 self.kept_bytes, self.context_bytes = facts["context"]
-                self.counting = facts["counting"]
+                self.counting, self.marks_at = facts["counting"], facts["marks_at"]
             self._linked[level] = linked
 
     def level_of(self, level: int | None) -> int:
@@ -127,6 +128,7 @@ class Code:
 
 def _facts(made: Translation) -> dict[str, object]:
     return {"points": made.points, "context": [made.kept_bytes, made.context_bytes], "counting": made.counting,
+            "marks_at": made.marks_at,
             "parts": parts_of(made.routines)}
 
 

@@ -23,6 +23,7 @@ from fbvm.engine.native.llvm.entry_points import EntryPoint, entry
 from fbvm.engine.native.scans.code import NO_CLOCK_WORDS, ClockWordTable
 from fbvm.engine.native.scans.scans import NO_LIMIT, NativeScans, ScheduledTask
 from fbvm.engine.native.scans.units import UnitExchange, UnitInCode
+from fbvm.engine.powered import UNMARKED
 from fbvm.engine.stops import PAUSE, STOPPED, StopTable
 from fbvm.engine.trap import Trap, trap
 
@@ -51,6 +52,10 @@ class NativeEngine:
                                 0 if stops is None else stops.at)
         self._allowance = WHOLE_BUDGET
         self._counts = Counts(image.counters, self._context.at, self._code.counting) if image.counters else None
+        marks_at = self._context.at + self._code.marks_at
+        self.marks = (ctypes.c_ubyte * image.marks).from_address(marks_at) if image.marks else bytearray()
+        """The notes of power of an image that has them."""
+        self.marks[:] = UNMARKED * image.marks
         self.counted = [0] * image.counters
         """What another engine has counted in place of this one."""
         self._stops = stops  # which stays while machine code looks into it

@@ -24,6 +24,7 @@ from fbvm.engine.apart import run_apart
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.observation import NO_SITE, Observation
+from fbvm.engine.powered import UNMARKED
 from fbvm.engine.python.logged import ENDLESS, MOST_ENTRIES, Full, Log, LoggedWriter, Row
 from fbvm.engine.python.runtime import environment
 from fbvm.engine.python.statements import BodyWriter, function_name
@@ -138,6 +139,8 @@ class PythonEngine:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.observed = image, memory, observed
         self.counted = [0] * image.counters
+        self.marks = bytearray(UNMARKED * image.marks)
+        """The notes of power of an image that has them."""
         self.substitutes: dict[int, Callable[[int], None]] = {}
         self._numbers = {function_name(number, body): number for number, body in enumerate(image.bodies)}
         self._allowance = WHOLE_BUDGET
@@ -154,7 +157,7 @@ class PythonEngine:
         """The bodies of a program over this memory."""
         log = self._log if program.build is Build.LOGGED else None
         names = environment(self.memory, self.image.objects) | program.constants | (log.names if log else {})
-        names["counts"] = self.counted
+        names["counts"], names["marks"] = self.counted, self.marks
         for part in program.parts:
             exec(part, names)
         self._spaces.append(names)

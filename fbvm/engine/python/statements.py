@@ -349,6 +349,14 @@ def _count(w: BodyWriter, number: int) -> None:
     w.line(f"counts[{number}] += 1")
 
 
+def _mark(w: BodyWriter, number: int, rows: tuple[int, ...], a: Node) -> None:
+    index = str(number)
+    if rows:
+        low, size, count, marks = rows
+        index = f"{number} + {marks} * (n if 0 <= (n := ({w.place(('self', 0, ()), 1)} - {low}) // {size}) < {count} else 0)"
+    w.line(f"marks[{index}] = {bare(w.value(a))}")
+
+
 def _stop(w: BodyWriter, code: str, site: int) -> None:
     w.line(f"stop({code!r}, {site})")
 
@@ -370,6 +378,6 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
     "charge": _charge, "due": _due, "stop": _stop,
-    "observe": _observe, "count": _count,
+    "observe": _observe, "count": _count, "mark": _mark,
 }
 """How each statement is written: called with the operands of its row."""

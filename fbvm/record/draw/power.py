@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from fbvm.code.image import RungPicture
@@ -21,6 +21,15 @@ class RungExecution:
     states: dict[int, list[bool]] = field(default_factory=dict)
     values: dict[tuple[int, int, int | None], str] = field(default_factory=dict)
     """The values that were read and written, as text, by site, offset and bit; empty without `keep`."""
+
+
+def latest_execution(picture: RungPicture, base: int, scan: int,
+                     elements: Mapping[tuple[int, object], bool]) -> RungExecution | None:  # fmt: skip
+    """The latest execution of a rung as far as `machine.power` knows it; None if none of its elements was evaluated.
+
+    `elements` are those of the instance that begins at byte `base`, `scan` is the number to show."""
+    states = {number: [elements[site, number]] for number, (site, *_) in enumerate(picture.steps) if (site, number) in elements}
+    return RungExecution(scan, base, picture, states) if states else None
 
 
 Keep = Callable[[ScanState, RungExecution, Read | Write], None]

@@ -1,6 +1,8 @@
 // The time chart: a canvas as large as what is in view, names beside it.
 
-const ROW = 26, RULER = 38, LANE = 18;
+const RULER = 38, LANE = 18;
+const PICTURE_MS = 12, LABELS_MS = 6;
+const FEW_PARTS = 8;
 
 class Chart {
   constructor(run, state, move) {
@@ -11,14 +13,12 @@ class Chart {
     this.scroll = document.getElementById("scroll");
     this.spacer = document.getElementById("spacer");
     this.labels = document.getElementById("labels");
-    this.head = RULER + (run.frames.length ? LANE : 0);
-    document.getElementById("lane").hidden = !run.frames.length;
+    this.head = RULER + (run.packets.length ? LANE : 0);
+    document.getElementById("lane").hidden = !run.packets.length;
     document.getElementById("corner").style.height = `${this.head}px`;
-    this.frames = new Map();
-    for (const frame of run.frames) this.frames.set(frame.scan, [...(this.frames.get(frame.scan) ?? []), frame]);
-    this.own = run.frames[0]?.sender;
     this.shown = [];
-    this.scroll.addEventListener("scroll", () => this.draw());
+    this.old = new Set();
+    this.scroll.addEventListener("scroll", () => this.move({}));
     new ResizeObserver(() => this.draw()).observe(this.scroll);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     this.fingers = new Map();
@@ -37,13 +37,14 @@ class Chart {
 
   /** Takes the signals that the filter lets through, and makes their names. */
   choose() {
-    const words = this.state.filter.toLowerCase().split(/\s+/).filter(Boolean);
-    const end = this.state.start + this.state.span;
+    const words = this.state.filter.toLowerCase().split(/\s+/).filter(Boolean), start = this.run.place(Math.floor(this.state.start));
+    const end = this.run.place(Math.ceil(this.state.start + this.state.span) - 1) + 1;
     this.shown = this.run.signals.map((_, number) => number).filter(number => {
       const signal = this.run.signals[number], text = `${signal.name} ${signal.said}`.toLowerCase();
       if (!words.every(word => text.includes(word))) return false;
       if (!this.state.moving) return true;
-      return signal.track.place(end) > Math.max(0, signal.track.place(this.state.start));
+      const [low, high] = signal.column.extremes(start, end);
+      return low !== high;
     });
     this.labels.replaceChildren(...this.shown.map((number, at) => this.label(number, at)));
     this.labels.style.top = `${this.head}px`;
@@ -74,22 +75,34 @@ class Chart {
     return row;
   }
 
-  values() {
-    for (const row of this.labels.children) {
-      const number = Number(row.dataset.signal), signal = this.run.signals[number];
-      const text = this.run.text(number, this.state.scan, this.state.row), value = row.children[1];
-      const shown = this.run.show(signal, text);
-      if (value.textContent !== shown) value.textContent = shown;
-      value.className = signal.bit && text === "1" ? "on" : "";
-      row.classList.toggle("chosen", number === this.state.chosen);
+  /** Writes the values at the cursor beside the names: of the rows in view at once, of the others when there is time. */
+  values(moved) {
+    const rows = this.labels.children, top = Math.floor(this.scroll.scrollTop / ROW), seen = Math.ceil(this.scroll.clientHeight / ROW);
+    if (moved) this.old = new Set(rows);
+    for (let at = top; at <= top + seen && at < rows.length; at++) this.write(rows[at]);
+    const until = performance.now() + LABELS_MS;
+    for (const row of this.old) {
+      if (performance.now() > until) break;
+      this.write(row);
     }
+    return this.old.size > 0;
+  }
+
+  write(row) {
+    if (!this.old.delete(row)) return;
+    const number = Number(row.dataset.signal), signal = this.run.signals[number];
+    const text = this.run.text(number, this.state.scan, this.state.row), value = row.children[1], shown = this.run.show(signal, text);
+    if (value.textContent !== shown) value.textContent = shown;
+    value.className = signal.bit && text === "1" ? "on" : "";
+    row.classList.toggle("chosen", number === this.state.chosen);
   }
 
   // --- what is drawn
 
+  /** Draws what is in view; true if it is drawn roughly, because there was no time to unpack all of it. */
   draw() {
     const wide = this.scroll.clientWidth, high = this.scroll.clientHeight, dots = devicePixelRatio || 1;
-    if (!wide || !high) return;
+    if (!wide || !high) return false;
     this.canvas.style.height = `${high}px`;
     this.canvas.style.marginBottom = `${-high}px`;
     if (this.canvas.width !== Math.round(wide * dots) || this.canvas.height !== Math.round(high * dots)) {
@@ -115,9 +128,13 @@ class Chart {
     pen.beginPath();
     pen.rect(this.left, this.head, this.width, high);
     pen.clip();
+    this.run.columns.hurry(PICTURE_MS);
+    const drawing = new Drawing(pen, this.colour, this.letter, this.run), {start, span} = this.state;
     for (let at = from; at < this.shown.length && at * ROW - top < high; at++) {
-      this.row(this.run.signals[this.shown[at]], this.head + at * ROW - top);
+      drawing.row(this.run.signals[this.shown[at]], this.head + at * ROW - top, this.left, this.left + this.width, start, span);
     }
+    const isRough = this.run.columns.isRough;
+    this.run.columns.hurry(Infinity);
     pen.restore();
     const x = this.x(this.state.scan), broad = Math.max(2, this.scale);
     pen.fillStyle = this.colour.band;
@@ -125,6 +142,7 @@ class Chart {
     pen.fillStyle = this.colour.cursor;
     pen.fillRect(x, 0, broad > 6 ? 1.5 : 1, high);
     pen.restore();
+    return isRough;
   }
 
   rulers(high) {
@@ -142,14 +160,35 @@ class Chart {
     }
     pen.fillStyle = this.colour.line;
     pen.fillRect(this.left, this.head - 1, this.width, 1);
+    pen.fillStyle = this.colour.cursor;
+    for (const window of this.run.windows) {
+      const from = Math.max(this.left, this.x(window.first)), to = Math.min(this.left + this.width, this.x(window.last + 1));
+      if (to >= from) pen.fillRect(from, RULER - 3, Math.max(2, to - from), 2);
+    }
+    this.packets();
+  }
+
+  /** Arrows where packets passed, or a bar where that were very many. */
+  packets() {
+    const {run, pen} = this, right = this.left + this.width, seen = run.data.frames
+      .map(([first, last], part) => [this.x(first), this.x(last + 1), part]).filter(([from, to]) => to >= this.left && from <= right);
+    if (seen.length > FEW_PARTS) {
+      pen.fillStyle = this.colour.out;
+      for (const [from, to] of seen) pen.fillRect(Math.max(this.left, from), RULER + 5, Math.max(1, Math.min(to, right) - Math.max(this.left, from)), 7);
+      return;
+    }
     let until = -Infinity;
-    for (const [scan, frames] of this.frames) {
-      const x = this.x(scan + .5);
-      if (x < this.left - 8 || x > this.left + this.width || x < until) continue;
-      const out = frames.filter(frame => frame.sender === this.own).length;
-      if (out) this.arrow(x - (out < frames.length ? 4 : 0), true);
-      if (out < frames.length) this.arrow(x + (out ? 4 : 0), false);
-      until = x + 1;
+    for (const [, , part] of seen) {
+      const frames = run.frames(part);
+      for (let at = 0, next; at < frames.length; at = next) {
+        const scan = frames[at].scan, x = this.x(scan + .5);
+        let out = 0;
+        for (next = at; next < frames.length && frames[next].scan === scan; next++) out += frames[next].out;
+        if (x < this.left - 8 || x > right || x < until) continue;
+        if (out) this.arrow(x - (out < next - at ? 4 : 0), true);
+        if (out < next - at) this.arrow(x + (out ? 4 : 0), false);
+        until = x + 1;
+      }
     }
   }
 
@@ -163,58 +202,6 @@ class Chart {
     pen.lineTo(x + 3.5, tip + (out ? 6 : -6));
     pen.fill();
     pen.fillRect(x - .75, Math.min(tip, foot), 1.5, Math.abs(tip - foot));
-  }
-
-  row(signal, y) {
-    const pen = this.pen, {start, span} = this.state, track = signal.track, end = Math.min(start + span, this.run.last + 1);
-    pen.fillStyle = this.colour.grid;
-    pen.fillRect(this.left, y + ROW - 1, this.width, 1);
-    const from = Math.max(0, track.place(start)), to = track.place(end);
-    if (to - from > 3 * this.width) {
-      pen.fillStyle = this.colour.fill;
-      pen.fillRect(this.left, y + 5, this.x(end) - this.left, ROW - 10);
-      return;
-    }
-    for (let at = from; at <= to; at++) {
-      const left = Math.max(this.left, this.x(track.scans[at]));
-      const right = Math.min(this.x(at + 1 < track.scans.length ? Math.min(track.scans[at + 1], end) : end), this.left + this.width);
-      if (right <= left && at < to) continue;
-      if (signal.bit) this.bit(left, right, y, track.values[at] === "1");
-      else this.value(signal, at, left, right, y, track.scans[at] > start);
-    }
-  }
-
-  bit(left, right, y, on) {
-    this.pen.fillStyle = on ? this.colour.on : this.colour.line;
-    this.pen.fillRect(left, on ? y + 5 : y + ROW - 8, Math.max(1, right - left), on ? ROW - 11 : 2);
-  }
-
-  value(signal, at, left, right, y, edge) {
-    const pen = this.pen, wide = right - left, text = signal.track.values[at];
-    if (signal.levels && signal.high > signal.low) {
-      const level = (ROW - 10) * (signal.levels[at] - signal.low) / (signal.high - signal.low);
-      pen.fillStyle = this.colour.fill;
-      pen.fillRect(left, y + ROW - 5 - level, Math.max(1, wide), level + 1);
-      pen.fillStyle = this.colour.word;
-      pen.fillRect(left, y + ROW - 5 - level, Math.max(1, wide), 1.5);
-    } else {
-      pen.strokeStyle = this.colour.line;
-      pen.strokeRect(left + .5, y + 4.5, Math.max(1, wide), ROW - 9);
-    }
-    if (edge) {
-      pen.fillStyle = this.colour.word;
-      pen.fillRect(left, y + 4, 1, ROW - 8);
-    }
-    const room = Math.floor((wide - 5) / this.letter);
-    if (room >= 1 && (room >= text.length || room >= 4)) {
-      const shown = room >= text.length ? text : `${text.slice(0, room - 1)}…`;
-      pen.strokeStyle = this.colour.bg;
-      pen.lineWidth = 3;
-      pen.strokeText(shown, left + 4, y + ROW / 2);
-      pen.lineWidth = 1;
-      pen.fillStyle = this.colour.fg;
-      pen.fillText(shown, left + 4, y + ROW / 2);
-    }
   }
 
   // --- fingers and wheels

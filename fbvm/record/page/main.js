@@ -1,13 +1,14 @@
 // Puts the page together: one state, moved by keys, buttons and fingers; everything is drawn from it.
 
-async function unpack() {
-  const packed = Uint8Array.from(atob(document.getElementById("data").textContent), letter => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return JSON.parse(await new Response(stream).text());
+/** The head of the data, and the parts behind it. */
+function unpack() {
+  const bytes = Uint8Array.from(atob(document.getElementById("data").textContent), letter => letter.charCodeAt(0));
+  const size = new DataView(bytes.buffer).getUint32(0, true);
+  return [inflateJson(bytes.subarray(4, 4 + size)), bytes.subarray(4 + size)];
 }
 
-function start(data) {
-  const run = new Run(data), span = Math.max(5, Math.min(run.count, 400));
+function start(data, bytes) {
+  const run = new Run(data, bytes), span = Math.max(5, Math.min(run.count, 400));
   const pinned = data.pinned.map(name => run.signals.findIndex(signal => signal.name === name)).filter(number => number >= 0);
   const state = {scan: run.first, row: -1, start: run.first, span, chosen: pinned[0] ?? 0, filter: "", moving: false, pinned,
                  every: false, power: true, hex: true, all: false, area: "", panel: "scan"};
@@ -15,7 +16,7 @@ function start(data) {
   const panels = {scan: new ScanPanel(run, state, move), memory: new MemoryPanel(run, state, move),
                   frames: new FramesPanel(run, state, move)};
   const where = document.getElementById("where");
-  let waiting = false, choose = true;
+  let waiting = false, choose = true, shown = null, naming = 0, took = 0;
 
   /** Changes the state and has everything drawn anew with the next picture. */
   function move(change) {
@@ -35,11 +36,12 @@ function start(data) {
   }
 
   function draw() {
+    const begun = performance.now();
     waiting = false;
     if (choose) chart.choose();
+    const moved = choose || shown !== `${state.scan} ${state.row} ${state.chosen}`, later = chart.values(moved), isRough = chart.draw();
     choose = false;
-    chart.values();
-    chart.draw();
+    shown = `${state.scan} ${state.row} ${state.chosen}`;
     const rows = run.rows(state.scan).length, inside = state.row >= 0 ? `, step ${state.row + 1} of ${rows}` : "";
     where.textContent = run.count ? `scan ${state.scan}, ${showTime(run.time(state.scan))}${inside}` : "no scans";
     for (const tab of document.querySelectorAll("#tabs button")) {
@@ -49,7 +51,10 @@ function start(data) {
     for (const [name, panel] of Object.entries(panels)) {
       if (document.getElementById(name).offsetParent) panel.draw();
     }
-    history.replaceState(null, "", `#${state.scan}`);
+    clearTimeout(naming);
+    naming = setTimeout(() => history.replaceState(null, "", `#${state.scan}`), 200);
+    if (isRough || later) move({});
+    took = performance.now() - begun;
   }
 
   /** A step inside the scan; behind the last one comes the next scan. */
@@ -97,11 +102,15 @@ function start(data) {
     const box = document.getElementById(name);
     box.addEventListener("change", () => move({[name]: box.checked}));
   }
-  document.getElementById("flow").hidden = !data.pictures.length;
+  document.getElementById("flow").hidden = !data.pictures;
   const wanted = parseInt(location.hash.slice(1), 10);
   move({scan: Number.isFinite(wanted) ? wanted : data.pinned.length ? run.last : run.first});
+  draw();
+  window.fbvm = {move, count: run.count, drawn: () => took, opened: performance.now()};  // for measuring
 }
 
-unpack().then(start).catch(error => {
+try {
+  start(...unpack());
+} catch (error) {
   document.getElementById("where").textContent = `this page cannot be shown: ${error.message ?? error}`;
-});
+}

@@ -7,29 +7,28 @@ from __future__ import annotations
 
 import base64
 import html
-import json
 import re
-import zlib
 from functools import cache
 from pathlib import Path
-from typing import Any
+
+from fbvm.record.page.data import PageData, packed
 
 FOLDER = Path(__file__).parent
-SCRIPTS = ("model.js", "chart.js", "panels.js", "main.js")
+SCRIPTS = ("inflate.js", "columns.js", "model.js", "drawing.js", "chart.js", "panels.js", "main.js")
 _PLACE = re.compile(r"\{\{(title|failure|style|script|data)\}\}")
 """Where the parts of a page go in `page.html`; what is put in is not searched again."""
 
 
-def page(data: dict[str, Any]) -> str:
-    """The text of the HTML file; `data` is the result of `page_data`, with `failure` also the text of a failed assertion."""
-    failure = html.escape(str(data.get("failure", "")))
-    packed = zlib.compress(json.dumps(data, separators=(",", ":")).encode(), 9)
+def page(data: PageData, failure: str = "") -> str:
+    """The text of the HTML file; `failure` is the text of a failed assertion."""
+    failure = html.escape(failure)
+    head = packed(data.head)
     parts = {
-        "title": html.escape(str(data["title"])),
+        "title": html.escape(str(data.head["title"])),
         "failure": f'<pre id="failure" aria-label="The failed assertion">{failure}</pre>' if failure else "",
         "style": _file("page.css"),
         "script": "\n".join(_file(name) for name in SCRIPTS),
-        "data": base64.b64encode(packed).decode("ascii"),
+        "data": base64.b64encode(b"".join([len(head).to_bytes(4, "little"), head, *data.parts])).decode("ascii"),
     }
     return _PLACE.sub(lambda place: parts[place[1]], _file("page.html"))
 

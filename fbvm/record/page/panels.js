@@ -40,10 +40,10 @@ class ScanPanel {
 
   /** The rungs and charts of the scan as drawings; what has power is heavy and coloured. */
   rungs() {
-    const shown = this.state.power ? this.run.data.ladder[this.state.scan] ?? [] : [];
+    const shown = this.state.power ? this.run.ladder(this.state.scan) : [];
     return shown.map(([instance, number]) => {
       const picture = element("pre");
-      const path = this.run.data.instances[instance], [head, ...lines] = this.run.data.pictures[number].split("\n");
+      const path = this.run.data.instances[instance], [head, ...lines] = this.run.picture(number).split("\n");
       picture.append(element("b", "", head), element("span", "dim", path ? `  in ${path}\n` : "\n"));
       for (const line of lines) picture.append(new DOMParser().parseFromString(line, "image/svg+xml").documentElement);
       return picture;
@@ -53,7 +53,7 @@ class ScanPanel {
   fill() {
     document.getElementById("ladder").replaceChildren(...this.rungs());
     const {run, state} = this, rows = run.rows(state.scan), known = new Map();
-    const before = number => known.get(number) ?? run.text(number, state.scan - 1) ?? run.signals[number].track.values[0];
+    const before = number => known.get(number) ?? run.text(number, state.scan - 1);
     const heads = ["", ...state.pinned.map(number => run.signals[number].name), "what it changed"];
     this.table.tHead.replaceChildren(element("tr", "", ...heads.map(text => element("th", "", text))));
     const made = [];
@@ -71,7 +71,7 @@ class ScanPanel {
       if (where >= 0 && !changes.length && !state.every) return;
       made.push(this.row(at, where, instance, changes, before));
     });
-    if (!made.length) made.push(element("tr", "phase", element("td", "", this.nothing(rows))));
+    if (!made.length) made.push(element("tr", "phase", this.nothing(rows)));
     this.table.tBodies[0].replaceChildren(...made);
   }
 
@@ -85,10 +85,26 @@ class ScanPanel {
     return row;
   }
 
+  /** Why nothing is shown of the scan, and buttons to the nearest scans of which it is. */
   nothing(rows) {
-    if (rows.length) return "no statement changed anything in this scan";
-    return this.run.data.depth === "scans" ? "recorded at scan ends only; --depth statements shows the inside"
-      : "what happened inside this scan is not kept";
+    const {run, state} = this, cell = element("td");
+    if (rows.length) cell.append("no statement changed anything in this scan");
+    else if (run.data.depth === "scans") cell.append("recorded at scan ends only; --depth statements shows the inside");
+    else {
+      const before = run.windows.findLast(window => window.last < state.scan), behind = run.windows.find(window => window.first > state.scan);
+      cell.append("what happened inside this scan is not on the page; it has the inside of ");
+      for (const [window, to, text] of [[before, before?.last, "◀ "], [behind, behind?.first, "▶ "]]) {
+        if (!window) continue;
+        const button = element("button", "window", `${text}scan${window.first < window.last ? `s ${window.first} to` : ""} ${window.last}`);
+        button.addEventListener("click", event => {
+          event.stopPropagation();
+          this.move({scan: to});
+        });
+        cell.append(button, " ");
+      }
+      if (!run.windows.length) cell.append("no scan");
+    }
+    return cell;
   }
 
   row(at, where, instance, changes, value) {
@@ -218,23 +234,43 @@ class MemoryPanel {
 
 class FramesPanel {
   constructor(run, state, move) {
+    this.run = run;
     this.state = state;
+    this.move = move;
     this.list = document.getElementById("passed");
-    const own = run.frames[0]?.sender.split(":")[0];
-    const rows = run.frames.map(frame => {
-      const out = frame.sender.split(":")[0] === own, button = element("button");
-      button.append(element("span", out ? "out" : "in", out ? "↑ " : "↓ "), element("span", "dim", `scan ${frame.scan}, ${showTime(run.time(frame.scan))}  `),
-                    `${frame.sender} → ${frame.receiver}  `, element("b", "", frame.said));
-      button.addEventListener("click", () => move({scan: frame.scan, row: -1}));
-      const row = element("li", "", button);
-      if (frame.hex) row.append(element("code", "", frame.hex.toUpperCase().replace(/(..)(?=.)/g, "$1 ")));
-      row.dataset.scan = frame.scan;
-      return row;
-    });
+    this.drawn = null;
+  }
+
+  /** The parts of the packets around the cursor: the one of its scan, or before it, and its neighbours. */
+  parts() {
+    const all = this.run.data.frames, near = Math.max(0, all.findLastIndex(([first]) => first <= this.state.scan));
+    return [Math.max(0, near - 1), Math.min(all.length, near + 2)];
+  }
+
+  fill(from, to) {
+    const rows = [], packets = count => element("li", "dim", `${count} packet${count === 1 ? "" : "s"}`);
+    const count = (first, last) => this.run.data.frames.slice(first, last).reduce((sum, [, , size]) => sum + size, 0);
+    if (from) rows.push(packets(`${count(0, from)} earlier`));
+    for (let part = from; part < to; part++) rows.push(...this.run.frames(part).map(frame => this.row(frame)));
+    if (to < this.run.packets.length) rows.push(packets(`${count(to)} later`));
     this.list.replaceChildren(...(rows.length ? rows : [element("li", "dim", "nothing passed the network, or the trace does not hold it")]));
   }
 
+  row(frame) {
+    const button = element("button"), row = element("li", "", button);
+    button.append(element("span", frame.out ? "out" : "in", frame.out ? "↑ " : "↓ "),
+                  element("span", "dim", `scan ${frame.scan}, ${showTime(this.run.time(frame.scan))}  `),
+                  `${frame.sender} → ${frame.receiver}  `, element("b", "", frame.said));
+    button.addEventListener("click", () => this.move({scan: frame.scan, row: -1}));
+    if (frame.hex) row.append(element("code", "", frame.hex.toUpperCase().replace(/(..)(?=.)/g, "$1 ")));
+    row.dataset.scan = frame.scan;
+    return row;
+  }
+
   draw() {
+    const [from, to] = this.parts();
+    if (this.drawn !== `${from} ${to}`) this.fill(from, to);
+    this.drawn = `${from} ${to}`;
     let found = null;
     for (const row of this.list.children) {
       const now = Number(row.dataset.scan) === this.state.scan;

@@ -64,15 +64,30 @@ class RecordedScans(ScanSource):
 
         @contextmanager
         def attached(plc: Plc) -> Iterator[None]:
-            listener = _Listener(Moment(self, plc.memory), follower)
-            plc.watchers.append(listener.end)
-            for network in [attached.network for attached in plc.units][:1]:
-                add_tap(network, listener.passed)
-            with observing(plc, listener):
+            with observing(plc, self._listen(plc, follower)):
                 yield
 
         if scans := self._wanted(scans):
             self._recorded.follow_with(scans, attached)
+
+    def follow_ends(self, follower: Follower, scans: range | None = None) -> None:
+        """Executes some scans again, or all, and reports their ends and what passed the network."""
+
+        @contextmanager
+        def attached(plc: Plc) -> Iterator[None]:
+            self._listen(plc, follower)
+            yield
+
+        if scans := self._wanted(scans):
+            self._recorded.follow_with(scans, attached)
+
+    def _listen(self, plc: Plc, follower: Follower) -> _Listener:
+        """Has a PLC report to `follower` the ends of its scans and what passes the network."""
+        listener = _Listener(plc, Moment(self, plc.memory), follower)
+        plc.watchers.append(listener.end)
+        for network in [attached.network for attached in plc.units][:1]:
+            add_tap(network, listener.passed)
+        return listener
 
     def _wanted(self, scans: range | None) -> range:
         held = self.scans
@@ -82,8 +97,8 @@ class RecordedScans(ScanSource):
 class _Listener:
     """Passes on to a follower what happens in the scans of a PLC that executes them again."""
 
-    def __init__(self, moment: Moment, follower: Follower) -> None:
-        self._moment, self._follower = moment, follower
+    def __init__(self, plc: Plc, moment: Moment, follower: Follower) -> None:
+        self._plc, self._moment, self._follower = plc, moment, follower
 
     def _at(self, plc: Plc, scan: int) -> Moment:
         self._moment.scans, self._moment.now_ns = scan, plc.now_ns
@@ -99,7 +114,7 @@ class _Listener:
 
     def passed(self, now_ns: int, unit: str, event: TapEvent) -> None:
         """Passes on an event of the network."""
-        self._follower.event(self._moment, NetworkEvent(now_ns, event))
+        self._follower.event(self._at(self._plc, self._plc.scans), NetworkEvent(now_ns, event))
 
     def end(self, plc: Plc) -> None:
         """Called after each scan."""

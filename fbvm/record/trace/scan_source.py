@@ -14,7 +14,7 @@ from fbvm.base.memory import Memory
 from fbvm.base.types import Field
 from fbvm.code.image import RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
-from fbvm.record.trace.events import Event
+from fbvm.record.trace.events import Event, NetworkEvent
 from fbvm.record.trace.writer import Depth
 from fbvm.watch import places
 from fbvm.watch.names import Names
@@ -88,6 +88,10 @@ class ScanSource(ABC):
     def follow(self, follower: Follower, scans: range | None = None) -> None:
         """Reports the phases and events of some scans, or of all, to `follower`."""
 
+    def follow_ends(self, follower: Follower, scans: range | None = None) -> None:
+        """Reports to `follower` the end of some scans, or of all, and what passed the network; nothing that happened inside."""
+        self.follow(_Ends(follower), scans)
+
     def find(self, text: str) -> Place | Span:
         """The place or span of places that `text` names.  Raises UnknownPlace."""
         return find(self.symbols, self.areas, text)
@@ -102,6 +106,23 @@ class ScanSource(ABC):
         if moment is None:
             raise ValueError(f"scan {scan} is not in the trace, which has {_shown(self.scans)}")
         return moment
+
+
+class _Ends:
+    """Passes on the ends of scans and network events only."""
+
+    def __init__(self, follower: Follower) -> None:
+        self._follower = follower
+
+    def phase(self, moment: Moment, phase: Phase) -> None:
+        """Passes on the end of a scan."""
+        if phase is Phase.REFRESH:
+            self._follower.phase(moment, phase)
+
+    def event(self, moment: Moment, event: Event) -> None:
+        """Passes on what passed the network."""
+        if isinstance(event, NetworkEvent):
+            self._follower.event(moment, event)
 
 
 def _shown(scans: Sequence[int]) -> str:

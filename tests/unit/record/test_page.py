@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 import re
-import zlib
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from page_rig import ReadPage
 from trace_rig import image, record, traced
 
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.svg import SvgChart
+from fbvm.record.page import columns, inside
 from fbvm.record.page import data as module
 from fbvm.record.page.data import page_data
+from fbvm.record.page.inside import POWER, text_of
 from fbvm.record.page.page import page
 from fbvm.record.recording.recording import Recording
 from fbvm.record.recording.scans import RecordedScans
@@ -28,10 +28,21 @@ from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.link import Peer
 
-
-def value_in(changes: list[Any], scan: int) -> Any:
-    """The value of the last change at or before a scan."""
-    return [value for at, value in zip(changes[::2], changes[1::2], strict=True) if at <= scan][-1]
+NUMBERS = """\
+PROGRAM Main
+VAR
+    n : INT; s : SINT; b : BYTE; u : UINT; d : DINT; dw : DWORD; l : LINT; lw : LWORD; r : REAL; lr : LREAL; t : TIME; low : BOOL;
+    located AT D7 : WORD; bit AT D9.3 : BOOL; text : STRING[20]; day : DATE := D#2024-02-28; far : ARRAY[0..400] OF LINT;
+    p : REF_TO INT;
+END_VAR
+    n := n + 1;
+    s := INT_TO_SINT(n * 7 MOD 100 - 50); b := BYTE#250 OR INT_TO_BYTE(n MOD 4); u := INT_TO_UINT(n) * 999; d := -70000 * n;
+    dw := ROL(DWORD#16#8000_0001, n); l := l * 3 - 12345678901; lw := LWORD#16#FFFF_FFFF_0000_0000 OR INT_TO_LWORD(n);
+    r := r / 3.0 + 1.5; lr := SQRT(INT_TO_LREAL(n)); t := t + T#1ms500us; low := n MOD 3 = 0; bit := n > 20;
+    IF n MOD 10 = 0 THEN text := CONCAT('at ', INT_TO_STRING(n)); END_IF
+    far[n] := n; far[30] := n; p := REF(n);
+END_PROGRAM
+"""
 
 
 def text(trace: Trace, name: str, scan: int) -> str:
@@ -45,88 +56,122 @@ def text(trace: Trace, name: str, scan: int) -> str:
 @pytest.mark.parametrize("depth", list(Depth))
 def test_every_value_of_every_scan_is_there(depth: Depth) -> None:
     trace = traced(160, depth)
-    data = page_data(trace)
-    assert data["scans"] == [0, 160]
-    assert len(data["times"]) == 160
+    read = ReadPage(page_data(trace))
+    assert read.head["scans"] == [0, 160]
+    assert read.times == [moment.now_ns for moment in trace.moments()]
     for scan in (0, 3, 7, 8, 149, 159):
-        for signal in data["signals"]:
-            assert value_in(signal["changes"], scan) == text(trace, signal["name"], scan), (signal["name"], scan)
+        for signal in read.head["signals"]:
+            place = trace.find(signal["name"])
+            is_text = read.head["columns"][signal["cell"]]["code"] == "text"
+            wanted = text(trace, signal["name"], scan) if is_text else trace.at(scan).read(place)
+            assert read.value(signal, scan) == wanted, (signal["name"], scan)
         for address in (199, 200):
-            changes = data["words"]["D"].get(str(address), [0, 0])
-            assert value_in(changes, scan) == trace.at(scan).read(f"D{address}")
+            assert read.word("D", address, scan) == trace.at(scan).read(f"D{address}")
+
+
+def test_values_in_blocks_are_those_of_the_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers of every size, bits and texts, over several blocks; in some of them nothing changes."""
+    monkeypatch.setattr(columns, "BLOCK_SCANS", 7)
+    plc = Plc(image(NUMBERS))
+    recorded = Recording().add("main", plc)
+    plc.run(scans=60)
+    plc.write("D7", 5)
+    plc.run(scans=5)
+    source = RecordedScans(recorded, {})
+    read = ReadPage(page_data(source))
+    assert len(read.head["blocks"]) > 8 and sum(read.head["blocks"]) == 65
+    for signal in read.head["signals"]:
+        place = source.find(signal["name"])
+        is_text = read.head["columns"][signal["cell"]]["code"] == "text"
+        found = read.values(signal["name"])
+        wanted = [text_of(source, Signal(place, ""), moment) if is_text else moment.read(place) for moment in source.moments()]
+        assert found == wanted, signal["name"]
+    assert [read.word("D", 7, scan) for scan in (0, 59, 60, 64)] == [0, 0, 5, 5]
+    assert read.word("D", 8, 60) == 0
 
 
 @pytest.mark.parametrize("depth", [Depth.WRITES, Depth.STATEMENTS])
 def test_the_rows_of_a_scan_lead_from_one_end_to_the_next(depth: Depth) -> None:
-    data = page_data(traced(20, depth))
+    trace = traced(20, depth)
+    read = ReadPage(page_data(trace))
+    names = [signal["name"] for signal in read.head["signals"]]
     for scan in range(1, 20):
-        known = [value_in(signal["changes"], scan - 1) for signal in data["signals"]]
-        for _, _, *moved in data["rows"][str(scan)]:
-            assert module.POWER not in moved[::2]
+        known = [text(trace, name, scan - 1) for name in names]
+        for _, _, *moved in read.rows[scan]:
+            assert POWER not in moved[::2]
             for number, now in zip(moved[::2], moved[1::2], strict=True):
                 assert known[number] != now
                 known[number] = now
-        assert known == [value_in(signal["changes"], scan) for signal in data["signals"]]
+        assert known == [text(trace, name, scan) for name in names]
 
 
 def test_a_row_says_which_statement_it_was() -> None:
-    data = page_data(traced(20, Depth.STATEMENTS))
-    pump = next(number for number, signal in enumerate(data["signals"]) if signal["name"] == "Main.Pump")
-    [row] = [row for row in data["rows"]["8"] if pump in row[2::2]]
-    assert data["sites"][row[0]] == ["pump.st", 17, "Pump := Delay.Q;"]
-    assert data["instances"][row[1]] == "Main"
-    assert data["rows"]["3"][0][0] == -1  # the button was pressed between the scans
-    assert data["names"]["CIO 100.00"] == "Main.Pump"
+    read = ReadPage(page_data(traced(20, Depth.STATEMENTS)))
+    pump = next(number for number, signal in enumerate(read.head["signals"]) if signal["name"] == "Main.Pump")
+    [row] = [row for row in read.rows[8] if pump in row[2::2]]
+    assert read.head["sites"][row[0]] == ["pump.st", 17, "Pump := Delay.Q;"]
+    assert read.head["instances"][row[1]] == "Main"
+    assert read.rows[3][0][0] == -1  # the button was pressed between the scans
+    assert read.head["names"]["CIO 100.00"] == "Main.Pump"
 
 
 def test_where_power_flows_in_rungs() -> None:
     text = "PROGRAM Main\nLADDER\n    LD 0.00\n    ANDNOT 0.01\n    OUT 100.00\nEND_LADDER\nEND_PROGRAM\n"
     plc = Plc(image(text))
-    data = page_data(Trace(io.BytesIO(record(plc, 5, Depth.STATEMENTS))))
-    flows = {scan: [(data["sites"][row[0]][1], row[3]) for row in data["rows"][scan] if row[2:3] == [module.POWER]]
-             for scan in ("2", "3")}  # fmt: skip
-    assert [data["pictures"][number].split("\n")[1].count('<path class="power"') for _, number in data["ladder"]["3"]] == [2]
-    assert data["ladder"]["2"] == data["ladder"]["1"] != data["ladder"]["3"]
-    assert len(data["pictures"]) == 2
-    assert flows == {"2": [(3, "0"), (4, "1"), (5, "0")], "3": [(3, "1"), (4, "1"), (5, "1")]}
+    read = ReadPage(page_data(Trace(io.BytesIO(record(plc, 5, Depth.STATEMENTS)))))
+    flows = {scan: [(read.head["sites"][row[0]][1], row[3]) for row in read.rows[scan] if row[2:3] == [POWER]]
+             for scan in (2, 3)}  # fmt: skip
+    assert [read.pictures[number].split("\n")[1].count('<path class="power"') for _, number in read.ladder[3]] == [2]
+    assert read.ladder[2] == read.ladder[1] != read.ladder[3]
+    assert len(read.pictures) == 2
+    assert flows == {2: [(3, "0"), (4, "1"), (5, "0")], 3: [(3, "1"), (4, "1"), (5, "1")]}
 
 
 def test_charts_are_drawn_as_they_were_in_each_scan() -> None:
     text = """PROGRAM Main VAR x : BOOL; END_VAR INITIAL_STEP a: END_STEP
         TRANSITION FROM a TO b := TRUE; END_TRANSITION STEP b: x(N); END_STEP END_PROGRAM"""
-    data = page_data(Trace(io.BytesIO(record(Plc(image(text)), 4, Depth.STATEMENTS))))
-    drawn = {scan: data["pictures"][number].splitlines() for scan, ((_, number),) in data["ladder"].items()}
+    read = ReadPage(page_data(Trace(io.BytesIO(record(Plc(image(text)), 4, Depth.STATEMENTS)))))
+    drawn = {scan: read.pictures[number].splitlines() for scan, ((_, number),) in read.ladder.items()}
     assert {lines[0] for lines in drawn.values()} == {"PROGRAM Main"}
-    assert not [signal["name"] for signal in data["signals"] if "$" in signal["name"]]
+    assert not [signal["name"] for signal in read.head["signals"] if "$" in signal["name"]]
     steps = {scan: re.findall(r">(●)?</text><text[^>]*> (\w)<", lines[1]) for scan, lines in drawn.items()}
-    assert [steps[scan] for scan in "0123"] == [[("●", "a")], *[[("●", "b")]] * 3]
+    assert [steps[scan] for scan in range(4)] == [[("●", "a")], *[[("●", "b")]] * 3]
     assert [lines[1].count('<path class="power"') for lines in drawn.values()] == [0, 1, 1, 1]
-    assert "→ TRUE" in "\n".join(drawn["1"]) and drawn["2"] == drawn["3"] and len(data["pictures"]) == 3
+    assert "→ TRUE" in "\n".join(drawn[1]) and drawn[2] == drawn[3] and len(read.pictures) == 3
 
 
 @pytest.mark.slow
 def test_names_and_scans_choose() -> None:
-    data = page_data(traced(100), ["Main.Pump", "D200"], range(10, 20))
-    assert [signal["name"] for signal in data["signals"]] == ["Main.Pump", "D200"]
-    assert data["scans"] == [10, 10]
-    assert page_data(traced(10), prefix="Main.", pinned=["Main.Pump"])["pinned"] == ["Pump"]
+    head = page_data(traced(100), ["Main.Pump", "D200"], range(10, 20)).head
+    assert [signal["name"] for signal in head["signals"]] == ["Main.Pump", "D200"]
+    assert head["scans"] == [10, 10]
+    assert page_data(traced(10), prefix="Main.", pinned=["Main.Pump"]).head["pinned"] == ["Pump"]
     with pytest.raises(UnknownPlace):
         page_data(traced(3), ["Main.Nobody"])
 
 
 @pytest.mark.slow
-def test_of_too_much_the_latest_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_ROWS", 100)
-    rows = page_data(traced(60, Depth.STATEMENTS))["rows"]
-    assert "59" in rows and "0" not in rows
-    assert sum(map(len, rows.values())) <= 100
+def test_of_too_much_there_are_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the end, at the beginning, around the change of a variable that somebody asked about, and where it is wanted."""
+    monkeypatch.setattr(module, "MOST_ROWS", 400)
+    trace = traced(160, Depth.STATEMENTS)
+    read = ReadPage(page_data(trace, pinned=["Main.Pump"], inside=[range(60, 64)]))
+    windows = [range(first, last + 1) for first, last in read.head["windows"]]
+    assert sorted(read.rows) == [scan for window in windows for scan in window]
+    assert {0, 7, 8, 9, 60, 61, 62, 63, 150, 151, 152, 159} <= set(read.rows)
+    assert not {30, 100, 140} & set(read.rows)
+    assert sum(map(len, read.rows.values())) <= 400
+    assert read.values("Main.Pump") == [8 <= scan < 150 for scan in range(160)]
+    for scan in (60, 150):  # the first row of a window starts from what was before it
+        moved = {read.head["signals"][row[at]]["name"] for row in read.rows[scan] for at in range(2, len(row), 2)}
+        assert ("Main.Pump" in moved) == (scan == 150)
 
 
 def test_a_trace_without_scans_and_one_with_a_late_beginning() -> None:
-    assert page_data(traced(0))["scans"] == [0, 0]
+    assert page_data(traced(0)).head["scans"] == [0, 0]
     plc = Plc(image())
     plc.run(scans=7)
-    assert page_data(Trace(io.BytesIO(record(plc, 5))))["scans"] == [7, 5]
+    assert page_data(Trace(io.BytesIO(record(plc, 5)))).head["scans"] == [7, 5]
 
 
 def test_the_page_holds_everything_and_asks_for_nothing() -> None:
@@ -134,9 +179,10 @@ def test_the_page_holds_everything_and_asks_for_nothing() -> None:
     made = page(data)
     assert "<title>a &lt;run&gt; &amp; " in made
     assert not re.search(r"https?://|src=|@import|url\(", made)
-    found = re.search(r'id="data">([^<]*)<', made)
-    assert found
-    assert json.loads(zlib.decompress(base64.b64decode(found[1]))) == json.loads(json.dumps(data))
+    read = ReadPage.of_html(made)
+    assert read.head == json.loads(json.dumps(data.head))
+    assert read.columns == ReadPage(data).columns
+    assert read.rows[29] == ReadPage(data).rows[29] != []
 
 
 # --- SVG --------------------------------------------------------------------------------------------------------------
@@ -178,17 +224,17 @@ def test_a_long_run_stays_a_picture() -> None:
 
 def test_a_scan_with_very_many_statements_is_shown_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scan 2 of 5 passes its loop a hundred times; its first rows are there, its end, and all of the other scans."""
-    monkeypatch.setattr(module, "MOST_IN_SCAN", 60)
-    monkeypatch.setattr(module, "FIRST_IN_SCAN", 20)
+    monkeypatch.setattr(inside, "MOST_IN_SCAN", 60)
+    monkeypatch.setattr(inside, "FIRST_IN_SCAN", 20)
     compiled = image("PROGRAM Main\nVAR n, i, last, sum : INT; END_VAR\nn := n + 1;\nlast := SEL(n = 3, 2, 100);\n"
                      "FOR i := 1 TO last DO sum := sum + i; END_FOR;\nEND_PROGRAM\n")  # fmt: skip
     plc = Plc(compiled, engine="python")
     recorded = Recording().add("main", plc)
     plc.run(scans=5)
-    data = page_data(RecordedScans(recorded, {}))
-    rows = {int(scan): len(found) for scan, found in data["rows"].items()}
+    read = ReadPage(page_data(RecordedScans(recorded, {})))
+    rows = {scan: len(found) for scan, found in read.rows.items()}
     assert rows[2] <= 21
     assert {scan for scan, count in rows.items() if count > 1} == {0, 1, 2, 3, 4}
-    changes = next(signal["changes"] for signal in data["signals"] if signal["name"] == "Main.sum")
-    assert value_in(changes, 2) == "5056"
-    assert value_in(changes, 4) == "5062"
+    values = read.values("Main.sum")
+    assert values[2] == 5056
+    assert values[4] == 5062

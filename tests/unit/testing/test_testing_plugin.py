@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 import html
-import json
 import re
-import zlib
 from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
+from page_rig import ReadPage
 from rows import first_quick
 
 import fbvm.testing.rig  # noqa: F401 - what is loaded before pytest runs within pytest stays loaded
@@ -639,13 +637,11 @@ def test_a_failure_with_a_unit_shows_the_network_and_the_units_words(project: py
         "  scan 2    192.168.250.21:49152 -> 192.168.250.1:502  asks for a connection",
     ])  # fmt: skip
     [page] = (project.path / ".fbvm").glob("*.html")
-    found = re.search(r'id="data">([^<]*)<', page.read_text(encoding="utf-8"))
-    assert found
-    data = json.loads(zlib.decompress(base64.b64decode(found[1])))
-    assert data["pinned"] == ["D200"] and "D200" in [signal["name"] for signal in data["signals"]]
-    assert data["described"]["CIO 1519.03"] == "Send Request Switch"
-    assert data["meanings"]["D30009"]["4"] == "ESTABLISHED"
-    assert data["frames"][0][4] == "asks for a connection"
+    read = ReadPage.of_html(page.read_text(encoding="utf-8"))
+    assert read.head["pinned"] == ["D200"] and "D200" in [signal["name"] for signal in read.head["signals"]]
+    assert read.head["described"]["CIO 1519.03"] == "Send Request Switch"
+    assert read.head["meanings"]["D30009"]["4"] == "ESTABLISHED"
+    assert read.frames[0][4] == "asks for a connection"
 
 
 @pytest.mark.slow

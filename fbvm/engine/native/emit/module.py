@@ -76,6 +76,8 @@ class Translation:
     """Bytes of the context from its fields on."""
     counting: list[object]
     """Facts about its counters (`Counting.facts`), none for code that counts nothing."""
+    marks_at: int
+    """Where the notes of power begin in the context."""
     routines: tuple[str, ...]
     """Names of the library's routines that it calls."""
 
@@ -107,13 +109,15 @@ def _translated(image: Image, stops: bool) -> Translation:
     if image.counters:
         counting = module.counting = Counting(image)
         counting.offset = module.room(counting.bytes)
+    if image.marks:
+        module.marks_at = module.room(-(-image.marks // 16) * 16)
     bodies = [_body(module, number) for number in module.heights]
     tasks = [_task(module, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
     text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(), ASK,
                       ATTRIBUTES, METADATA, *[GUARD] * stops])
     return Translation(text, tuple(module.regions), tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
-                       module.counting.facts if module.counting else [],
+                       module.counting.facts if module.counting else [], module.marks_at,
                        tuple(sorted(module.routines)))
 
 

@@ -228,6 +228,18 @@ def _count(w: Writer, number: int) -> None:
     w.counting.count(number)
 
 
+def _mark(w: Writer, number: int, rows: tuple[int, ...], a: Node) -> None:
+    index = str(w.module.marks_at + number)
+    if rows:
+        low, size, count, marks = rows
+        away = w.new(f"sub i64 {w.offset(('self', 0, ()), 1)}, {low}")
+        row = w.new(f"udiv i64 {away}, {size}")
+        known = w.new(f"select i1 {w.new(f'icmp ult i64 {row}, {count}')}, i64 {row}, i64 0")
+        index = w.new(f"add i64 {w.new(f'mul i64 {known}, {marks}')}, {index}")
+    value = w.new(f"zext i1 {w.value(a)} to i8")
+    w.emit(f"store i8 {value}, ptr {w.new(f'getelementptr inbounds i8, ptr %c, i64 {index}')}, align 1")
+
+
 def _observe(w: Writer, kind: str, site: int, detail: Any) -> None:
     """What a run can stop at; a plain build has none."""
     observe(w, kind, site)
@@ -238,6 +250,6 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
     "charge": charge, "due": _due, "stop": _stop,
-    "observe": _observe, "count": _count,
+    "observe": _observe, "count": _count, "mark": _mark,
 }
 """How each statement is written: called with the operands of its row."""

@@ -104,6 +104,8 @@ class Module:
     """Whether its runs can be stopped at observations."""
     counting: Counting | None = None
     """The counters, if its code counts."""
+    marks_at: int = 0
+    """Where the bytes for notes of power begin in the context."""
     kept_bytes: int = 0
     scratch_end: int = SCRATCH
     regions: list[AliasScopes] = field(default_factory=list)
