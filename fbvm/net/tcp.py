@@ -28,12 +28,11 @@ class TcpNetwork(Switchboard):
     """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
     A unit without a row listens on the host's address `bind`, on the port of its request if that is 1024 or above; the first
-    one listens at `door`, if that is given.  Host names of the map are resolved here, once.
+    one listens at `door`, if given.  Host names of the map are resolved here, once.
 
-    With `backlog`, True or the endpoints of units, the host keeps a port open on which a unit has listened: who calls while none
-    of the unit's sockets waits is let in as soon as one does.  Without, such a caller is refused, as by the unit; only those
-    wait that the host has accepted in the same moment as the caller who took the last socket.  `faults` are rows of
-    `net.faults`, `seed` starts their random numbers.  Raises OSError for a name that cannot be resolved."""
+    With `backlog`, True or the endpoints of units, the host keeps a port open on which a unit has listened: who calls while no
+    socket of the unit waits is let in as soon as one does.  Without, the unit refuses such a caller, unless the host accepted it
+    together with the last one.  `faults` are rows of `net.faults`, `seed` seeds them.  Raises OSError for a bad name."""
 
     virtual_time = False
 
