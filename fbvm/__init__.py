@@ -40,12 +40,15 @@ if TYPE_CHECKING:
     from fbvm.record.draw.chart import chart as chart
     from fbvm.record.draw.chart import draw as draw
     from fbvm.record.export.pcapng import Capture as Capture
+    from fbvm.record.recording.file_reader import RecordingFile as RecordingFile
+    from fbvm.record.recording.file_scans import FileScans as FileScans
+    from fbvm.record.recording.file_writer import RecordingWriter as RecordingWriter
+    from fbvm.record.recording.journal_replay import Replay as Replay
     from fbvm.record.recording.recording import Recording as Recording
     from fbvm.record.trace.reader import Trace as Trace
     from fbvm.record.trace.recorder import Recorder as Recorder
     from fbvm.record.trace.writer import Depth as Depth
     from fbvm.record.trace.writer import TraceWriter as TraceWriter
-    from fbvm.run.replay import Replay as Replay
     from fbvm.units.etn21.unit import Etn21 as Etn21
     from fbvm.units.port.noc import Noc as Noc
     from fbvm.units.port.tianxing import Tianxing as Tianxing
@@ -67,11 +70,14 @@ _HOMES = {
     "interchange.plcopen.read.importing": ("Imported", "import_xml"),
     "record.draw.chart": ("chart", "draw"),
     "record.export.pcapng": ("Capture",),
+    "record.recording.file_reader": ("RecordingFile",),
+    "record.recording.file_scans": ("FileScans",),
+    "record.recording.file_writer": ("RecordingWriter",),
+    "record.recording.journal_replay": ("Replay",),
     "record.recording.recording": ("Recording",),
     "record.trace.reader": ("Trace",),
     "record.trace.recorder": ("Recorder",),
     "record.trace.writer": ("Depth", "TraceWriter"),
-    "run.replay": ("Replay",),
     "units.etn21.unit": ("Etn21",),
     "units.port.noc": ("Noc",),
     "units.port.tianxing": ("Tianxing",),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import marshal
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -199,6 +200,11 @@ class Image:
             content = _plain_bytes((body.name, body.code, body.instance_size))
             digest.update(b"%d:" % len(content) + content)
         return digest.hexdigest()[:32]
+
+    def with_e_banks(self, banks: Iterable[str]) -> Image:
+        """The image for a PLC that has these banks of the E area, too.  They follow its own, so no other offset changes."""
+        missing = tuple(name for name in banks if name not in self.layout.e_banks)
+        return replace(self, layout=replace(self.layout, e_banks=(*self.layout.e_banks, *missing))) if missing else self
 
 
 def _plain_bytes(data: Any) -> bytes:

@@ -2,7 +2,7 @@
 
 Inputs are the time, the events of the network for each unit, memory that was written from outside, forces, changes of
 mode, power-on, and settings of units.  Each scan ends with a fingerprint of the memory.  Lines are JSON.
-`fbvm.run.replay` executes a journal again.
+`fbvm.record.recording.journal_replay` executes a journal again.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ class Journal:
     def told(self, unit: int, events: Sequence[Event]) -> None:
         """Adds the events of the network for a unit to the line of the scan."""
         if events:
-            self._line.setdefault("events", {})[str(unit)] = [_from_event(event) for event in events]
+            self._line.setdefault("events", {})[str(unit)] = [from_event(event) for event in events]
 
     def after(self, watch: tuple[int, int] | None = None) -> None:
         """Writes the line of a scan; called after the scan.  `watch` is that of `Scan`."""
@@ -273,7 +273,7 @@ def _entry(line: dict[str, Any]) -> Entry:
             int(line["scan"]), int(line["now_ns"]), str(line["memory"]), writes,
             dict(line.get("force", {})), tuple(map(str, line.get("unforce", ()))),
             {int(unit): dict(given) for unit, given in line.get("settings", {}).items()},
-            {int(unit): tuple(map(_to_event, told)) for unit, told in line.get("events", {}).items()},
+            {int(unit): tuple(map(to_event, told)) for unit, told in line.get("events", {}).items()},
             int(line["budget"]) if "budget" in line else None,
             _watch(*line["watch"]) if "watch" in line else None,
         )  # fmt: skip
@@ -287,16 +287,22 @@ def _watch(steps: int, watch_ns: int) -> tuple[int, int]:
     return int(steps), int(watch_ns)
 
 
-def _from_event(event: Event) -> list[Any]:
-    """`["Received", 1, "0A0B", "192.168.250.1:502"]`: the class, then its fields in order."""
-    return [type(event).__name__, *(_plain(getattr(event, row.name)) for row in fields(event))]
+def from_event(event: Event) -> list[Any]:
+    """An event as plain data, `["Received", 1, "0A0B", "192.168.250.1:502"]`: the class, then its fields in order."""
+    kind = type(event)
+    return [kind.__name__, *[_plain(getattr(event, name)) for name in _NAMES[kind]]]
+
+
+_NAMES = {kind: tuple(row.name for row in fields(kind)) for kind in EVENTS.values()}
+"""The names of an event's fields, in order."""
 
 
 def _plain(value: int | str | bytes | Peer) -> int | str:
     return value.hex() if isinstance(value, bytes) else str(value) if isinstance(value, Peer) else value
 
 
-def _to_event(told: list[Any]) -> Event:
+def to_event(told: list[Any]) -> Event:
+    """The event that `from_event` was given.  Raises ValueError, TypeError, LookupError or AttributeError for other data."""
     kind = EVENTS.get(told[0])
     rows = fields(kind) if kind else ()
     if kind is None or len(told) != 1 + len(rows):

@@ -12,7 +12,7 @@ from typing import TypeAlias
 from fbvm.engine.observation import NO_SITE
 from fbvm.engine.stops import State
 from fbvm.machine.breakpoints import Breakpoint
-from fbvm.record.recording.recording import PlcRecording
+from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.trace.events import Statement
 from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position, Reached, Said
@@ -40,7 +40,7 @@ class Debugged:
         """By breakpoint with a hit count: where it was set, and how often it had been passed up to a position."""
 
     @property
-    def recorded(self) -> PlcRecording:
+    def recorded(self) -> RecordedPlc:
         """The recording of its scans."""
         session = self.session
         return session.source.recorded if isinstance(session, PastSession) else session.world.recorded(self.name)

@@ -11,7 +11,7 @@ from typing import Protocol
 from fbvm.engine.stops import State
 from fbvm.machine.breakpoints import Breakpoint, Breakpoints
 from fbvm.machine.plc import Plc
-from fbvm.record.recording.recording import PlcRecording
+from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.recording.replay import Replay
 from fbvm.step.world import World
 
@@ -123,7 +123,7 @@ class LiveRunner(Runner):
 class PastRunner(Runner):
     """Executes scans of a recording again, from number `scan` on."""
 
-    def __init__(self, recorded: PlcRecording, scan: int, scene: Scene, breakpoints: Sequence[Breakpoint], state: State | None,
+    def __init__(self, recorded: RecordedPlc, scan: int, scene: Scene, breakpoints: Sequence[Breakpoint], state: State | None,
                  passes: Mapping[Breakpoint, int], check: ScanCheck | None = None) -> None:  # fmt: skip
         self._again = Replay(recorded, scan)
         self._again.advance(scan)

@@ -26,6 +26,9 @@ from fbvm.machine.plc import Phase, Plc  # noqa: E402
 from fbvm.machine.power import powering  # noqa: E402
 from fbvm.record.page.data import page_data  # noqa: E402
 from fbvm.record.page.page import page  # noqa: E402
+from fbvm.record.recording.file_reader import RecordingFile  # noqa: E402
+from fbvm.record.recording.file_writer import Described, RecordingWriter  # noqa: E402
+from fbvm.record.recording.program_text import ProgramText  # noqa: E402
 from fbvm.record.recording.recording import Recording  # noqa: E402
 from fbvm.record.trace.events import Event  # noqa: E402
 from fbvm.record.trace.observing import observing  # noqa: E402
@@ -151,6 +154,35 @@ def shown(image: Image, scans: int) -> None:
     row("a scan shown at statement depth", f"{taken * 1e3:.1f} ms", "<= 50 ms")
 
 
+def in_a_file(image: Image, scans: int) -> None:
+    """A run that is recorded into a file: its price, its size, and scans of it that are shown from there."""
+    text = ProgramText(((str(PROGRAM), PROGRAM.read_text(encoding="utf-8")),))
+    for engine in ("native", "python"):
+        count = scans if engine == "native" else max(LEAST_SCANS, scans // 10)
+        Plc(image, engine=engine).run(scans=WARM)
+        plain = seconds(lambda engine=engine, count=count: Plc(image, engine=engine).run(scans=count))
+        for verify in (False, True):
+            plc, file = Plc(image, engine=engine), io.BytesIO()
+            recording = Recording(file=RecordingWriter(file, verify=verify))
+            recording.add("lines100", plc, Described(text))
+            taken = seconds(lambda plc=plc, count=count: plc.run(scans=count)) + seconds(recording.close)
+            said = ", fingerprint at every scan" if verify else ""
+            row(f"added by a file of {count} scans, {engine}{said}", f"{taken - plain:.2f} s",
+                "" if verify else f"<= {0.3 * count / SCANS:.2g} s")  # fmt: skip
+            row("  size", f"{len(file.getvalue()) / 1e6:.3f} MB", f"<= {1 + 20e-6 * count:.2f} MB")
+        in_memory = Recording()
+        in_memory.add("lines100", plc := Plc(image, engine=engine))
+        plc.run(scans=count)
+        row(f"{count} scans in memory, {engine}", f"{in_memory.size_bytes / 1e6:.2f} MB", f"<= {1 + 20e-6 * count:.2f} MB")
+        recorded = RecordingFile(io.BytesIO(file.getvalue()))["lines100"]
+        opened = seconds(lambda recorded=recorded: recorded.follow(Listener(), range(1)))
+        row(f"the first scan shown from the file, {engine}", f"{opened * 1e3:.0f} ms", "with compiling the program")
+        wanted = range(count // 7, count, max(1, count // 11))
+        took = [seconds(lambda recorded=recorded, scan=scan: recorded.follow(Listener(), range(scan, scan + 1)))
+                for scan in wanted]  # fmt: skip
+        row("  others, anywhere, the slowest", f"{max(took) * 1e3:.1f} ms", "<= 50 ms")
+
+
 def opening(text: str) -> None:
     """A page, opened by a browser where playwright and one are there."""
     program = shutil.which("chromium") or shutil.which("google-chrome")
@@ -183,6 +215,7 @@ def main() -> None:
     scans_of_each_build(image)
     power_us()
     shown(image, LEAST_SCANS)
+    in_a_file(image, scans)
     recorded(image, scans)
 
 

@@ -31,8 +31,8 @@ from fbvm.net.journal import Journal, open_journal
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, by_script, right
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
+from fbvm.record.recording.journal_replay import Replay
 from fbvm.run import run
-from fbvm.run.replay import Replay
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer

@@ -17,15 +17,19 @@ import zlib
 from collections.abc import Callable
 from contextlib import chdir
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from random import Random
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parents[2]))
+    sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parents[1] / "unit/rigs")]
 
 from click.testing import CliRunner
+from old_files import write_old_journal, write_old_trace
 
+from fbvm import Depth
 from fbvm.cli.main import main
+from fbvm.record.recording import container
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 2.0
@@ -95,6 +99,10 @@ KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "project": ("fbvm.toml", (("check",), ("check", "--json"), ("run",), ("run", "--json"), ("step",))),
     "library": ("own/library.toml", (("check", "use.st", "--library", "own", "--"),)),
     "journal": ("run.journal", (("replay",), ("replay", "--show", "Main.n", "--json"))),
+    "recording": ("run.fbtrace", (
+        ("chart",), ("table", "", "Main.n"), ("why", "Main.n"), ("convert", "", "out.html"), ("convert", "", "out.pcapng"),
+        ("replay",), ("replay", "--show", "Main.n", "--json"),
+    )),
     "trace": ("run.fbtrace", (
         ("chart",), ("table", "", "Main.n"), ("why", "Main.n"), ("convert", "", "out.html"), ("convert", "", "out.svg"),
         ("convert", "", "out.csv"), ("convert", "", "out.vcd"), ("convert", "", "out.pcapng"),
@@ -119,13 +127,16 @@ def seeds() -> dict[str, list[bytes]]:
         for path in (*examples[1:3], Path("counter.st")):
             verb("export", str(path), "-o", f"{path.stem}.xml")
             found["xml"].append(Path(f"{path.stem}.xml").read_bytes())
-        verb("run", "counter.st", "--scans", "5", "--trace", "a.fbtrace", "--depth", "statements", "--journal", "a.journal",
-             "--set", "D7=3@20ms")  # fmt: skip
-        verb("run", str(examples[0]), "--map", "192.168.250.1:502=peer", "--scans", "60", "--trace", "b.fbtrace", "--journal",
-             "b.journal")  # fmt: skip
+        verb("run", "counter.st", "--scans", "5", "--trace", "a.fbtrace", "--depth", "statements", "--set", "D7=3@20ms")
+        verb("run", str(examples[0]), "--map", "192.168.250.1:502=peer", "--scans", "60", "--trace", "b.fbtrace", "--verify")
         verb("convert", "a.fbtrace", "a.csv")
+        found["recording"] = [Path(name).read_bytes() for name in ("a.fbtrace", "b.fbtrace")]
+        demo = examples[0].read_text(encoding="utf-8")
+        for name, text, scans in (("a", COUNTER, 5), ("b", demo, 60)):
+            write_old_journal(f"{name}.journal", text, f"{name}.st", scans)
+            write_old_trace(f"{name}.trace", text, f"{name}.st", scans, Depth.STATEMENTS)
         found["journal"] = [Path(name).read_bytes() for name in ("a.journal", "b.journal")]
-        found["trace"] = [Path(name).read_bytes() for name in ("a.fbtrace", "b.fbtrace")]
+        found["trace"] = [Path(name).read_bytes() for name in ("a.trace", "b.trace")]
         found["csv"] = [Path("a.csv").read_bytes()]
     found["image"] = [json.dumps({"spaces": {"CIO": [1, 2, 3], "D": [65535, 0, 7]}}).encode()]
     return found
@@ -185,10 +196,33 @@ def _damaged_trace(random: Random, data: bytes, other: bytes) -> bytes:
     return _packed(chunks)
 
 
+def _damaged_recording(random: Random, data: bytes, other: bytes) -> bytes:
+    """A recording with damage inside of a block, which the checksum does not show, or anywhere."""
+    if random.random() < 0.3:
+        return _damaged(random, data, other)
+    blocks, others = _blocks(data), _blocks(other)
+    at = random.randrange(len(blocks))
+    blocks[at] = blocks[at][0], _damaged(random, blocks[at][1], random.choice(others)[1])
+    file = BytesIO()
+    file.write(container.MAGIC)
+    for head, payload in blocks:
+        container.write_block(file, head.kind, payload, head.plc, head.first, head.scans)
+    return file.getvalue()
+
+
+def _blocks(data: bytes) -> list[tuple[container.BlockHead, bytes]]:
+    file = BytesIO(data)
+    file.seek(len(container.MAGIC))
+    return [(head, container.read_block(file, head)) for head in list(container.heads(file))]
+
+
+DAMAGE: dict[str, Callable[[Random, bytes, bytes], bytes]] = {"trace": _damaged_trace, "recording": _damaged_recording}
+
+
 def broken(random: Random) -> tuple[str, bytes]:
     """A damaged file: its kind and its bytes."""
     kind = random.choice(("source", "source", "source", *KINDS))
-    damage: Callable[[Random, bytes, bytes], bytes] = _damaged_trace if kind == "trace" else _damaged
+    damage = DAMAGE.get(kind, _damaged)
     return kind, damage(random, random.choice(seeds()[kind]), random.choice(seeds()[kind]))
 
 

@@ -1,9 +1,11 @@
-"""What a recording says of each scan is what an observed run said at the time: events, values, memory, over several PLCs.
+"""What a recording says of each scan, from memory and from its file, is what an observed run said at the time: events, values,
+memory, over several PLCs.
 
 The same happens twice: to PLCs that are recorded, on each engine, and to others that are looked into all the time."""
 
 from __future__ import annotations
 
+import io
 from contextlib import ExitStack
 from pathlib import Path
 from random import Random
@@ -21,6 +23,8 @@ from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Mode
 from fbvm.net.faults import random_faults
 from fbvm.net.peers import ModbusPeer
+from fbvm.record.recording.file_reader import RecordingFile
+from fbvm.record.recording.file_writer import RecordingWriter
 from fbvm.record.recording.recording import Recording
 from fbvm.record.trace.observing import observing
 from fbvm.units.port.noc import Noc
@@ -112,11 +116,26 @@ def observed(seed: int) -> dict[str, list[tuple[Any, ...]]]:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("seed", range(times(2)))
 def test_what_a_recording_says_of_a_scan_is_what_an_observed_run_said(seed: int, engine: str) -> None:
-    plant, recording = Plant(seed, engine), Recording()
+    plant, file = Plant(seed, engine), io.BytesIO()
+    recording = Recording(file=RecordingWriter(file, verify=seed % 2 == 1))
     for name, plc in plant.plcs.items():
         recording.add(name, plc)
     plant.run()
-    for name, rows in observed(seed).items():
+    said = observed(seed)
+    check(plant, recording, said)
+    recording.close()
+    file.seek(0)
+    images = {name: plc.image for name, plc in plant.plcs.items()}
+    written = RecordingFile(file, images=images)
+    assert written.is_complete
+    check(plant, written, said)
+    assert [written[name].differs(row) for name in images for row in range(written[name].count)] == [None] * sum(
+        written[name].count for name in images)
+
+
+def check(plant: Plant, recording: Recording | RecordingFile, said: dict[str, list[tuple[Any, ...]]]) -> None:
+    """What a recording says of each scan, and of one of them alone, is what was said while it happened."""
+    for name, rows in said.items():
         recorded, again = recording[name], WatchedRun()
         assert recorded.scans == range(plant.plcs[name].scans)
         recorded.follow(again, recorded.scans)

@@ -22,6 +22,7 @@ SUBJECTS = {
     "Units": ("Etn21", "Noc", "Tianxing"),
     "Networks and peers": ("LoopNetwork", "TcpNetwork", "Peer", "ModbusPeer", "ModbusServer"),
     "Look": ("chart", "draw", "Recorder", "Recording", "TraceWriter", "Depth", "Trace", "Capture"),
+    "Recordings in files": ("RecordingFile", "FileScans", "RecordingWriter"),
     "Journals": ("Journal", "JournalError", "open_journal", "Replay"),
     "PLCopen XML": ("import_xml", "Imported", "export_xml", "Exported"),
 }

@@ -14,7 +14,7 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named
-from fbvm.cli.shared.traces import SUFFIX, open_trace, scans_option, waveforms_of
+from fbvm.cli.shared.traces import SUFFIX, open_trace, scans_option, trace_options, waveforms_of
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd
@@ -22,14 +22,15 @@ from fbvm.record.page.data import page_data
 from fbvm.record.page.page import page
 from fbvm.record.trace.csv_reader import CsvError, read_csv
 from fbvm.record.trace.csv_writer import write_csv
-from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.signals import network_events, packets
+from fbvm.record.trace.writer import Depth
 
 CSV = ".csv"
 Names = Sequence[str]
 
 
-def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+def _csv(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
     made = waveforms_of(trace, names, scans)
     with new_file(path) as file:
         text = TextIOWrapper(file, encoding="utf-8", newline="")
@@ -37,7 +38,7 @@ def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
         text.detach()
 
 
-def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+def _vcd(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
     text = StringIO()
     try:
         write_vcd(waveforms_of(trace, names, scans), text)
@@ -46,17 +47,17 @@ def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     write_file(path, text.getvalue().encode("ascii", "replace"))
 
 
-def _svg(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+def _svg(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
     made = waveforms_of(trace, names, scans)
     write_file(path, SvgChart(made, packets(trace, made.scans), path.stem).text())
 
 
-def _html(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+def _html(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
     waveforms_of(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
     write_file(path, page(page_data(trace, names, scans, path.stem)))
 
 
-def _pcapng(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+def _pcapng(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
     if names:
         raise click.UsageError("a capture holds what passed the network; it takes no names")
     with new_file(path) as file:
@@ -67,7 +68,7 @@ def _pcapng(trace: Trace, names: Names, scans: range | None, path: Path) -> None
             capture.tap(event.now_ns, event.tap_event.local.host, replace(event.tap_event, mirrored=False))
 
 
-FORMATS: dict[str, Callable[[Trace, Names, range | None, Path], None]] = {
+FORMATS: dict[str, Callable[[ScanSource, Names, range | None, Path], None]] = {
     ".html": _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd, ".pcapng": _pcapng,
 }  # fmt: skip
 
@@ -77,7 +78,9 @@ FORMATS: dict[str, Callable[[Trace, Names, range | None, Path], None]] = {
 @click.argument("target", metavar="TO", type=click.Path(dir_okay=False, path_type=Path))
 @click.argument("names", nargs=-1, metavar="[NAME|ADDRESS|FIRST..LAST]...")
 @scans_option
-def command(source: Path, target: Path, names: tuple[str, ...], scans: range | None) -> None:
+@trace_options
+def command(source: Path, target: Path, names: tuple[str, ...], scans: range | None, plc: str | None,
+            libraries: tuple[Path, ...]) -> None:  # fmt: skip
     """Write a trace as a page that shows all of it, a picture, or a table; or a table as a trace.
 
     \b
@@ -95,7 +98,8 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
         write = FORMATS.get(target.suffix.lower())
         if write is None:
             raise click.UsageError(f"{named(target)}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
-        with open_trace(source) as trace:
+        depth = None if write is _html else Depth.SCANS
+        with open_trace(source, plc, libraries, depth) as trace:
             write(trace, [name for text in names for name in split_names(text)], scans, target)
 
 

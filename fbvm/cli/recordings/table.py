@@ -21,13 +21,14 @@ from fbvm.record.trace.writer import Depth
 @click.argument("names", nargs=-1, required=True, metavar="NAME|ADDRESS|FIRST..LAST...")
 @scans_option
 @click.option("--every", is_flag=True, help="Also the statements and the scans that changed none of these.")
-def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool) -> None:
+def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool, plc: str | None,
+            libraries: tuple[Path, ...]) -> None:  # fmt: skip
     """Show which statement changed variables of a TRACE, and in which phase of the scan.
 
-    The trace must have been written with --depth writes or statements.  Status 1 if nothing changed."""
-    with open_trace(path) as trace:
+    Status 1 if nothing changed."""
+    with open_trace(path, plc, libraries, Depth.STATEMENTS) as trace:
         if trace.depth is Depth.SCANS:
-            raise click.UsageError(f"{named(path)} holds values at scan ends only; write it with --depth statements")
+            raise click.UsageError(f"{named(path)} holds values at scan ends only, not what statements did")
         signals = [signal for text in names for name in split_names(text)
                    for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
         table = ScanTable(trace.sites, trace.names, signals, every)

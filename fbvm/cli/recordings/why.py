@@ -8,7 +8,7 @@ import click
 
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import say
-from fbvm.cli.shared.traces import SUFFIX, open_trace
+from fbvm.cli.shared.traces import SUFFIX, open_trace, trace_options
 from fbvm.record.draw.why import DEEPEST, cause_text, why
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place
@@ -17,16 +17,17 @@ from fbvm.watch.paths import Place
 @click.command("why")
 @click.argument("name", metavar="NAME|ADDRESS")
 @click.argument("path", metavar="[TRACE]", required=False, type=ExistingPath(dir_okay=False))
+@trace_options
 @click.option("--scan", type=click.IntRange(min=0), metavar="N", help="At the end of this scan; the last one if not given.")
 @click.option("--deep", type=click.IntRange(min=0), default=DEEPEST, show_default=True, metavar="N",
               help="Causes of causes to look for.")
-def command(name: str, path: Path | None, scan: int | None, deep: int) -> None:
+def command(name: str, path: Path | None, scan: int | None, deep: int, plc: str | None, libraries: tuple[Path, ...]) -> None:
     """Say why a variable has its value: the statement that gave it, what it had read, and so on back through scans.
 
-    The TRACE must have been written with --depth statements; it may be left out where the folder has only one."""
-    with open_trace(path or _only_trace()) as trace:
+    The TRACE may be left out where the folder has only one."""
+    with open_trace(path or _only_trace(), plc, libraries, Depth.STATEMENTS) as trace:
         if trace.depth is not Depth.STATEMENTS:
-            raise click.UsageError("the trace does not hold what statements read; write it with --depth statements")
+            raise click.UsageError("the trace does not hold what statements read; it was made of a table, or without --depth")
         place = trace.find(name)
         if not isinstance(place, Place):
             raise click.UsageError(f"{name} is a range; name one place")

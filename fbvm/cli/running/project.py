@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -13,6 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.project_arguments import check_project_options, read_given_project
+from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run
 from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, scans_in, value_text
 from fbvm.cli.shared.sources import report_diagnostics, show_diagnostic
 from fbvm.cli.shared.terminal import say, say_json
@@ -26,7 +28,8 @@ from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value
 
-OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json"}
+OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json",
+           "trace": "--trace", "journal": "--journal", "verify": "--verify", "depth": "--depth"}  # fmt: skip
 """The options that may be given with a project; all others are in its file."""
 HOW_TO_MAP = 'write [[door]] with address = "{endpoint}" and bind = "127.0.0.1:{port}"'
 
@@ -57,13 +60,30 @@ def run_project(file: Path, context: click.Context) -> int:
         plant.network.notices.tell = notice_teller(HOW_TO_MAP, plant.doors)
     first = plant.runs[0].plc
     try:
-        with RunProgress(None if as_json else first, plant.scans, plant.for_ns) as progress:
-            run_all(plant.runs, lambda: progress.update(first))
+        with record_run(context.params, {"project": project.source.name}) as recorded, \
+                RunProgress(None if as_json else first, plant.scans, plant.for_ns) as progress:  # fmt: skip
+            if recorded.recording:
+                _record(plant, recorded, context.params)
+
+            def tick() -> None:
+                progress.update(first)
+                recorded.tick()
+
+            run_all(plant.runs, tick)
     finally:
         plant.close()
     real = not plant.network.virtual_time and not as_json and sys.stderr.isatty()
     _print(plant, as_json, context.params["scan_time"] or real)
     return max(EXIT_STATUS.get(run.reason, status.GOOD) for run in plant.runs)
+
+
+def _record(plant: Plant, recorded: RunRecording, options: Mapping[str, Any]) -> None:
+    """Records all PLCs of a plant, each by its name."""
+    for kind in plant.kinds:
+        row = kind.row
+        text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect)
+        for name, run in zip(kind.names, kind.runs, strict=True):
+            recorded.add(name, run.plc, described(run.plc, text, options, row.sources, row.libraries))
 
 
 def _refuse(diagnostics: list[Diagnostic], as_json: bool) -> int:

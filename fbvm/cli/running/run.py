@@ -14,9 +14,8 @@ from fbvm.cli.running.project import run_project
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
-from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
+from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.files import growing_file, writing
-from fbvm.cli.shared.journals import start_journal
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import (
     CYCLE_NS,
@@ -35,20 +34,20 @@ from fbvm.cli.shared.options import (
 )
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
+from fbvm.cli.shared.recording_options import recording_options
+from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, write_page
 from fbvm.cli.shared.run_result import RunProgress, RunResult
-from fbvm.cli.shared.sources import compile_or_exit, source_options
+from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_options
 from fbvm.cli.shared.terminal import say
-from fbvm.cli.shared.traces import statement_lines, write_page, write_trace
+from fbvm.cli.shared.traces import statement_lines
 from fbvm.code.image import Image
 from fbvm.engine.choice.tiers import CHOICES
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
-from fbvm.net.journal import Journal
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.trace.recorder import Recorder
-from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.watch.places import parse_for
@@ -87,16 +86,7 @@ HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 @watch_cycle_option
 @click.option("--pcap", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Write what passed the network, for Wireshark.")
-@click.option("--journal", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              help="Write every input of every scan, for `fbvm replay`.")
-@click.option("--html", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              help="Write the run as one page for a browser, with every statement.")
-@click.option("--trace", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              help="Record the run for `fbvm chart`, `table`, `why` and `convert`.")
-@click.option("--depth", type=click.Choice([depth.value for depth in Depth]), default="scans", show_default=True,
-              help="What the trace holds: values at scan ends, and every write, and every statement.")
-@click.option("--select", "selected", multiple=True, metavar="PATTERN",
-              help="What the trace keeps: 'Main.*.Q', D200..D299; all if not given.  May be repeated.")
+@recording_options
 @click.option("--timing", type=click.Choice(["exact", "real"]), default="exact", show_default=True,
               help="exact: the unit answers in fixed scans.  real: late and out of step, as the device may.")
 @click.option("--engine", type=click.Choice(CHOICES), default="auto", show_default=True,
@@ -123,19 +113,17 @@ def command(
         options["net"] = "tcp"
     _check_usage(**options)
     _check_endpoints(**options)
-    drawn = bool(options["rungs"]) and not options["journal"]  # a replay compiles as the journal says
+    drawn = bool(options["rungs"])
     image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]
     banks = e_banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
                       *options["conditions"], *options["lines"]])
-    image = with_e_banks(image, banks)
+    image = image.with_e_banks(banks)
     with ExitStack() as stack:
         network = build_network(options["net"], options["mappings"], options["seed"], options["bind"], options["doors"])
         stack.callback(network.close)
-        path = options["journal"]
         said = {name: options[name] for name in ("net", "pace", "timing", "seed", "engine")}
-        journal = start_journal(stack, path, files, program, libraries, banks, said) if path else None
-        plc = _plc(image, cycle_ns, options["engine"], journal)
+        plc = _plc(image, cycle_ns, options["engine"])
         plc.watch_cycle.time_ns = options["watch_ns"]
         capture = _capture(stack, options["pcap"], network, plc) if options["pcap"] else None
         if capture:
@@ -143,11 +131,16 @@ def command(
         for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
         _try_doors(plc, network, options["mappings"], options["doors"])
-        with write_trace(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
-                write_page(plc, options["html"], files, libraries) as page, \
+        html = options["html"]
+        with record_run(options, said, html) as recorded, \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
-            result = _run(plc, as_json, capture, **options)
-            page.only_last = result.reason == "interrupted"
+            if recorded.recording:
+                text = program_text(files, libraries, program=program, drawn=drawn, e_banks=tuple(banks), **compile_options())
+                recorded.add(files[0].stem if files else "PLC", plc, described(plc, text, options, files, libraries))
+            result = _run(plc, as_json, capture, recorded, **options)
+            recorded.only_last = result.reason == "interrupted"
+        if html:
+            write_page(recorded, html, statement_lines(image, files, libraries))
         result.print()
         _warn_unused_mappings(plc, network)
         if plc.halted and not as_json:
@@ -156,15 +149,15 @@ def command(
     sys.exit(result.status)
 
 
-def _plc(image: Image, cycle_ns: int, engine: str, journal: Journal | None) -> Plc:
+def _plc(image: Image, cycle_ns: int, engine: str) -> Plc:
     try:
-        return Plc(image, cycle_ns, engine=engine, journal=journal)
+        return Plc(image, cycle_ns, engine=engine)
     except ValueError as error:  # an engine that this machine does not have
         raise click.UsageError(str(error)) from None
 
 
 def _run(
-    plc: Plc, as_json: bool, capture: Capture | None, *,
+    plc: Plc, as_json: bool, capture: Capture | None, recorded: RunRecording, *,
     settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
     pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
     scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], **_: Any,
@@ -183,6 +176,7 @@ def _run(
 
             def progress(plc: Plc) -> None:
                 shown_progress.update(plc)
+                recorded.tick()
                 if capture:  # of a quiet network a buffer would take minutes to fill
                     capture.flush()
 

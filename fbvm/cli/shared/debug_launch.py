@@ -10,7 +10,7 @@ import click
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
-from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
+from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import Mapping as Mapped
 from fbvm.cli.shared.options import mapping
@@ -83,7 +83,7 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
                                 resource=given.get("resource"), dialect=given.get("dialect", "standard"))  # fmt: skip
     image = _image(compilation.image, compilation.diagnostics)
     sets = [_SetRow.of(row) for row in given.get("set", ())]
-    image = with_e_banks(image, e_banks_in([row.name for row in sets] + list(given.get("force", {}))))
+    image = image.with_e_banks(e_banks_in([row.name for row in sets] + list(given.get("force", {}))))
     cycle_ns = _time_ns(given.get("cycle", "10ms"))
     mappings = tuple(mapping(str(row)) for row in given.get("map", ()))
     timing, seed = given.get("timing", "exact"), given.get("seed", 0)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import replace
 
 from fbvm.base.areas import E_NAMES
-from fbvm.code.image import Image
 
 _BANK = re.compile(r"(?<!\w)(E[0-9A-F])\s*[_:]\s*\d", re.I)
 
@@ -16,11 +14,3 @@ def e_banks_in(texts: Iterable[str]) -> list[str]:
     """The E banks in names and conditions, `E3_100` or `E3:100`, in the order of their first use."""
     found = [match[1].upper() for text in texts for match in _BANK.finditer(text)]
     return [name for name in dict.fromkeys(found) if name in E_NAMES]
-
-
-def with_e_banks(image: Image, banks: Iterable[str]) -> Image:
-    """The image for a PLC that has these E banks, too.  They follow its own, so no other offset changes."""
-    missing = tuple(name for name in banks if name not in image.layout.e_banks)
-    if not missing:
-        return image
-    return replace(image, layout=replace(image.layout, e_banks=(*image.layout.e_banks, *missing)))

@@ -1,10 +1,10 @@
-"""Journal files: the program and options that `fbvm run --journal` adds to the inputs, and the program that is read back."""
+"""Journals of fbvm 0.1: the inputs of a run, with its program."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
@@ -12,38 +12,14 @@ from typing import Any
 
 import click
 
-import fbvm
 from fbvm.base.diagnostics import Source
 from fbvm.base.files import LINE_CHARACTERS, open_file, reason
 from fbvm.cli.shared import status
-from fbvm.cli.shared.e_banks import with_e_banks
-from fbvm.cli.shared.ending import held
-from fbvm.cli.shared.files import growing_file, writing
-from fbvm.cli.shared.sources import compile_options, report_diagnostics
+from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import named
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
-from fbvm.net.journal import Entry, Header, Journal, JournalError, open_journal
-from fbvm.run import loop
-from fbvm.syntax.text import read
-
-
-def start_journal(
-    stack: ExitStack, path: Path, files: Sequence[Path], program: str | None, libraries: Sequence[Path],
-    banks: Sequence[str], options: Mapping[str, object],
-) -> Journal:  # fmt: skip
-    """Starts a journal in a file, with the texts of the program and the `options` of the run; `stack` closes it."""
-    with writing(path):
-        file = stack.enter_context(TextIOWrapper(growing_file(path), encoding="utf-8", newline="\n"))
-    texts = [read(name, str(name)) for name in files]
-    journal = held()(Journal)(file, {
-        "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": compile_options(),
-        "libraries": [str(folder) for folder in libraries], "banks": list(banks),
-        "options": dict(options),
-        "sources": [[text.name, text.text] for text in texts if isinstance(text, Source)],
-    })  # fmt: skip
-    stack.callback(held()(journal.close))
-    return journal
+from fbvm.net.journal import Entry, Header, JournalError, open_journal
 
 
 @contextmanager
@@ -63,10 +39,10 @@ def _text(file: TextIOWrapper) -> Iterator[str]:
     try:
         for number, line in enumerate(iter(partial(file.readline, LINE_CHARACTERS), "")):
             if number == 0 and not line.startswith("{"):
-                raise JournalError("this is no journal of fbvm; `fbvm run --journal FILE` writes one")
+                raise JournalError("this is neither a recording of fbvm nor a journal; `fbvm run --trace FILE` writes one")
             yield line
     except UnicodeDecodeError:
-        raise JournalError("this is no text, so no journal") from None
+        raise JournalError("this is neither a recording of fbvm nor a journal") from None
 
 
 def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Image:
@@ -90,4 +66,4 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
     if compilation.image is None:
         report_diagnostics(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)
-    return with_e_banks(compilation.image, banks)
+    return compilation.image.with_e_banks(banks)

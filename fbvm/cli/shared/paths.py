@@ -11,6 +11,7 @@ import click
 
 _HEAD_BYTES = 512
 _FORMS = (
+    ((b"fbvmrec",), "a recording", "`fbvm chart`, `fbvm table` and `fbvm why` look at it, `fbvm replay` does its run again"),
     ((b"fbvmtrc",), "a trace", "`fbvm chart`, `fbvm table` and `fbvm why` look at it"),
     ((b'{"journal"',), "a journal", "`fbvm replay` does its run again"),
     ((b"<!doctype html", b"<html"), "a page", "open it in a browser"),
@@ -18,7 +19,7 @@ _FORMS = (
     ((b"%pdf", b"pk\x03\x04", b"\x1f\x8b"), "no text", "unpack or export the sources from it"),
 )
 """How files begin that are no sources, in lower case: what such a file is, and what to do with it."""
-_SUFFIXES = {".html": 2, ".htm": 2, ".xml": 3}
+_SUFFIXES = {".html": 3, ".htm": 3, ".xml": 4}
 """Files that are known by their names, by the row of `_FORMS`."""
 
 

@@ -1,40 +1,36 @@
-"""Trace files: arguments and options of the verbs that read one, and the traces that `fbvm run` writes."""
+"""Recordings and traces in files: arguments and options of the verbs that read one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
+import fbvm
 from fbvm.base.digits import whole_number
-from fbvm.base.files import reason, write_file
-from fbvm.cli.shared.ending import held
-from fbvm.cli.shared.files import growing_file, writing
+from fbvm.base.files import open_file, reason
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named, say
 from fbvm.code.image import Image
-from fbvm.machine.plc import Plc
-from fbvm.record.page.data import page_data
-from fbvm.record.page.page import page
-from fbvm.record.recording.recording import Recording
-from fbvm.record.recording.scans import RecordedScans
+from fbvm.record.recording import container
+from fbvm.record.recording.container import RecordingError
+from fbvm.record.recording.file_reader import FileRecordedPlc, RecordingFile
+from fbvm.record.recording.file_scans import FileScans
 from fbvm.record.trace.format import TraceError
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Waveforms
+from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.source_texts import source_texts
-from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
+from fbvm.record.trace.writer import Depth, source_lines
 from fbvm.watch.paths import UnknownPlace
 
 SUFFIX = ".fbtrace"
 LAST_SCAN = 1 << 62
 """No run has so many scans."""
-INTERRUPTED_SCANS = 400
-"""The scans on the page of a run that was interrupted."""
 
 
 class ScanRange(click.ParamType[range]):
@@ -58,8 +54,19 @@ class ScanRange(click.ParamType[range]):
 
 
 def trace_argument(function: Callable[..., Any]) -> Callable[..., Any]:
-    """TRACE, a file that `fbvm run --trace` wrote."""
-    return click.argument("path", metavar="TRACE", type=ExistingPath(dir_okay=False))(function)
+    """TRACE, a file that `fbvm run --trace` wrote, and the options about it."""
+    return trace_options(click.argument("path", metavar="TRACE", type=ExistingPath(dir_okay=False))(function))
+
+
+def trace_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--plc and --library, about the file of a recording."""
+    for decorate in (
+        click.option("--library", "libraries", multiple=True, metavar="DIR", type=ExistingPath(file_okay=False),
+                     help="Where folders of libraries are now, if those of the recording are gone; may be repeated."),
+        click.option("--plc", metavar="NAME", help="Which PLC of a recording that has several."),
+    ):
+        function = decorate(function)
+    return function
 
 
 def scans_option(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -67,88 +74,84 @@ def scans_option(function: Callable[..., Any]) -> Callable[..., Any]:
     return click.option("--scans", type=ScanRange(), help="Only these scans.")(function)
 
 
+def is_recording(path: Path) -> bool:
+    """True for the file of a recording, False for a trace of fbvm 0.1, a table, and all others.  Raises OSError."""
+    with open_file(path) as file:
+        return file.read(len(container.MAGIC)) == container.MAGIC
+
+
 @contextmanager
-def open_trace(path: Path) -> Iterator[Trace]:
-    """Opens a trace for a `with` block.  A damaged file and an unknown name in the block end the verb with status 2."""
+def open_recording(path: Path, libraries: Sequence[Path] = ()) -> Iterator[RecordingFile]:
+    """Opens the file of a recording for a `with` block.  One that cannot be read, or is damaged, ends the verb with status 2."""
     try:
-        trace = Trace.open(path)
+        recording = RecordingFile.open(path, libraries, version=fbvm.__version__)
     except OSError as error:
         raise click.UsageError(f"{named(path)} cannot be read: {reason(error)}") from None
-    except TraceError as error:
+    except RecordingError as error:
         raise click.UsageError(f"{named(path)}: {error}") from None
     try:
-        with trace:
+        with recording:
+            yield recording
+    except RecordingError as error:
+        raise click.UsageError(f"{named(path)}: {error}") from None
+
+
+@contextmanager
+def open_trace(path: Path, plc: str | None = None, libraries: Sequence[Path] = (), depth: Depth | None = None,
+               ) -> Iterator[ScanSource]:  # fmt: skip
+    """Opens the file of a recording, or a trace, for a `with` block.  A damaged file and an unknown name in the block end the
+    verb with status 2.
+
+    `depth` is what is asked of the scans of a recording; a trace has what was written."""
+    try:
+        opened = _recorded(path, plc, libraries, depth) if is_recording(path) else _written(path)
+    except OSError as error:
+        raise click.UsageError(f"{named(path)} cannot be read: {reason(error)}") from None
+    with opened as source:
+        try:
+            yield source
+        except (UnknownPlace, TypeError) as error:
+            raise click.UsageError(str(error)) from None
+
+
+@contextmanager
+def _recorded(path: Path, plc: str | None, libraries: Sequence[Path], depth: Depth | None) -> Iterator[ScanSource]:
+    with open_recording(path, libraries) as recording:
+        source = FileScans(chosen_plc(recording, plc), depth)
+        yield source
+    if source.warning:
+        say(source.warning, fg="yellow", err=True)
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[ScanSource]:
+    """A trace that fbvm 0.1 wrote, or one that was made of a table."""
+    try:
+        with Trace.open(path) as trace:
             yield trace
     except TraceError as error:
         raise click.UsageError(f"{named(path)}: {error}") from None
-    except (UnknownPlace, TypeError) as error:
-        raise click.UsageError(str(error)) from None
 
 
-def waveforms_of(trace: Trace, names: Sequence[str], scans: range | None) -> Waveforms:
+def chosen_plc(recording: RecordingFile, name: str | None) -> FileRecordedPlc:
+    """The PLC of this name, or the only one.  Raises UsageError."""
+    names = list(recording)
+    if not names:
+        raise RecordingError("the recording has no PLC yet")
+    if name is None and len(names) == 1:
+        return recording[names[0]]
+    if name is None or name not in names:
+        raise click.UsageError(f"choose a PLC with --plc NAME; the recording has {', '.join(names)}")
+    return recording[name]
+
+
+def waveforms_of(trace: ScanSource, names: Sequence[str], scans: range | None) -> Waveforms:
     """The waveforms of some variables in some scans.  Raises UsageError if the trace has no such scans."""
     made = waveforms(trace, names, scans)
     if not made.times_ns:
         held = f"scans {trace.scans[0]} to {trace.scans[-1]}" if trace.scans else "no scans yet"
         raise click.UsageError(f"the trace has {held}")
     return made
-
-
-# --- written by a run -------------------------------------------------------------------------------------------------
-
-
-@contextmanager
-def write_trace(
-    plc: Plc, path: Path | None, depth: str, selected: Sequence[str], files: Sequence[Path], libraries: Sequence[Path]
-) -> Iterator[None]:
-    """Records the scans of `plc` in the `with` block into a trace file, if `path` is given."""
-    if path is None:
-        if selected:
-            raise click.UsageError("--select chooses what --trace keeps, which is not given")
-        yield
-        return
-    with writing(path):
-        file = growing_file(path)
-    with file:
-        try:
-            lines = statement_lines(plc.image, files, libraries)
-            with held():
-                writer = TraceWriter(plc, file, Depth(depth), selected, lines)
-        except UnknownPlace as error:
-            raise click.UsageError(str(error)) from None
-        try:
-            yield
-        finally:
-            with held():
-                writer.close()
-
-
-@dataclass
-class PageScans:
-    """The scans that a page holds."""
-
-    only_last: bool = False
-    """True after Ctrl-C: a page of all scans may take long."""
-
-
-@contextmanager
-def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequence[Path]) -> Iterator[PageScans]:
-    """Writes the scans of `plc` in the `with` block as one HTML file, if `path` is given: all, or those that the block wants."""
-    wanted = PageScans()
-    if path is None:
-        yield wanted
-        return
-    recording = Recording()
-    recorded = recording.add(path.stem, plc)
-    yield wanted
-    recording.close()
-    source = RecordedScans(recorded, statement_lines(plc.image, files, libraries))
-    last = max(source.scans.start, source.scans.stop - INTERRUPTED_SCANS)
-    scans = range(last, source.scans.stop) if wanted.only_last and last > source.scans.start else None
-    if scans:
-        say(f"{named(path)} holds scans {last} to {scans[-1]} only: the run was interrupted", err=True)
-    with writing(path):
-        write_file(path, page(page_data(source, scans=scans, title=path.stem)))
 
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:

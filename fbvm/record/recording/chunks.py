@@ -5,12 +5,13 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.base.memory import Snapshot
 from fbvm.machine.state import State
+from fbvm.record.recording.packed import PackedSnapshot
 from fbvm.units.contract import Unit, UnitState
 from fbvm.watch.values import Value
 from fbvm.wire.link import Event, Received
@@ -98,6 +99,15 @@ class Times:
         end = self._scans[row] if row < len(self._scans) else self.end
         return end - scan, self._steps_ns[row - 1]
 
+    def rows(self, first: int) -> list[list[int]]:
+        """The times of the scans from number `first` on, in rows: scan, its time, the step to those that follow, how many."""
+        made, scan = [], first
+        while scan < self.end:
+            count, step_ns = self.regular(scan)
+            made.append([scan, self.at(scan), step_ns, count])
+            scan += count
+        return made
+
     def cut(self, scan: int) -> None:
         """Forgets this scan and those behind it."""
         rows = bisect_left(self._scans, scan)
@@ -132,6 +142,8 @@ class Chunk:
         self.times = Times(state.scans)
         self.inputs: list[ScanInputs] = []
         self.inputs_bytes = 0
+        self.machine = False
+        """True if machine code did some of the scans."""
 
     @property
     def first(self) -> int:
@@ -153,22 +165,36 @@ class Chunk:
         self.times.cut(scan)
         self.inputs = [inputs for inputs in self.inputs if inputs.scan < scan]
 
+    def pack(self, base: Chunk) -> None:
+        """Keeps of its memories what differs from those of `base`, an earlier chunk that is not packed, as long as both have the
+        same ones."""
+        known = base.memories
+        own = self.memories
+        if [len(snapshot.pages) for snapshot in known] != [len(snapshot.pages) for snapshot in own]:
+            return
+        packed = iter([PackedSnapshot(new, old) for new, old in zip(own, known, strict=True)])
+        self.state = replace(self.state, memory=next(packed))
+        self.units = [UnitKeyframe(frame.unit, replace(frame.state, memory=next(packed))) if frame.state and frame.state.memory
+                      else frame for frame in self.units]  # fmt: skip
+
+    @property
+    def memories(self) -> list[Snapshot]:
+        """The memory of the PLC, then those of units with processors that are on."""
+        return [self.state.memory, *(unit.state.memory for unit in self.units if unit.state and unit.state.memory)]
+
     def size_bytes(self, before: Chunk | None) -> int:
         """About how many bytes this takes, without the pages that it shares with the chunk before."""
-        snapshots = [*_snapshots(before)] if before else []
-        pages = sum(_pages(new, snapshots[number] if number < len(snapshots) else None)
-                    for number, new in enumerate(_snapshots(self)))  # fmt: skip
+        known = before.memories if before else []
+        pages = sum(_pages(new, known[number] if number < len(known) else None) for number, new in enumerate(self.memories))
         return pages + SMALL_BYTES + self.inputs_bytes + self.times.size_bytes
 
 
-def _snapshots(chunk: Chunk) -> list[Snapshot]:
-    own = [unit.state.memory for unit in chunk.units if unit.state and unit.state.memory]
-    return [chunk.state.memory, *own]
-
-
 def _pages(new: Snapshot, old: Snapshot | None) -> int:
-    """The bytes of the pages of a snapshot that the other one does not have."""
-    if old is None or len(old.pages) != len(new.pages):
+    """The bytes that a snapshot takes beside another one."""
+    base = old.base if isinstance(old, PackedSnapshot) else old
+    if isinstance(new, PackedSnapshot):
+        return new.size_bytes + (0 if new.base is base else _pages(new.base, None))
+    if base is None or len(base.pages) != len(new.pages):
         return 8 * len(new.pages) + PAGE_BYTES * sum(page is not None for page in new.pages)
     return 8 * len(new.pages) + PAGE_BYTES * sum(
-        page is not known and page is not None for page, known in zip(new.pages, old.pages, strict=True))
+        page is not known and page is not None for page, known in zip(new.pages, base.pages, strict=True))

@@ -1,19 +1,17 @@
-"""Records runs in memory: what cannot be computed again, for as many of the last scans as there is room for."""
+"""Records runs: what cannot be computed again; in memory of as many of the last scans as there is room for, in a file of all."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
 
 from fbvm.base.areas import BUDGET
 from fbvm.base.memory import changes
 from fbvm.engine.choice.tiers import python_of
 from fbvm.machine.plc import Plc
-from fbvm.machine.state import State
 from fbvm.record.recording.chunks import Chunk, ScanInputs, UnitKeyframe
-from fbvm.record.recording.replay import Replay
-from fbvm.record.trace.observing import Listener, observing
+from fbvm.record.recording.file_writer import Described, PlcWriter, RecordingWriter
+from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.trace.packets import add_tap
 from fbvm.units.contract import ResumableUnit
 from fbvm.watch.values import Value
@@ -28,12 +26,15 @@ CALL_NS, SCAN_NS = 20_000, 300
 """About what a call of `Plc.scan` takes beside its statements, and each scan of one that does many."""
 STATEMENT_NS = {True: 2, False: 190}
 """About what a statement takes in machine code, and in Python."""
+BASE_KEYFRAMES = 64
+"""So many keyframes are kept as what differs from one before them."""
 MOST_INPUT_BYTES = 1 << 20
 """Behind a keyframe; then comes another one."""
 
 
 class Recording:
-    """The recording of a run: each PLC by its name, in `limit_bytes` of memory for all of them together.
+    """The recording of a run: each PLC by its name, in `limit_bytes` of memory for all of them together.  With
+    `file` it is written there, too, whole.
 
     >>> from fbvm import Plc, Recording, compile_text
     >>> plc = Plc(compile_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM").image)
@@ -45,17 +46,20 @@ class Recording:
     (41, range(0, 1000))
     """
 
-    def __init__(self, limit_bytes: int = RING_BYTES) -> None:
-        self._limit_bytes = limit_bytes
+    def __init__(self, limit_bytes: int = RING_BYTES, file: RecordingWriter | None = None) -> None:
+        self._limit_bytes, self._file = limit_bytes, file
         self._plcs: dict[str, PlcRecording] = {}
         self.size_bytes = 0
         """About how much memory is taken, without what follows the last keyframes."""
 
-    def add(self, name: str, plc: Plc) -> PlcRecording:
-        """Records a PLC from its next scan on.  Raises ValueError for a name that is taken or a PLC that is recorded."""
+    def add(self, name: str, plc: Plc, described: Described | None = None) -> PlcRecording:
+        """Records a PLC from its next scan on; `described` is what its file tells beside the scans.
+
+        Raises ValueError for a name that is taken or a PLC that is recorded."""
         if name in self._plcs:
             raise ValueError(f"a PLC {name} is recorded already")
-        made = self._plcs[name] = PlcRecording(plc, self._grown)
+        written = self._file.add(name, plc, described or Described()) if self._file else None
+        made = self._plcs[name] = PlcRecording(plc, self._grown, written)
         return made
 
     def __getitem__(self, name: str) -> PlcRecording:
@@ -64,8 +68,13 @@ class Recording:
     def __iter__(self) -> Iterator[str]:
         return iter(self._plcs)
 
+    def flush(self) -> None:
+        """Writes what is not in the file yet, so that a reader sees it."""
+        if self._file:
+            self._file.flush()
+
     def close(self) -> None:
-        """Ends the recording; what was recorded stays."""
+        """Ends the recording; what was recorded stays.  The file stays open."""
         for recorded in self._plcs.values():
             recorded.close()
 
@@ -80,18 +89,21 @@ class Recording:
             self.size_bytes -= oldest.shrink()
 
 
-class PlcRecording:
-    """The recording of one PLC.  `grown` is called with the bytes of each keyframe and what lies before it."""
+class PlcRecording(RecordedPlc):
+    """The recording of one PLC.  `grown` is called with the bytes of each keyframe and what lies before it; `written` puts it
+    into a file."""
 
-    def __init__(self, plc: Plc, grown: Callable[[int], None]) -> None:
+    def __init__(self, plc: Plc, grown: Callable[[int], None], written: PlcWriter | None = None) -> None:
         if plc.is_recorded:
             raise ValueError("this PLC is recorded already")
-        self._plc, self._grown = plc, grown
+        self._plc, self._grown, self._written = plc, grown, written
         self._chunks: list[Chunk] = []
+        self._base: Chunk | None = None
+        """The keyframe from which the last ones are kept as differences; and how many these are."""
+        self._since_base = 0
         self._sizes: list[int] = []
         """Of each chunk but the last what it takes."""
-        self.substituted: list[int] = []
-        """The bodies that Python stands in for."""
+        self._substituted: list[int] = []
         self._pending = ScanInputs(plc.scans)
         self._now_ns = 0
         """The time of the scan that has begun."""
@@ -99,8 +111,10 @@ class PlcRecording:
         """True between `before` and `after`."""
         self._has_changed = True
         """True if the state was changed by something that is no input."""
-        self._known = b""
+        self._known = bytearray(plc.memory.size)
         """The memory at the end of the last scan."""
+        self._known_view = memoryview(self._known)
+        self._before_refresh = b""
         self._units: list[ResumableUnit] = []
         """Those whose settings are inputs, and how often they have been set."""
         self._times_set: list[int] = []
@@ -117,6 +131,9 @@ class PlcRecording:
         """Ends the recording; what was recorded stays."""
         self._addresses = set()
         self._plc.record_inputs(None)
+        if self._written:
+            self._written.close((self._now_ns, self._pending) if self._has_begun else None)
+            self._written = None
 
     # --- what was recorded --------------------------------------------------------------------------------------------
 
@@ -131,48 +148,6 @@ class PlcRecording:
     def begun(self) -> range:
         """The scans that can be executed again; one that was interrupted is executed to the end that it would have had."""
         return range(self.scans.start, self.scans.stop + self._has_begun)
-
-    def at(self, scan: int) -> Plc:
-        """A new PLC in the state before a scan, to be read or to go on with other inputs; its units ask nothing of a network.
-
-        Raises ValueError if the scan is not recorded."""
-        if not self._chunks or not self.scans.start <= scan <= self.scans.stop:
-            held = f"{self.scans.start} to {self.scans.stop}" if self._chunks else "none"
-            raise ValueError(f"scan {scan} is not recorded; recorded are {held}")
-        again = Replay(self, scan)
-        again.advance(scan)
-        again.leave()
-        return again.plc
-
-    def states(self, scans: range) -> Iterator[State]:
-        """The states before some recorded scans, or behind the last one, in order; without what was written before each."""
-        again = Replay(self, scans.start)
-        for scan in scans:
-            again.advance(scan)
-            yield again.plc.snapshot()
-
-    def follow(self, listener: Listener, scans: range) -> None:
-        """Executes recorded scans again and reports their phases and events to `listener`."""
-        self.follow_with(scans, lambda plc: observing(plc, listener))
-
-    def follow_with(self, scans: range, attached: Callable[[Plc], AbstractContextManager[object]]) -> None:
-        """Executes scans of `begun` again on a new PLC, inside the context that `attached` makes for this PLC."""
-        scans = range(max(scans.start, self.begun.start), min(scans.stop, self.begun.stop))
-        if not scans:
-            return
-        again = Replay(self, scans.start)
-        again.advance(scans.start)
-        with attached(again.plc):
-            for _ in scans:
-                again.scan()
-
-    def again(self, scans: range) -> Iterator[Plc]:
-        """Executes scans of `begun` again; yields the PLC after each of them."""
-        again = Replay(self, scans.start)
-        again.advance(scans.start)
-        for _ in scans:
-            again.scan()
-            yield again.plc
 
     def chunk(self, scan: int) -> Chunk:
         """The keyframe before a scan, and what follows up to the next one."""
@@ -194,6 +169,11 @@ class PlcRecording:
         """The PLC that is recorded."""
         return self._plc
 
+    @property
+    def substituted(self) -> Sequence[int]:
+        """The bodies that Python stands in for."""
+        return self._substituted
+
     # --- what may not be repeated -------------------------------------------------------------------------------------
 
     def substitute(self, body: int, function: Callable[[int], None]) -> None:
@@ -210,7 +190,7 @@ class PlcRecording:
             self._pending.results.append((base, memory.map[base : base + size]))
 
         python_of(plc.engine).substitute(body, recorded)
-        self.substituted.append(body)
+        self._substituted.append(body)
 
     # --- called by the PLC: InputRecorder -----------------------------------------------------------------------------
 
@@ -223,10 +203,11 @@ class PlcRecording:
             self._has_begun = True
             return
         self._has_begun = True
-        memory = plc.memory.map[:]
-        if memory != self._known:
-            pending.writes += changes(self._known, memory)
-            self._known = memory
+        if self._known != plc.memory.u8:
+            if self._written:
+                self._written.settle()
+            pending.writes += changes(bytes(self._known), plc.memory.map[:])
+            self._known_view[:] = plc.memory.u8
         if plc.budget != self._budget:
             pending.budget = self._budget = plc.budget
         if (forces := plc.forces) != self._forces:
@@ -243,12 +224,12 @@ class PlcRecording:
     def refresh_begins(self) -> None:
         """Keeps the memory before a refresh that cannot be done again."""
         if self.wants_plain_scans:
-            self._known = self._plc.memory.map[:]
+            self._before_refresh = self._plc.memory.map[:]
 
     def refresh_ended(self) -> None:
         """Records what a refresh changed that cannot be done again."""
         if self.wants_plain_scans:
-            self._pending.refreshed += changes(self._known, self._plc.memory.map[:])
+            self._pending.refreshed += changes(self._before_refresh, self._plc.memory.map[:])
 
     def after(self, scans: int, now_ns: int, step_ns: int = 0) -> None:
         """Records the times of some scans, and with the last of them what was told since `before`."""
@@ -260,12 +241,16 @@ class PlcRecording:
         chunk.times.add(now_ns, scans, step_ns)
         if not pending.is_empty:
             self._put(chunk, pending, scans)
-        self._pending = ScanInputs(plc.scans)
-        self._known = plc.memory.map[:]
+            self._pending = ScanInputs(plc.scans)
+        self._known_view[:] = plc.memory.u8
         statements = plc.budget - plc.memory.views["i64"][BUDGET // 8]
-        self._cost_ns += CALL_NS + scans * (SCAN_NS + STATEMENT_NS[plc.engine.machine is not None] * statements)
+        machine = plc.engine.machine is not None
+        chunk.machine = chunk.machine or machine
+        self._cost_ns += CALL_NS + scans * (SCAN_NS + STATEMENT_NS[machine] * statements)
         if chunk.inputs_bytes > MOST_INPUT_BYTES:
             self._cost_ns = AGAIN_NS + 1
+        if self._written:
+            self._written.ended(self._known)
 
     def changed(self) -> None:
         """The next scan begins a chunk."""
@@ -287,6 +272,8 @@ class PlcRecording:
     def _begin_chunk(self) -> None:
         """Keeps the state of PLC and units as a keyframe."""
         plc, chunks = self._plc, self._chunks
+        if self._written:
+            self._written.flush()
         follows = bool(chunks) and not self._has_changed and not self._has_begun and plc.scans == chunks[-1].times.end
         while chunks and chunks[-1].first >= plc.scans:  # the PLC went back, or a chunk begins again
             chunks.pop()
@@ -294,6 +281,7 @@ class PlcRecording:
                 self._grown(-self._sizes.pop())
         if chunks:
             chunks[-1].cut(plc.scans)
+            self._pack()
             size = chunks[-1].size_bytes(chunks[-2] if len(chunks) > 1 else None)
             self._sizes.append(size)
         units = [attached.unit for attached in plc.units]
@@ -305,11 +293,22 @@ class PlcRecording:
         self._times_set = [unit.times_set for unit in self._units]
         chunks.append(Chunk(plc.snapshot(), frames, plc.budget, follows))
         self._pending = ScanInputs(plc.scans, traffic=self._pending.traffic)
-        self._known = plc.memory.map[:]
+        self._known_view[:] = plc.memory.u8
         self._forces, self._budget = plc.forces, plc.budget
         self._cost_ns, self._has_changed = 0, False
+        if self._written:
+            self._written.began(chunks[-1], self._substituted)
         if len(chunks) > 1:
             self._grown(self._sizes[-1])
+
+    def _pack(self) -> None:
+        """Packs the last keyframe, behind which another one comes; one in so many stays as it is, the base of those behind it."""
+        last = self._chunks[-1]
+        self._since_base += 1
+        if self._base is None or self._base.first > last.first or self._since_base > BASE_KEYFRAMES:
+            self._base, self._since_base = last, 0
+        elif last is not self._base:
+            last.pack(self._base)
 
     def _listen(self) -> None:
         """Taps the networks of units that are new."""

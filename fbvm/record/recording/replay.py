@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any, Protocol
 
 from fbvm.base.areas import NEVER
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.choice.tiers import again_choice, python_of
+from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Plc
 from fbvm.machine.scan.refresh import Attached
 from fbvm.record.recording.chunks import Chunk, ScanInputs, Writes
+from fbvm.record.recording.packed import unpacked
 from fbvm.units.contract import AreaMemory, ResumableUnit, Unit
 from fbvm.wire.link import Event, Request
 from fbvm.wire.tap import Tap, TapEvent
@@ -31,6 +35,8 @@ class Recorded(Protocol):
     def inputs(self, scan: int) -> ScanInputs | None: ...
 
     def now_ns(self, scan: int) -> int: ...
+
+    def applying(self, scan: int) -> AbstractContextManager[None]: ...
 
 
 class RecordedLink:
@@ -109,6 +115,8 @@ class Replay:
         self._recorded = recorded
         source, chunk = recorded.plc, recorded.chunk(scan)
         self._engine = again_choice(source.image, source.engine_choice, bool(recorded.substituted))
+        if chunk.machine and self._engine == "auto" and native.available():
+            self._engine = "native"  # between keyframes are more scans than Python does in that time
         self.plc = Plc(source.image, source.cycle_ns, budget=chunk.budget, engine=self._engine)
         self._links: list[RecordedLink] = []
         self._refreshes: list[RecordedRefresh] = []
@@ -116,15 +124,20 @@ class Replay:
         self._results: deque[tuple[int, bytes]] = deque()
         for body in recorded.substituted:
             python_of(self.plc.engine).substitute(body, self._play_back)
-        self._load(chunk)
+        with recorded.applying(chunk.first):
+            self._load(chunk)
 
     def advance(self, scan: int) -> None:
-        """Executes scans up to the one before `scan`, as fast as that can be done."""
+        """Executes scans up to the one before `scan`, as fast as that can be done; the PLC is in the state before `scan` then."""
+        self.execute(scan)
+        self._enter()
+
+    def execute(self, scan: int) -> None:
+        """Executes scans up to the one before `scan`, as fast as that can be done; the PLC is in the state that this one left."""
         plc = self.plc
         while plc.scans < scan:
             if (most := self._regular(scan)) < 2 or not plc.scan_many(most):
                 self.scan()
-        self._enter()
         plc.cycle_ns = self._recorded.plc.cycle_ns
 
     def scan(self) -> None:
@@ -134,20 +147,27 @@ class Replay:
             plc.scan()
         else:
             self._enter()
-            inputs = self._recorded.inputs(number)
-            if inputs and inputs.scan == number:
-                self._apply(inputs)
-            plc.scan(self._recorded.now_ns(number))
+            with self._recorded.applying(number):
+                self._begin(number)
         if plc.halted:
             return
         self._results.clear()
         plc.engine.allowance = WHOLE_BUDGET
 
+    def _begin(self, number: int) -> None:
+        """Executes a scan with its inputs."""
+        recorded, plc = self._recorded, self.plc
+        inputs = recorded.inputs(number)
+        if inputs and inputs.scan == number:
+            self._apply(inputs)
+        plc.scan(recorded.now_ns(number))
+
     def _enter(self) -> None:
         """Puts the PLC into the state of the keyframe before the next scan, if the scan before does not lead to that."""
         chunk = self._recorded.chunk(self.plc.scans)
         if chunk is not self._loaded and chunk.first == self.plc.scans and not chunk.follows:
-            self._load(chunk)
+            with self._recorded.applying(chunk.first):
+                self._load(chunk)
 
     def leave(self) -> None:
         """Takes the units off, so that the PLC goes on alone."""
@@ -179,12 +199,13 @@ class Replay:
             else:
                 units.append(type(frame.unit)(**frame.unit.configuration))
         attached = [Attached(unit, link, link) for unit, link in zip(units, self._links, strict=True)]
-        plc.resume(chunk.state, attached)
+        plc.resume(replace(chunk.state, memory=unpacked(chunk.state.memory)), attached)
         for row, frame in zip(attached, chunk.units, strict=True):
             if row.own:
                 row.own.run_on(self._engine)
             if frame.state and isinstance(row.unit, ResumableUnit):
-                row.unit.resume(frame.state, plc.memory)
+                memory = frame.state.memory
+                row.unit.resume(replace(frame.state, memory=memory and unpacked(memory)), plc.memory)
 
     def _apply(self, inputs: ScanInputs) -> None:
         plc = self.plc

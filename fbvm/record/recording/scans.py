@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from fbvm.machine.plc import Phase, Plc
-from fbvm.record.recording.recording import PlcRecording
+from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.trace.events import Event, NetworkEvent
 from fbvm.record.trace.observing import observing
 from fbvm.record.trace.outline import outer_statements
@@ -21,12 +21,13 @@ class RecordedScans(ScanSource):
     """The scans of `recorded` from number `first` on.
 
     `selected` are patterns of the variables that are meant if none is named, `lines` source lines by file and number.  Of depth
-    SCANS, nothing is told of what happened inside."""
+    SCANS, nothing is told of what happened inside but what passed the network."""
 
-    def __init__(self, recorded: PlcRecording, lines: Mapping[str, Mapping[int, str]], selected: Sequence[str] = (),
+    def __init__(self, recorded: RecordedPlc, lines: Mapping[str, Mapping[int, str]], selected: Sequence[str] = (),
                  depth: Depth = Depth.STATEMENTS, first: int = 0) -> None:  # fmt: skip
         plc, image = recorded.plc, recorded.plc.image
-        self._recorded, self._first = recorded, first
+        self._recorded: RecordedPlc = recorded
+        self._first = first
         self.cycle_ns, self.depth, self.selected, self.lines = plc.cycle_ns, depth, tuple(selected), lines
         self.symbols, self.areas = image.symbols, plc.memory.areas
         self.names = Names.of(image, plc.memory.areas)
@@ -36,7 +37,7 @@ class RecordedScans(ScanSource):
         self.described, self.meanings = descriptions(plc), meanings(plc)
 
     @property
-    def recorded(self) -> PlcRecording:
+    def recorded(self) -> RecordedPlc:
         """The recording that the scans are of."""
         return self._recorded
 
@@ -58,8 +59,7 @@ class RecordedScans(ScanSource):
     def follow(self, follower: Follower, scans: range | None = None) -> None:
         """Executes some scans again, or all, and reports their phases and events to `follower`."""
         if self.depth is Depth.SCANS:
-            for moment in self.moments(scans):
-                follower.phase(moment, Phase.REFRESH)
+            self.follow_ends(follower, scans)
             return
 
         @contextmanager
@@ -81,9 +81,9 @@ class RecordedScans(ScanSource):
         if scans := self._wanted(scans):
             self._recorded.follow_with(scans, attached)
 
-    def _listen(self, plc: Plc, follower: Follower) -> _Listener:
+    def _listen(self, plc: Plc, follower: Follower) -> ScanListener:
         """Has a PLC report to `follower` the ends of its scans and what passes the network."""
-        listener = _Listener(plc, Moment(self, plc.memory), follower)
+        listener = ScanListener(plc, Moment(self, plc.memory), follower)
         plc.watchers.append(listener.end)
         for network in [attached.network for attached in plc.units][:1]:
             add_tap(network, listener.passed)
@@ -94,7 +94,7 @@ class RecordedScans(ScanSource):
         return held if scans is None else range(max(held.start, scans.start), min(held.stop, scans.stop))
 
 
-class _Listener:
+class ScanListener:
     """Passes on to a follower what happens in the scans of a PLC that executes them again."""
 
     def __init__(self, plc: Plc, moment: Moment, follower: Follower) -> None:

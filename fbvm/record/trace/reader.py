@@ -14,12 +14,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from fbvm.base.areas import Mailbox
 from fbvm.base.files import open_file
 from fbvm.base.memory import Memory
-from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
-from fbvm.record.trace import symbols
+from fbvm.record.trace.description import DescriptionError, describe
 from fbvm.record.trace.events import Call, Contact, Cut, Event, Frame, NetworkEvent, Read, Return, Statement, Write
 from fbvm.record.trace.format import (
     BLOCK,
@@ -28,7 +26,6 @@ from fbvm.record.trace.format import (
     END,
     FRAME,
     HEADER,
-    LARGEST_BYTES,
     LINE,
     MAGIC,
     NETWORK,
@@ -46,8 +43,7 @@ from fbvm.record.trace.format import (
     xor,
 )
 from fbvm.record.trace.scan_source import Follower, Moment, ScanSource
-from fbvm.record.trace.writer import FORMAT, Depth
-from fbvm.watch.names import Names
+from fbvm.record.trace.writer import FORMAT
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import TapEvent, TapKind
 
@@ -63,39 +59,14 @@ class Trace(ScanSource):
         if header is None or header.kind != HEADER:
             raise TraceError("the trace has no header yet")
         self.header = _header(read_chunk(file, header.at))
-        head = self.header
-        self._read_header(head)
+        try:
+            self.size = describe(self, self.header)
+        except DescriptionError as error:
+            raise TraceError(f"the trace's header is damaged: {error}") from None
+        self.rung_sites = frozenset(rung.site for rung in self.rungs)
         self._blocks: list[Chunk] = []
         self._end = file.tell()
         self.refresh()
-
-    def _read_header(self, head: dict[str, Any]) -> None:
-        try:
-            self.symbols = symbols.from_data(head)
-            extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
-            boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
-            layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes)
-            self.areas, self.size = layout.areas, layout.size
-            if not 0 <= layout.slots_size <= LARGEST_BYTES:
-                raise ValueError(f"{layout.slots_size} bytes of slots")
-            self.cycle_ns = int(head["cycle_ns"])
-            self.depth = Depth(head["depth"])
-            self.selected: tuple[str, ...] = tuple(head["selected"])
-            self.sites = [Site(head["files"][file], pou, line, column) for file, pou, line, column in head["sites"]]
-            self.outer = [int(number) for number in head["outer"]]
-            self.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
-            self.rungs = tuple(_rung(*row) for row in head["rungs"])
-            self.charts = tuple(_chart(*row) for row in head.get("charts", ()))
-            self.described = dict(head["described"])
-            self.meanings: dict[str, dict[int, str]] = {
-                address: {int(value): str(text) for value, text in known.items()}
-                for address, known in head["meanings"].items()}  # fmt: skip
-            self.lines = {
-                file: {int(n): str(text) for n, text in rows.items()} for file, rows in head["lines"].items()}
-        except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise TraceError(f"the trace's header is damaged: {error}") from None
-        self.rung_sites = frozenset(rung.site for rung in self.rungs)
-        self.names = Names(self.symbols, self.areas, extents)
 
     @classmethod
     def open(cls, path: Path | str) -> Trace:
@@ -248,21 +219,6 @@ class _Player:
         else:
             memory.u8[event.offset : end] = event.value
         self._touched.append((event.offset, end))
-
-
-def _rung(body: int, site: int, number: int, comment: str, steps: list[Any]) -> RungPicture:
-    return RungPicture(int(body), int(site), int(number), str(comment),
-                       tuple((int(place), str(prefix), str(mnemonic), tuple(map(str, operands)))
-                             for place, prefix, mnemonic, operands in steps))  # fmt: skip
-
-
-def _chart(body: int, site: int, steps: list[Any], transitions: list[Any]) -> SfcPicture:
-    return SfcPicture(
-        int(body), int(site),
-        tuple((str(name), bool(initial), int(flag), tuple((str(a), str(b), str(c)) for a, b, c in rows))
-              for name, initial, flag, rows in steps),
-        tuple((int(place), str(name), int(priority), tuple(map(int, sources)), tuple(map(int, targets)), str(condition))
-              for place, name, priority, sources, targets, condition in transitions))  # fmt: skip
 
 
 def _passing(text: bytes) -> NetworkEvent:

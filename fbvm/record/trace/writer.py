@@ -101,7 +101,7 @@ class TraceWriter:
                             Return: self._note_ended, Contact: self._note_contact}  # fmt: skip
         self.size_bytes = len(MAGIC)
         file.write(MAGIC)
-        head = json.dumps(_header(plc, depth, selected, lines or {}), separators=(",", ":"))
+        head = json.dumps(description(plc, depth, selected, lines or {}), separators=(",", ":"))
         self.size_bytes += write_chunk(file, HEADER, head.encode())
         deque(self._changed(), 0)
         self._attached = ExitStack()
@@ -266,7 +266,8 @@ def _different(start: int, now: bytes, old: bytes) -> Iterator[tuple[int, bytes]
                 yield (start + at) // LINE, xor(now[at : at + LINE], old[at : at + LINE])
 
 
-def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str, Mapping[int, str]]) -> dict[str, Any]:
+def description(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str, Mapping[int, str]]) -> dict[str, Any]:
+    """What readers have to know of a PLC and its program, as plain data (`trace.description`)."""
     image = plc.image
     files = sorted({site.file for site in image.sites})
     known = {address: {str(value): text for value, text in rows.items()} for address, rows in meanings(plc).items()}

@@ -90,7 +90,7 @@ def test_json_tells_where() -> None:
     (["--break", "plant.st:99"], "the last statement of plant.st is on line 12"),
     (["--watch", "Main.nothing"], "nothing"),
     (["--break-if", "D100"], "is no condition"),
-    (["--break", "main", "--trace", "t.fbvm", "--depth", "statements"], "looks into every scan already"),
+    (["--break", "main", "--ladder", "1"], "looks into every scan already"),
 ])
 def test_what_cannot_be_is_refused(arguments: list[str], words: str) -> None:
     result = run(*arguments)

@@ -73,7 +73,7 @@ def test_a_disk_that_is_full_during_a_run(disk: Callable[[int], None], option: s
     if option == "--trace":
         assert fbvm("chart", "out.file", "Main.Step", "--scans", "0..50").exit_code == 0
     if option == "--journal":
-        disk(len(whole) // 2)
+        disk(len(whole) - 1)
         assert fbvm(*run).exit_code == 4
         result = fbvm("replay", "out.file")
         assert result.exit_code == 0

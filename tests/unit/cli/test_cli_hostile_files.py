@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import struct
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from old_files import write_old_journal, write_old_trace
 from rows import each_of, first_quick
 
 from fbvm.base import files
@@ -114,7 +114,7 @@ def test_zeros_are_packed() -> None:
 def test_a_trace_that_is_much_larger_when_unpacked(fbvm: Fbvm, largest: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trace_format, "LARGEST_BYTES", largest)
     monkeypatch.setattr(trace_format, "LARGEST_HEADER_BYTES", min(largest, trace_format.LARGEST_HEADER_BYTES))
-    assert fbvm("run", "counter.st", "--scans", "3", "--trace", "run.fbtrace").exit_code == 0
+    write_old_trace("run.fbtrace", COUNTER)
     packed = many_zeros(1 << 22, (largest >> 22) + 1)
     assert len(packed) < 1 << 20
     whole = Path("run.fbtrace").read_bytes()
@@ -182,8 +182,7 @@ def test_an_export_of_a_file_with_an_impossible_time(fbvm: Fbvm) -> None:
 
 
 def test_a_journal_with_an_endless_line(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert fbvm("run", "counter.st", "--scans", "3", "--journal", "run.journal").exit_code == 0
-    assert json.loads(Path("run.journal").read_text(encoding="utf-8").splitlines()[-1]) == {"end": 3}
+    write_old_journal("run.journal", COUNTER)
     with Path("run.journal").open("a", encoding="utf-8") as file:
         file.write('{"scan":' * 100_000)
     assert fbvm("replay", "run.journal").exit_code == 0

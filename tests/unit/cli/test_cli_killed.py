@@ -45,14 +45,14 @@ def killed(command: list[str], grown: Path, size: int) -> int:
 @pytest.mark.parametrize("seed", range(times(2, 25)))
 def test_a_run_that_writes_everything(seed: int, tmp_path: Path) -> None:
     journal, trace, capture = tmp_path / "run.jsonl", tmp_path / "run.fbt", tmp_path / "run.pcapng"
-    size = random.Random(seed).randrange(1, 60_000)
+    size = random.Random(seed).randrange(1, 20_000)
     killed(["run", DEMO, *PEER, "--for", "100000000s", "--journal", str(journal), "--trace", str(trace), "--depth", "statements",
             "--pcap", str(capture)], journal, size)  # fmt: skip
-    replayed = CliRunner().invoke(main, ["replay", str(journal), "--show", "D200"])
-    assert replayed.exit_code == 0, replayed.output
-    if trace.stat().st_size:
-        shown = CliRunner().invoke(main, ["table", str(trace), "D200"])
-        assert shown.exit_code == 0, shown.output
+    for verb in (["replay", str(journal), "--show", "D200", "--scans", "5000"],
+                 ["table", str(trace), "D200", "--scans", "0..60"]):  # fmt: skip
+        read = CliRunner().invoke(main, verb)
+        words = "has no PLC yet", "has no scans yet", "has no beginning yet", "none of these changed", "neither a recording"
+        assert read.exit_code == 0 or any(said in read.output for said in words), read.output
     content = capture.read_bytes()
     while len(content) >= 12:
         kind, length = struct.unpack_from("<II", content)

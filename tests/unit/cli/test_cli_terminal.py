@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from old_files import write_old_journal
 from rows import each_of
 
 from fbvm.base.printable import one_line, printable
@@ -113,6 +114,7 @@ def test_recordings_and_journals(fbvm: Fbvm) -> None:
             Path("evil.csv").write_text(f'scan,time,"Main.{EVIL}"\n0,0,1\n1,10,{EVIL}\n', encoding="utf-8")
             named = {"table": (file, f"Main.n{EVIL}"), "why": (f"Main.n{EVIL}", file), "convert": (file, "-o", f"o{EVIL}.x")}
             fbvm(verb, *named.get(verb, (file,)))
+    write_old_journal(f"j{EVIL}.jsonl", Path(NAME).read_text(encoding="utf-8"), NAME)
     good = Path(f"j{EVIL}.jsonl").read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(good[:3]):
         for key in json.loads(line):

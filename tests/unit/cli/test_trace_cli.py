@@ -171,8 +171,9 @@ def test_only_what_is_selected(fbvm: Fbvm) -> None:
     ("chart run.fbtrace --scans 900..", "the trace has scans 0 to 59"),
     ("chart run.fbtrace --scans 9..3", "has no scan in it"),
     ("chart run.fbtrace --scans x", "is not scans such as"),
-    ("table run.fbtrace D200", "--depth statements"),
-    ("why D200", "--depth statements"),
+    ("chart run.fbtrace --plc other", "choose a PLC with --plc NAME; the recording has pump"),
+    ("table back.fbtrace D200", "values at scan ends only"),
+    ("why D200 back.fbtrace", "does not hold what statements read"),
     ("convert run.fbtrace run.xyz", "what it shall be is not clear"),
     ("convert run.fbtrace none/run.csv", "cannot be written"),
     ("convert table.csv run.vcd", "a table becomes a trace"),
@@ -183,6 +184,8 @@ def test_only_what_is_selected(fbvm: Fbvm) -> None:
 ])  # fmt: skip
 def test_mistakes_of_usage(fbvm: Fbvm, arguments: str, said: str) -> None:
     record(fbvm)
+    Path("table.csv").write_text("scan,time_ms,D200\n0,0,7\n")
+    assert fbvm("convert", "table.csv", "back.fbtrace").exit_code == 0
     Path("table.csv").write_text("a,b\n")
     result = fbvm(*arguments.split())
     assert result.exit_code == 2, result.output

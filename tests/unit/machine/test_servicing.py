@@ -9,7 +9,7 @@ from fins_rig import COUNTING, FinsRig, TcpClient, compiled
 
 from fbvm import Plc, Recording, compile_text
 from fbvm.net.journal import Journal, open_journal
-from fbvm.run.replay import Replay
+from fbvm.record.recording.journal_replay import Replay
 
 CONVERSATION = [
     (0x0102, "82 0064 00 0002 1234 5678"), (0x2301, "0001 0001 30 0064 01"), (0x0101, "82 01F4 00 0001"),

@@ -22,7 +22,7 @@ from fbvm.net.faults import Fault
 from fbvm.net.journal import Act, End, Entry, Header, Journal, JournalError, Scan, open_journal
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.run.replay import Replay
+from fbvm.record.recording.journal_replay import Replay
 from fbvm.units.etn21.map import Switch
 from fbvm.units.etn21.unit import Etn21
 from fbvm.units.etn21.unit import Fault as UnitFault

@@ -17,9 +17,9 @@ from fbvm.engine.python.engine import PythonEngine
 from fbvm.machine.plc import STEP_BUDGET
 from fbvm.net.journal import Journal, open_journal
 from fbvm.net.tcp import TcpNetwork
+from fbvm.record.recording.journal_replay import Replay
 from fbvm.record.recording.recording import Recording
 from fbvm.run import run, watchdog
-from fbvm.run.replay import Replay
 from fbvm.run.watchdog import FIRST_STEPS, Watchdog
 
 ENGINES = ["python", "native"] if native.available() else ["python"]

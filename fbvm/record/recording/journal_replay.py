@@ -1,6 +1,7 @@
 """Replays a journal: the same program, the same inputs, and after each scan the same memory, to the bit.
 
-The time is that of the journal, so that an hour on real connections takes seconds.  Nothing is sent.
+The time is that of the journal, so that an hour on real connections takes seconds.  Nothing is sent.  `fbvm run` writes
+recordings; journals are those of `Plc(image, journal=...)` and of fbvm 0.1.
 """
 
 from __future__ import annotations
@@ -11,44 +12,14 @@ from typing import Any
 from fbvm.code.image import Image
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.machine.backplane import UNITS
-from fbvm.machine.goal import Goal
 from fbvm.machine.plc import Mode, Plc, Stopped
 from fbvm.net.journal import Act, End, Entry, Fingerprint, Header, JournalError, Scan
+from fbvm.record.recording.repeated_run import RepeatedRun
+from fbvm.record.recording.replay import RecordedLink
 from fbvm.units.contract import Unit
-from fbvm.wire.link import Event, Request
 
 
-class _Recorded:
-    """Network and link at once: tells what the journal says, and takes requests without doing anything."""
-
-    virtual_time = True
-
-    def __init__(self) -> None:
-        self.address = ""
-        self.next: list[Event] = []
-
-    def attach(self, address: str) -> _Recorded:
-        self.address = address
-        return self
-
-    is_quiet = False
-    """The journal may tell something in any scan."""
-
-    def pass_by(self, refreshes: int) -> None:
-        """Never, as it is never quiet."""
-
-    def submit(self, requests: Iterable[Request], now_ns: int) -> None:
-        """What they led to stands in the journal."""
-
-    def events(self, now_ns: int) -> list[Event]:
-        told, self.next = self.next, []
-        return told
-
-    def close(self) -> None:
-        """There is nothing to end."""
-
-
-class Replay:
+class Replay(RepeatedRun):
     """A replay in progress: `plc` is as it was after the scan that was replayed last.
 
     `header` and `entries` come from `open_journal`; `image` is the program that ran, `units` make the units by class
@@ -69,12 +40,8 @@ class Replay:
             raise JournalError("the journal was written by another program, or by another version of fbvm")
         self._entries = entries
         self.plc = Plc(image, header.cycle_ns, budget=header.budget, observed=observed, engine=engine)
-        self.differs: int | None = None
-        """Number of the first scan after which the memory was not that of the journal; None if there is none."""
-        self.complete = False
-        """True when the end of the journal was reached.  One that was cut off has none."""
         self._units = units
-        self._links: list[_Recorded] = []
+        self._links: list[RecordedLink] = []
         self._fingerprint = Fingerprint(self.plc.memory)
 
     def step(self) -> bool:
@@ -90,19 +57,6 @@ class Replay:
                 raise JournalError(f"scan {self.plc.scans} cannot be done again: {error}") from error
             self.complete = isinstance(entry, End)
         return False
-
-    def run(self, *, scans: int | None = None, until: str | Callable[[Plc], bool] | None = None) -> str:
-        """Replays scans up to a bound of `Plc.run`, the end of the journal, or the first scan with another memory.
-
-        Returns "scans", "until", "end" or "differs"."""
-        never = scans is None and until is None
-        goal = Goal(self.plc, scans=1 << 62 if never else scans, until=until)
-        while not (reason := goal.reached()) or reason == "trap":
-            if not self.step():
-                return "end"
-            if self.differs is not None:
-                return "differs"
-        return reason
 
     def _act(self, act: Act) -> None:
         self._write(act.writes)
@@ -120,7 +74,8 @@ class Replay:
         make = self._units.get(described["class"])
         if make is None:
             raise JournalError(f"nothing here makes a unit of class {described['class']}")
-        unit, link = make(**described["with"]), _Recorded()
+        unit = make(**described["with"])
+        link = RecordedLink(unit.address, None)
         unit.settings = described["settings"]
         self.plc.attach(unit, link)
         self._links.append(link)
@@ -135,7 +90,7 @@ class Replay:
             plc.budget = scan.budget
         self._write(scan.writes)
         for number, events in scan.events.items():
-            self._links[number].next = list(events)
+            self._links[number].told = list(events)
         if scan.watch is not None:
             steps, plc.watch_cycle.time_ns = scan.watch
             plc.engine.allowance = Allowance(plc.budget - steps + 1)

@@ -1,0 +1,67 @@
+"""The program of a recorded PLC as its file holds it: texts and how they are compiled, so that it can be executed elsewhere.
+
+A file may come from anywhere, and code that is executed has to come from the compiler: therefore it holds texts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fbvm.base.diagnostics import Source
+from fbvm.code.compiler import compile_sources
+from fbvm.code.image import Image
+from fbvm.code.store import cache as image_cache
+
+
+@dataclass(frozen=True)
+class ProgramText:
+    """The sources of a program, and the choices that `compile_sources` had."""
+
+    sources: tuple[tuple[str, str], ...] = ()
+    """Name and text of each; none for a program that Python has put together."""
+    libraries: tuple[str, ...] = ()
+    """Folders of libraries beside the shipped ones; they are not held."""
+    program: str | None = None
+    resource: str | None = None
+    dialect: str = "standard"
+    drawn: bool = False
+    e_banks: tuple[str, ...] = field(default=())
+    """Banks of the E area that are added to those that the program names."""
+
+    def as_data(self) -> dict[str, Any]:
+        """As plain data."""
+        return dict(vars(self))
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> ProgramText:
+        """From plain data.  Raises KeyError, TypeError, ValueError for other data."""
+        program, resource = data["program"], data["resource"]
+        return cls(tuple((str(name), str(text)) for name, text in data["sources"]), tuple(map(str, data["libraries"])),
+                   None if program is None else str(program), None if resource is None else str(resource), str(data["dialect"]),
+                   bool(data["drawn"]), tuple(map(str, data["e_banks"])))  # fmt: skip
+
+    def compiled(self, libraries: Sequence[Path] = ()) -> Image | str:
+        """The program, or why there is none.  `libraries` take the place of its own folders."""
+        if not self.sources:
+            return "it holds no sources of the program; from Python, hand over its image"
+        folders = list(libraries) or [Path(folder) for folder in self.libraries]
+        for folder in folders:
+            if not folder.is_dir():
+                return f"the program needs the library folder {folder}; say where it is now with --library"
+        sources = [Source(name, text) for name, text in self.sources]
+        entry = image_cache.name(sources, folders, ("recording", self.program, self.resource, self.dialect, self.drawn))
+        known = image_cache.read(entry, sources)
+        if known is None:
+            try:
+                made = compile_sources(sources, self.program, folders, resource=self.resource, dialect=self.dialect, lint=False,
+                                       drawn=self.drawn)
+            except ValueError as error:
+                return str(error)
+            if made.image is None:
+                return f"the program does not compile here: {made.errors[0].code} {made.errors[0].message}"
+            image_cache.write(entry, sources, made.image, [])
+            known = made.image, []
+        return known[0].with_e_banks(self.e_banks)
