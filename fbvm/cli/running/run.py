@@ -34,8 +34,7 @@ from fbvm.cli.shared.options import (
 )
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
-from fbvm.cli.shared.recording_options import recording_options
-from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, write_page
+from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, recording_options, write_page
 from fbvm.cli.shared.run_result import RunProgress, RunResult
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_options
 from fbvm.cli.shared.terminal import say

@@ -1,8 +1,8 @@
-"""The recording of a run: one file for `--journal` and `--trace`, and the page of `--html`, made of the same recording."""
+"""The recording of a run and the options that ask for it: one file for `--journal` and `--trace`, and the page of `--html`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -35,6 +35,27 @@ INTERRUPTED_SCANS = 400
 """The scans on the page of a run that was interrupted."""
 FLUSHES = 10
 """The file has what happened up to so many calls of `tick` ago: one second, if they come every 100 ms."""
+
+
+_FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+def recording_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--trace, --journal, --verify, --html, --depth and --select."""
+    for decorate in (
+        click.option("--select", "selected", multiple=True, metavar="PATTERN",
+                     help="What charts and pages of the recording show by default: 'Main.*.Q', D200..D299.  May be repeated."),
+        click.option("--depth", type=click.Choice([depth.value for depth in Depth]), default="scans", show_default=True,
+                     help="What a page of the recording carries along: scan ends, also writes, also statements."),
+        click.option("--html", type=_FILE, metavar="FILE",
+                     help="Write the run as one page for a browser, with every statement."),
+        click.option("--verify", is_flag=True, help="Record a fingerprint of the memory at every scan."),
+        click.option("--journal", type=_FILE, metavar="FILE", help="The same as --trace."),
+        click.option("--trace", type=_FILE, metavar="FILE",
+                     help="Record the run for `fbvm chart`, `table`, `why`, `convert` and `replay`."),
+    ):
+        function = decorate(function)
+    return function
 
 
 class _Files(BytesIO):
