@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from io import StringIO
+from io import BytesIO, StringIO
 
 import pytest
 from fins_rig import COUNTING, FinsRig, TcpClient, compiled
 
-from fbvm import Plc, Recording, compile_text
+from fbvm import Plc, Recording, RecordingFile, RecordingWriter, compile_text
 from fbvm.net.journal import Journal, open_journal
+from fbvm.record.recording import recording as recording_module
 from fbvm.record.recording.journal_replay import Replay
 
 CONVERSATION = [
@@ -55,19 +56,23 @@ def test_a_journal_with_fins_is_done_again_to_the_bit(engine: str) -> None:
 
 
 @pytest.mark.slow
-def test_every_scan_of_a_recording_with_fins_is_had_again() -> None:
-    rig = FinsRig(plc=compiled())
-    recording = Recording()
-    recorded = recording.add("plc", rig.plc)
+def test_every_scan_of_a_recording_with_fins_is_had_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording_module, "AGAIN_NS", 5 * recording_module.CALL_NS)
+    rig, file = FinsRig(plc=compiled()), BytesIO()
+    recording = Recording(file=RecordingWriter(file))
+    in_memory = recording.add("plc", rig.plc)
     seen: dict[int, bytes] = {}
     rig.plc.watchers.append(lambda plc: seen.__setitem__(plc.scans, plc.memory.map[:]))
     converse(rig)
-    for plc in recorded.again(recorded.scans):
-        assert plc.memory.map[:] == seen[plc.scans], plc.scans
-    for scan in (5, 20, 40, recorded.scans.stop):
-        at = recorded.at(scan)
-        assert at.scans == scan
-        assert at.read("D100..D101") == ([0x1234, 0x5678] if scan > 4 else [0, 0])
+    recording.close()
+    in_file = RecordingFile(BytesIO(file.getvalue()), images={"plc": rig.plc.image})["plc"]
+    for recorded in (in_memory, in_file):
+        for plc in recorded.again(recorded.scans):
+            assert plc.memory.map[:] == seen[plc.scans], plc.scans
+        for scan in (5, 20, 40, recorded.scans.stop):
+            at = recorded.at(scan)
+            assert at.scans == scan
+            assert at.read("D100..D101") == ([0x1234, 0x5678] if scan > 4 else [0, 0])
 
 
 def test_the_clock_goes_on_over_a_restart() -> None:
