@@ -7,8 +7,8 @@ one edit of one file: another relation, AND for OR, a constant plus one, a condi
 result.  Each is written into a copy of the repository in a temporary folder, where the tests of the room run without the slow
 ones, first those that name the file.  A mutant that no test finds is printed as a difference.
 
-A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).  Those
-that were looked at and stay are in mutants_survivors.md, each with its reason."""
+A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).
+Those that were looked at and stay are in mutants_survivors.md, each with its reason."""
 
 from __future__ import annotations
 
