@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import site
 import subprocess
 import sys
@@ -50,6 +51,19 @@ def test_the_wheel_holds_what_fbvm_needs(dist: Path) -> None:
     assert {"fbvm/record/page/chart.js", "fbvm/_data/examples/project/.github/workflows/test.yml",
             "fbvm/_data/examples/project/.gitignore",
             "fbvm/_data/examples/lessons/12-two-plcs-one-wire/solution/program.st"} <= set(names)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_links_of_the_description_lead_somewhere_without_the_repository(dist: Path) -> None:
+    """README.md has them relative, which a package index cannot follow."""
+    with zipfile.ZipFile(built(dist, "*.whl")) as wheel:
+        [name] = [name for name in wheel.namelist() if name.endswith(".dist-info/METADATA")]
+        description = wheel.read(name).decode("utf-8").partition("\n\n")[2]
+    links = re.findall(r"\]\(([^)]*)\)", description)
+    assert len(links) > 30 and [link for link in links if not link.startswith("https://")] == []
+    inside = [link.partition("/blob/main/")[2].partition("#")[0] for link in links if "/blob/main/" in link]
+    assert [link for link in inside if not (HOUSE / link).exists()] == []
+    assert "](docs/" in (HOUSE / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

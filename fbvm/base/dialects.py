@@ -169,6 +169,8 @@ ALIKE = (
     ("AND and OR whose right side has effects", "Both sides are worked out; AND_THEN and OR_ELSE leave out what cannot matter."),
     ("FOR whose limit is the last value of its type", "Ends."),
     ("TIME_TO_DWORD, DWORD_TO_TIME", "Milliseconds modulo 2**32; in seconds under matiec."),
+    ("UDINT_TO_DATE(90061)", "D#1970-01-02 with an hour, a minute and a second in it, as in CODESYS and TwinCAT: they count in "
+     "comparisons and in DATE_TO_DT, and only the day is shown. DT_TO_DATE cuts them off."),
     ("A number that TIME or DATE cannot hold; DT + TIME past 2262-04-11", "The program stops (R0105); TIME + TIME wraps."),
     ("SIZEOF of ten INT", "20: the bytes that they fill."),
     ("TON, TOF, TP when ET = PT exactly", "The time is over."),

@@ -7,7 +7,8 @@ one edit of one file: another relation, AND for OR, a constant plus one, a condi
 result.  Each is written into a copy of the repository in a temporary folder, where the tests of the room run without the slow
 ones, first those that name the file.  A mutant that no test finds is printed as a difference.
 
-A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out)."""
+A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).
+Those that were looked at and stay are in mutants_survivors.md, each with its reason."""
 
 from __future__ import annotations
 
@@ -47,7 +48,8 @@ TESTS = {
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/machine", "tests/unit/units"),
     "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run"),
-    "record": ("tests/unit/record", "tests/unit/cli"), "testing": ("tests/unit/testing",), "cli": ("tests/unit/cli",),
+    "record": ("tests/unit/record", "tests/unit/cli"), "run": ("tests/unit/run", "tests/unit/net"),
+    "testing": ("tests/unit/testing",), "cli": ("tests/unit/cli",),
 }  # fmt: skip
 """The folders of tests that matter for a room; for others that of its own name."""
 RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is": "is not", "is not": "is",

@@ -176,7 +176,7 @@ def test_a_command_while_one_runs() -> None:
     rig.command(bytes.fromhex("03 00 00 00 01"))
     rig.scan(5)
     rig.command(bytes.fromhex("04 00 00 00 01"))
-    assert rig.plc.read("Main.Client.Error_Code") == 0x110C
+    assert (rig.plc.read("Main.Client.Error"), rig.plc.read("Main.Client.Error_Code")) == (True, 0x110C)
     rig.until("Main.Client.Done")
     assert rig.reply() == "03 02 00 00"
     assert len(rig.peer.received) == 1

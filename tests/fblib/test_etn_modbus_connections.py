@@ -55,6 +55,17 @@ def test_the_port_may_be_set_by_a_declaration() -> None:
     assert plc.read("D30019") == 1502
 
 
+@pytest.mark.parametrize("sockets", [1, 3])
+def test_words_that_another_program_has_left_hold_nobody_up(sockets: int) -> None:
+    """W485 to W487 say which socket listens, receives and sends."""
+    text = f"PROGRAM Main VAR Server : ETN_Modbus_Server; END_VAR Server(Sockets := {sockets}); END_PROGRAM"
+    plc = Plc(image_of(text))
+    plc.attach(Etn21(0, "192.168.250.1"), LoopNetwork())
+    plc.write("W485..W487", [5, 6, 7])
+    assert plc.run(until="CIO 1519.01", max_ns=SECOND_NS) == "until"  # passive open
+    assert plc.read("W485..W487") == [1, 0, 0]
+
+
 # --- scan by scan -----------------------------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, RudePeer, by_script, by_seed
 
 every_client = pytest.mark.parametrize("client", KINDS)
 TIMINGS = pytest.mark.parametrize("timing", ["exact", pytest.param("real", marks=pytest.mark.slow)])
-QUICK = ["the next reply, too", "garbage behind"]
+QUICK = ["the next reply, too", "garbage behind", "a byte behind"]
 
 
 def ends_after(client: str, misdeed: str, timing: str) -> list[str]:

@@ -69,6 +69,26 @@ def test_a_late_reply_in_pieces_of_the_size_that_is_expected(late: str, asked: s
     assert rig.get("conn.ENO"), "the connection has not been opened again"
 
 
+@pytest.mark.parametrize("asked", ["one", "three", "wr"])
+@pytest.mark.parametrize("there", [6, 8, 10])
+def test_a_late_reply_of_which_a_part_is_there_when_the_next_command_comes(there: int, asked: str) -> None:
+    """The command waits for its end and is sent then."""
+
+    class Rig(LateRig):
+        def said(self, request: int) -> list[Action]:
+            if request > 1:
+                return [Say(self.kept[-1])]
+            return [Say(self.kept[0][:there], REPLY_NS + 2 * GAP_NS), Say(self.kept[0][there:], REPLY_NS + 4 * GAP_NS)]
+
+    rig = Rig(one=ONE, three=THREE, wr=WRITE)
+    assert rig.end_of("one") == "0080"
+    rig.run_until(f"D30001 = {there}", max_s=1)
+    assert rig.end_of(asked) == "ok"
+    assert rig.words(200, 1) == ([0x1111] if asked == "one" else [0])
+    assert rig.words(210, 3) == (HELD if asked == "three" else [0] * 3)
+    assert rig.get("conn.ENO"), "the connection has not been opened again"
+
+
 @pytest.mark.parametrize("surplus", [-3, 0, 4])
 def test_a_reply_that_comes_two_requests_later(surplus: int) -> None:
     """A reply to the second request does not mean that the one to the first will not come."""

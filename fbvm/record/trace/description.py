@@ -7,6 +7,7 @@ from typing import Any
 
 from fbvm.base.areas import Mailbox
 from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
+from fbvm.engine.observation import NO_SITE
 from fbvm.record.trace import symbols
 from fbvm.record.trace.format import LARGEST_BYTES
 from fbvm.record.trace.scan_source import ScanSource
@@ -38,6 +39,9 @@ def describe(source: ScanSource, head: Mapping[str, Any]) -> int:
         source.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
         source.rungs = tuple(_rung(*row) for row in head["rungs"])
         source.charts = tuple(_chart(*row) for row in head.get("charts", ()))
+        if len(source.outer) != len(source.sites) or not {*source.outer, *(rung.site for rung in source.rungs)} <= {
+                NO_SITE, *range(len(source.sites))}:  # fmt: skip
+            raise ValueError("statements do not fit one another")
         source.described = dict(head["described"])
         source.meanings = {
             address: {int(value): str(text) for value, text in known.items()} for address, known in head["meanings"].items()}

@@ -142,7 +142,7 @@ class _Player:
     def __init__(self, trace: Trace, cursor: Cursor, memory: Memory, follower: Follower | None, wanted: range) -> None:
         self._cursor, self._follower, self._wanted = cursor, follower, wanted
         self._moment = Moment(trace, memory)
-        self._rung_sites = trace.rung_sites
+        self._rung_sites, self._sites = trace.rung_sites, len(trace.sites)
         self._base = bytearray(memory.size)
         self._touched: list[tuple[int, int]] = []
         self._frames: list[Frame] = []
@@ -191,26 +191,32 @@ class _Player:
             return Cut()
         if tag == FRAME:
             body, start, site, caller = (cursor.number() for _ in range(4))
-            frame = Frame(body, start, site - 1, self._frames[caller - 1] if caller else self._outside)
+            frame = Frame(body, start, self._site(site), self._frames[caller - 1] if caller else self._outside)
             self._frames.append(frame)
             return Call(frame)
         frame = self._frames[cursor.number()]
         if tag == END:
             return Return(frame)
         if tag == STATEMENT:
-            number = cursor.number()
+            number = self._site(cursor.number() + 1)
             return Statement(number, frame, number in self._rung_sites)
         if tag == CONTACT:
             site, value, size = (cursor.number() for _ in range(3))
-            return Contact(site, frame, json.loads(cursor.bytes(size)), bool(value))
+            return Contact(self._site(site + 1), frame, json.loads(cursor.bytes(size)), bool(value))
         site, offset, bit, size = (cursor.number() for _ in range(4))
         if tag == READ:
-            return Read(site - 1, frame, offset, bit, cursor.bytes(size))
+            return Read(self._site(site), frame, offset, bit, cursor.bytes(size))
         if tag != WRITE:
             raise IndexError(f"a record of kind {tag}")
-        event = Write(site - 1, frame, offset, bit, cursor.bytes(size), cursor.bytes(size))
+        event = Write(self._site(site), frame, offset, bit, cursor.bytes(size), cursor.bytes(size))
         self._write(event)
         return event
+
+    def _site(self, number: int) -> int:
+        """The number of a site that a record has, raised by one.  Raises IndexError for one that the trace does not have."""
+        if number > self._sites:
+            raise IndexError(f"there is no statement {number}")
+        return number - 1
 
     def _write(self, event: Write) -> None:
         memory, end = self._moment.memory, event.offset + len(event.value)

@@ -7,8 +7,6 @@ line between statements only once.
 
 from __future__ import annotations
 
-from typing import Any
-
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.syntax.formatter.comments import Comments
 from fbvm.syntax.formatter.declarations import DeclarationLayout
@@ -46,15 +44,14 @@ class _NeedsMending(Exception):
 
 def _printed(source: Source, spelling: Spelling) -> str:
     """The canonical text of a text without errors."""
-    tokens = list(Lexer(source.text, _silent).tokens())
+    wrong: list[object] = []
+    tokens = list(Lexer(source.text, lambda *message: wrong.append(message)).tokens())
+    if wrong:  # within what the parser has passed over
+        raise _NeedsMending
     comments = Comments(source.text, tokens)
     layout = DeclarationLayout(comments, spelling)
     doc: Doc = Automaton(layout, iter(tokens), source.text).run(_no_mender)
     return Printer(comments).print(doc)
-
-
-def _silent(*message: Any) -> None:
-    """Errors of the lexer were reported by the parser."""
 
 
 def _no_mender(stuck: Automaton) -> ErrorRecovery:

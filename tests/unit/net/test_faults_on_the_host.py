@@ -122,6 +122,37 @@ def data_of(events: list[Event]) -> bytes:
 # --- what a unit opens --------------------------------------------------------------------------------------------------
 
 
+def test_the_loop_is_told_when_something_is_due(host: Host) -> None:
+    host.network.faults.append(fault("slow", latency_ns=50 * MS))
+    host.open()
+    host.settle()
+    relays = host.network.relays
+    assert relays.until_due_s() is None
+    host.scan(Send(1, b"ask"))
+    due_s = relays.until_due_s()
+    assert due_s is not None and 0.02 < due_s <= 0.05
+    assert relays.channels_behind == 1
+    host.network.close()
+    assert (relays.channels_behind, relays.until_due_s()) == (0, None)
+
+
+def test_a_send_that_waits_when_a_fault_comes_is_answered(host: Host) -> None:
+    """The host has not taken all of it yet; the unit is told as soon as it has."""
+    device = host.open()
+    host.scan(Send(1, bytes(16 << 20)))
+    assert host.settle() == [], "the device reads nothing"
+    host.network.faults.append(fault("slow", latency_ns=20 * MS))
+    assert host.settle() == []
+    device.setblocking(False)
+    told: list[Event] = []
+    for _ in range(20_000):
+        arrived(device)
+        told += host.scan()
+        if told:
+            break
+    assert told == [Sent(1, 16 << 20)]
+
+
 def test_latency_is_each_way(host: Host) -> None:
     host.network.faults.append(fault("slow", latency_ns=50 * MS))
     host.scan(Connect(1, SERVER), Grant(1, 4096))

@@ -204,6 +204,8 @@ def test_a_rude_peer_may_reform() -> None:
     peer.reform()
     link.submit([Send(1, Adu(6, 1, PDU).to_bytes()), Connect(2, SERVER), Grant(2, 4096)], 2)
     assert [word for event in link.events(2) for word in said(event)] == ["5", "6"]
+    link.submit([Send(2, Adu(7, 1, PDU).to_bytes())], 3)
+    assert [word for event in link.events(3) for word in said(event)] == ["7"], "it reads on new connections, too"
 
 
 def test_misdeeds_by_script_and_by_seed() -> None:

@@ -45,7 +45,7 @@ def segments(content: bytes) -> list[tuple[int, str, int, bytes]]:
         if kind == 6:
             _, high, low, size, _ = struct.unpack_from("<IIIII", body)
             frame = body[20 : 20 + size]
-            assert frames.checksum(frame[14:34]) == 0
+            assert frame[12:14] == b"\x08\x00" and frames.checksum(frame[14:34]) == 0
             offset = 34 + (frame[46] >> 4) * 4
             found.append((high << 32 | low, ".".join(map(str, frame[26:30])), frame[47], frame[offset:]))
     return found

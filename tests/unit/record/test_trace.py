@@ -21,7 +21,20 @@ from fbvm.record.draw.chart import draw
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace import symbols
 from fbvm.record.trace.events import Call, Event, Frame, Read, Return, Statement, Write
-from fbvm.record.trace.format import MAGIC, Cursor, TraceError, put, xor
+from fbvm.record.trace.format import (
+    BLOCK,
+    CONTACT,
+    FRAME,
+    MAGIC,
+    READ,
+    SCAN,
+    STATEMENT,
+    Cursor,
+    TraceError,
+    put,
+    write_chunk,
+    xor,
+)
 from fbvm.record.trace.observing import observing
 from fbvm.record.trace.selection import select
 from fbvm.record.trace.signals import waveforms
@@ -299,6 +312,28 @@ def test_a_damaged_block_is_told() -> None:
     trace = Trace(io.BytesIO(bytes(data)))
     with pytest.raises(TraceError, match="is damaged"):
         trace.at(49)
+
+
+@pytest.mark.parametrize("tag", [STATEMENT, READ, CONTACT])
+def test_a_statement_that_the_trace_does_not_have_is_told(tag: int) -> None:
+    """What shows events looks its line up."""
+    data = record(Plc(image()), 1)
+    body = bytearray()
+    put(body, 0, SCAN, 0, 0, FRAME, 0, START, 0, 0, tag, 0, 9999, 0, 0, 0, 0)
+    whole = io.BytesIO()
+    whole.write(data[: Trace(io.BytesIO(data))._blocks[0].at])
+    write_chunk(whole, BLOCK, bytes(body), 0, 1)
+    whole.seek(0)
+
+    class Ignoring:
+        def phase(self, moment: object, phase: object) -> None:
+            """Nothing is kept."""
+
+        def event(self, moment: object, event: object) -> None:
+            """Nothing is kept."""
+
+    with pytest.raises(TraceError, match="there is no statement"):
+        Trace(whole).follow(Ignoring())
 
 
 @pytest.mark.slow

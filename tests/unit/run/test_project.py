@@ -13,7 +13,7 @@ from fbvm.net.faults import KINDS, Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.run import run_all
 from fbvm.run.plant import MANY, Plant
-from fbvm.run.project import PLC, SERVER, Project, project_file, read_project
+from fbvm.run.project import PLC, RUN, SERVER, Project, project_file, read_project
 from fbvm.run.toml_keys import span
 from fbvm.wire.link import Peer
 
@@ -459,3 +459,8 @@ def test_paths_stay_inside_the_project(folder: Path) -> None:
     assert isinstance(found, list)
     assert said(found) == [("P0103", 3, "plc.a.libraries: .. is outside of the project")]
     assert project(inside, f"[plc.a]\nsources = ['{inside / 'here.st'}', 'own/../here.st']\nlibraries = ['own']\n")
+
+
+def test_a_bound_that_nobody_reaches_is_not_said() -> None:
+    assert RUN["seed"].kind.called == "a whole number from 0"  # type: ignore[union-attr]
+    assert PLC["count"].kind.called == "a whole number from 1 to 100000"  # type: ignore[union-attr]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_of
 
-from fbvm.wire import modbus
+from fbvm.wire import modbus, registers
 from fbvm.wire.modbus import Adu, Fault, Splitter, decode_reply, decode_request, mismatch
 from fbvm.wire.modbus_server import ModbusServer
 
@@ -244,3 +244,27 @@ def test_the_words_of_exceptions() -> None:
     }  # fmt: skip
     assert {code: str(decode_reply(bytes((0x83, code)))) for code in range(1, 0x0D)} == {
         code: f"03 read holding registers, exception {code:02X} {words.get(code, 'unknown')}" for code in range(1, 0x0D)}
+
+
+@each_of(("sub", "count"), [(0x0B, 1), (0x0C, 0), (0x0D, 0), (0x0E, 1), (0x0F, 0), (0x10, 0), (0x11, 0), (0x12, 0)])
+def test_every_counter_of_diagnostics_can_be_asked(sub: int, count: int) -> None:
+    server = a_server()
+    reply = server.answer(Adu(1, 1, bytes((8, 0, sub, 0, 0))).to_bytes())
+    assert reply is not None and reply[7:10] == bytes((8, 0, sub))
+    assert int.from_bytes(reply[10:12], "big") == count
+    assert server.answer(Adu(1, 1, bytes((8, 0, 0x13, 0, 0))).to_bytes()) == Adu(1, 1, b"\x88\x01").to_bytes()
+
+
+def test_an_identity_that_begins_nowhere_begins_with_its_first_object() -> None:
+    server = ModbusServer(identity={0: "a", 1: "b", 2: "c"})
+    whole, unknown = (server.answer(Adu(1, 1, bytes((0x2B, 0x0E, 1, first))).to_bytes()) for first in (0, 0x55))
+    assert whole == unknown
+    assert whole is not None and whole[7:] == bytes.fromhex("2B 0E 01 81 00 00 03 00 01 61 01 01 62 02 01 63")
+
+
+def test_the_values_of_the_peer_show_their_addresses() -> None:
+    server = registers.server()
+    assert list(server.coils[:7]) == [1, 0, 1, 0, 1, 0, 1]
+    assert list(server.discrete_inputs[:7]) == [1, 0, 0, 1, 0, 0, 1]
+    assert [server.holding_registers[at] for at in (0, 1, 64_535, 64_536, 65_535)] == [1000, 1001, 65_535, 0, 999]
+    assert [server.input_registers[at] for at in (0, 1, 63_535, 63_536, 65_535)] == [2000, 2001, 65_535, 0, 1999]

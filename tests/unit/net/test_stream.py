@@ -1,0 +1,101 @@
+"""The ends of a connection in memory: when each is over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from fbvm.net.faults import Fault
+from fbvm.net.stream import End
+from fbvm.wire.link import Peer
+from fbvm.wire.tap import TapKind
+
+CLIENT, SERVER = Peer("192.168.250.2", 1024), Peer("192.168.250.1", 502)
+
+
+class Carrier:
+    """A network without delays, whose deliveries wait for `run`."""
+
+    def __init__(self) -> None:
+        self.calls: list[Callable[[int], None]] = []
+
+    def at(self, due_ns: int, call: Callable[[int], None]) -> None:
+        self.calls.append(call)
+
+    def fault(self, one: Peer, other: Peer) -> Fault:
+        return Fault()
+
+    def latency_ns(self, fault: Fault) -> int:
+        return 0
+
+    def cut(self, fault: Fault, data: bytes) -> list[bytes]:
+        return [data]
+
+    def tell(self, end: End, what: TapKind, out: bool, data: bytes) -> None:
+        """Nobody listens."""
+
+    def run(self) -> None:
+        while self.calls:
+            self.calls.pop(0)(0)
+
+
+class Owner:
+    """Takes note of what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def sent(self, size_bytes: int) -> None:
+        self.told.append(f"sent {size_bytes}")
+
+    def readable(self, now_ns: int) -> None:
+        self.told.append("readable")
+
+    def finished(self, now_ns: int) -> None:
+        self.told.append("finished")
+
+    def broken(self, error: str, unsent: int, now_ns: int) -> None:
+        self.told.append(f"{error} {unsent}")
+
+
+@pytest.fixture
+def joined() -> tuple[Carrier, End, End, Owner, Owner]:
+    carrier, one, other = Carrier(), Owner(), Owner()
+    client, server = End(carrier, CLIENT, SERVER, None, one), End(carrier, SERVER, CLIENT, None, other)
+    client.join(server)
+    return carrier, client, server, one, other
+
+
+def test_an_end_whose_owner_has_half_closed_is_not_over(joined: tuple[Carrier, End, End, Owner, Owner]) -> None:
+    """Also when both sides have sent FIN: data that came before are still there to be taken."""
+    carrier, client, server, one, other = joined
+    server.send(b"last words", 0)
+    client.finish(0)
+    server.finish(0)
+    carrier.run()
+    assert one.told == ["readable", "finished"] and other.told == ["sent 10", "finished"]
+    assert not client.gone and not server.gone
+    assert client.take(99, 0) == b"last words"
+    client.leave(0)
+    assert client.gone and not server.gone
+
+
+def test_an_end_that_was_left_is_over_when_both_have_sent_fin(joined: tuple[Carrier, End, End, Owner, Owner]) -> None:
+    carrier, client, server, _, other = joined
+    client.leave(0)
+    carrier.run()
+    assert other.told == ["finished"] and not client.gone
+    server.leave(0)
+    carrier.run()
+    assert client.gone and server.gone and not client.error
+
+
+def test_who_sends_to_an_end_that_was_left_is_reset(joined: tuple[Carrier, End, End, Owner, Owner]) -> None:
+    carrier, client, server, one, other = joined
+    client.leave(0)
+    carrier.run()
+    server.send(b"more", 0)
+    carrier.run()
+    assert other.told == ["finished", "sent 4", "ECONNRESET 0"] and one.told == []
+    assert client.gone and server.gone

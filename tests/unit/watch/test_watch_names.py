@@ -1,0 +1,63 @@
+"""Bytes to names, and values at places that have been found."""
+
+from __future__ import annotations
+
+import pytest
+
+from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
+from fbvm.watch.names import Names, is_single
+from fbvm.watch.places import parse_for, read_found, write_found
+from fbvm.watch.values import parse_time_ns
+
+TEXT = """TYPE Pair : STRUCT low : INT; high : ARRAY[1..2] OF DINT; END_STRUCT END_TYPE
+PROGRAM Main
+VAR a : INT; pairs : ARRAY[0..1] OF Pair; t : TON; flag AT CIO 1.04 : BOOL; END_VAR
+a := 1;
+END_PROGRAM
+"""
+
+
+@pytest.fixture
+def plc() -> Plc:
+    made = compile_text(TEXT).image
+    assert made is not None
+    return Plc(made)
+
+
+@pytest.mark.parametrize("name", ["Main.a", "Main.pairs[1].high[2]", "Main.pairs[0].low", "Main.t.ET", "Main.flag"])
+def test_a_byte_has_the_name_of_the_single_value_in_it(plc: Plc, name: str) -> None:
+    names, place = Names.of(plc.image, plc.memory.areas), plc.find(name)
+    found = names.at(place.offset, place.bit)
+    assert found is not None and found.name == name and is_single(found)
+
+
+def test_structures_arrays_and_instances_are_not_single(plc: Plc) -> None:
+    for name in ("Main.pairs", "Main.pairs[0]", "Main.pairs[0].high", "Main.t"):
+        assert is_single(plc.find(name)) is False
+    assert is_single(plc.find("Main.a")) is True
+
+
+def test_an_instance_is_known_by_its_first_byte(plc: Plc) -> None:
+    names = Names.of(plc.image, plc.memory.areas)
+    assert names.instance(plc.find("Main.t").offset) == "Main.t"
+    assert names.instance(plc.find("Main.a").offset) == ""
+
+
+def test_values_are_written_where_they_were_found(plc: Plc) -> None:
+    one, several = plc.find("Main.a"), plc.find("D200..D202")
+    write_found(plc.memory, one, 7)
+    write_found(plc.memory, several, [1, 2, 3])
+    assert (read_found(plc.memory, one), read_found(plc.memory, several)) == (7, [1, 2, 3])
+    for wrong in ([1, 2], 5, "abc"):
+        with pytest.raises(ValueError, match=r"D200\.\.D202 takes a list of 3 values"):
+            write_found(plc.memory, several, wrong)
+    assert parse_for(one, "-3") == -3 and parse_for(several, "4, 16#5, 6") == [4, 5, 6]
+    with pytest.raises(ValueError, match="takes 3 values parted by commas, 2 given"):
+        parse_for(several, "1,2")
+
+
+def test_the_longest_time_has_64_bits() -> None:
+    assert parse_time_ns("9223372036854775807ns") == (1 << 63) - 1
+    with pytest.raises(ValueError, match="64 bits of nanoseconds"):
+        parse_time_ns("9223372036854775808ns")
