@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,14 @@ from fbvm.dap.target import LaunchError, Target, checked
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
+from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import FILE, Project, project_file, read_project
+from fbvm.run.real_pace import RealPace
 from fbvm.run.running import TimedWrite
+from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position
 from fbvm.step.session import Session
 from fbvm.step.world import Debugged, World
@@ -35,7 +38,7 @@ from fbvm.wire.tap import TapEvent
 LAUNCH: dict[str, tuple[type, ...]] = {
     "program": (str, list), "project": (str,), "plc": (str,), "main": (str,), "resource": (str,), "libraries": (list,),
     "dialect": (str,), "cycle": (str,), "timing": (str,), "seed": (int,), "engine": (str,), "map": (list,), "set": (list,),
-    "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,),
+    "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,), "test": (str,),
 }  # fmt: skip
 """The keys of a launch configuration, and what their values are; `docs/guides/debugger.md` describes each."""
 
@@ -43,17 +46,47 @@ LAUNCH: dict[str, tuple[type, ...]] = {
 def open_launch(arguments: Mapping[str, Any]) -> Target:
     """What `launch` asks for.  Raises LaunchError."""
     given = checked(arguments, LAUNCH, "launch")
-    chosen = [key for key in ("program", "project") if key in given]
+    chosen = [key for key in ("program", "project", "test") if key in given]
     if len(chosen) != 1:
-        raise LaunchError("launch has either program (a file, a list of files or a folder) or project (an fbvm.toml)")
+        raise LaunchError("launch has either program (a file, a list of files or a folder), project (an fbvm.toml) or test")
     folder = Path(given.get("cwd", "."))
     try:
+        if chosen[0] == "test":
+            return _test(given["test"], folder)
         if chosen[0] == "program" and not (isinstance(given["program"], str) and _is_project(folder / given["program"])):
             return _program(given, folder)
         return _project(given, folder / given[chosen[0]])
     except (click.ClickException, LookupError, TypeError, ValueError, OSError) as error:
         said = error.format_message() if isinstance(error, click.ClickException) else str(error)
         raise LaunchError(said) from None
+
+
+ATTACH: dict[str, tuple[type, ...]] = {"stopOnEntry": (bool,), "force": (dict,), "keepForces": (bool,), "cwd": (str,),
+                                       "connect": (str, int)}  # fmt: skip
+"""The keys of an attach configuration; `connect` is for the extension that starts `fbvm dap --connect`."""
+
+
+def open_attached(plc: Plc, paths: Mapping[str, Path], libraries: Sequence[Path], arguments: Mapping[str, Any]) -> Target:
+    """A PLC that runs, from now on.  `paths` are its sources by name.  Raises LaunchError."""
+    given = checked(arguments, ATTACH, "attach")
+    pace = RealPace(plc)
+    try:
+        world = World(lambda: [Debugged("plc", plc)], is_fixed=True, pace=pace if pace.is_real else None)
+        forced = set(plc.forces)
+        for name, value in given.get("force", {}).items():
+            place = plc.find(name)
+            plc.force(name, parse_for(place, _text(value)))
+    except (LookupError, TypeError, ValueError) as error:
+        raise LaunchError(str(error)) from None
+
+    def close() -> None:
+        world.leave()
+        for name in () if given.get("keepForces") else set(plc.forces) - forced:
+            plc.unforce(name)
+
+    notes = ["going back shows what was recorded since now, read-only: real connections do not travel in time"]
+    return Target({"plc": Session(world, "plc")}, source_texts(plc.image, paths, libraries), paths, stop_on_entry=given.get(
+        "stopOnEntry"), notes=notes, close=close)  # fmt: skip
 
 
 def _is_project(path: Path) -> bool:
@@ -102,6 +135,18 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     texts = source_texts(image, {str(path): path for path in files}, libraries)
     return _target(given, World(make), texts, {str(path): path for path in files}, tapped, cycle_ns,
                    _said(compilation.diagnostics))  # fmt: skip
+
+
+def _test(node: str, folder: Path) -> Target:
+    """The recordings of a test that is run now."""
+    from fbvm.cli.shared.recorded_item import record_item
+
+    item = record_item(node, folder)
+    if not item.recordings:
+        raise LaunchError(f"{node} has no rig that did a scan", item.output)
+    sessions = {name: PastSession(RecordedScans(recorded, {}), name) for name, recorded in item.recordings.items()}
+    paths = {name: folder / name for name in item.texts if (folder / name).is_file()}
+    return Target(sessions, item.texts, paths, notes=[item.output], failure=item.reason)
 
 
 def network_in_memory(mappings: Iterable[Mapped], seed: int) -> LoopNetwork:

@@ -136,3 +136,70 @@ def test_a_recording_that_ended_in_a_trap_opens_there() -> None:
     assert stop["reason"] == "exception" and "divided by 0" in stop["description"]
     client.go("stepBack")
     assert client.line == 4 and client.value("Main.n") == "41"
+
+
+TEST = """\
+def test_it_counts_to_forty(fb):
+    rig = fb("count.st::Main")
+    rig.run("500ms")
+    assert rig.n == 40
+
+
+def test_it_counts(fb):
+    rig = fb("count.st::Main")
+    rig.run("30ms")
+    assert rig.n == 3
+"""
+
+
+@pytest.mark.slow
+def test_a_test_is_run_and_looked_at_backwards_from_its_failure(tmp_path: Path) -> None:
+    (tmp_path / "count.st").write_text(COUNTER.format(step=1), encoding="utf-8")
+    (tmp_path / "test_count.py").write_text(TEST, encoding="utf-8")
+    client = Client()
+    stop = client.begin(test="test_count.py::test_it_counts_to_forty", cwd=str(tmp_path))
+    assert stop["reason"] == "exception" and stop["text"] == "assert" and "40" in stop["description"]
+    assert client.ask("exceptionInfo", threadId=1)["exceptionId"] == "assert"
+    assert "1 failed" in client.events("output")[0]["output"]
+    assert client.value("Main.n") == "50"
+    client.go("fbvm/gotoScan", scan=39)
+    assert client.value("Main.n") == "39"
+    passed = Client()
+    assert passed.begin(test="test_count.py::test_it_counts", cwd=str(tmp_path))["reason"] == "entry"
+    again = Client()
+    again.ask("initialize", adapterID="fbvm")
+    with pytest.raises(RefusedError, match="no test"):
+        again.ask("launch", test="test_count.py::test_nothing", cwd=str(tmp_path))
+
+
+FUNCTIONS = """\
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+VAR t : ARRAY[0..2] OF INT; END_VAR
+t[1] := x * 2;
+Twice := t[1];
+END_FUNCTION
+PROGRAM Main
+VAR n : INT; END_VAR
+VAR_TEMP q : INT; END_VAR
+q := Twice(n) + 1;
+n := q;
+END_PROGRAM
+"""
+
+
+def test_variables_of_functions_and_temporary_ones_have_names_while_they_live(tmp_path: Path) -> None:
+    path = tmp_path / "twice.st"
+    path.write_text(FUNCTIONS, encoding="utf-8")
+    client = Client()
+    rows = [{"line": 5, "condition": "x > 5 AND t[1] > 5", "logMessage": ""}, {"line": 4, "logMessage": "x={x}"}]
+    client.begin({"setBreakpoints": {"source": {"path": str(path)}, "breakpoints": rows}}, program=str(path))
+    scopes = client.scopes()
+    assert client.rows(scopes["Inputs"]["variablesReference"])["x"]["value"] == "7"
+    locals_ = client.rows(scopes["Locals"]["variablesReference"])
+    assert client.rows(locals_["t"]["variablesReference"])["[1]"]["value"] == "14" and "Twice" in locals_
+    assert client.value("x + t[1]", frame=0) == "21"
+    assert [row["output"].partition(": ")[2] for row in client.events("output")] == ["x=0\n", "x=1\n", "x=3\n", "x=7\n"]
+    main = client.scopes(1)
+    assert client.rows(main["Temporary"]["variablesReference"])["q"]["type"] == "INT"
+    assert client.ask("setExpression", expression="x", value="100", frameId=client.frames[0]["id"])["value"] == "100"
