@@ -86,8 +86,8 @@ def conversation(folder: Path, talk: Callable[[Editor], Awaitable[None]], *names
                 editor.open(name)
             await asyncio.wait_for(talk(editor), WAIT_S)
             await asyncio.wait_for(editor.shutdown_async(None), WAIT_S)
-            editor.exit(None)
         finally:
+            editor.exit(None)
             await editor.stop()
 
     asyncio.run(all_of_it())
