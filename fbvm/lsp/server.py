@@ -12,7 +12,6 @@ from pathlib import Path
 from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
-import fbvm
 from fbvm.analysis.parts import File
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.lsp import project_file
@@ -36,8 +35,8 @@ _SEVERITY = {"error": types.DiagnosticSeverity.Error, "warning": types.Diagnosti
 class Server(LanguageServer):
     """One client's server.  The features are in `navigation`, `editing` and `appearance`."""
 
-    def __init__(self) -> None:
-        super().__init__("fbvm", fbvm.__version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
+    def __init__(self, version: str) -> None:
+        super().__init__("fbvm", version, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
         self.projects = Projects(self.open_text)
         self.open_paths: dict[Path, str] = {}
         """The files that the editor has open, and their URIs as it writes them."""
@@ -216,14 +215,3 @@ class Server(LanguageServer):
         dialect, libraries = given.get("dialect") or "standard", given.get("libraries") or []
         if project_file.is_dialect(dialect) and isinstance(libraries, list):
             self.projects.settings = Settings(dialect, tuple(Path(str(each)) for each in libraries))
-
-
-def server_with_features() -> Server:
-    """A server that answers all that fbvm knows to answer."""
-    from fbvm.lsp import appearance, editing, navigation, synchronization
-
-    server = Server()
-    for module in (synchronization, navigation, editing, appearance):
-        for method, options, function in module.FEATURES:
-            server.feature(method, options)(function)
-    return server

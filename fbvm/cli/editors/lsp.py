@@ -6,6 +6,7 @@ import sys
 
 import click
 
+import fbvm
 from fbvm.cli.shared import status
 from fbvm.cli.shared.ending import loading
 
@@ -19,8 +20,8 @@ def command(stdio: bool) -> None:
     An editor starts it; `docs/howto` has the lines of configuration for some.  It needs the extra `editor`."""
     try:
         with loading():
-            from fbvm.lsp.server import server_with_features
+            from fbvm.lsp.features import server
     except ImportError:
         raise click.UsageError("pygls is missing: pip install 'fbvm[editor]'") from None
-    server_with_features().start_io()
+    server(fbvm.__version__).start_io()
     sys.exit(status.GOOD)
