@@ -6,6 +6,7 @@ const fs = require('fs');
 const path = require('path');
 const vscode = require('vscode');
 const { Client } = require('./client');
+const debugging = require('./debugging');
 const features = require('./features');
 const tests = require('./tests');
 
@@ -165,7 +166,7 @@ async function importProject(uri) {
 
 // --- VS Code's side ---
 
-const debugging = {
+const adapter = {
   createDebugAdapterDescriptor() {
     const [command, ...first] = commandOf(folder());
     return new vscode.DebugAdapterExecutable(command, [...first, 'dap']);
@@ -209,13 +210,13 @@ async function activate(context) {
   const runner = view[view.length - 1];
   const on = (name, action) => vscode.commands.registerCommand(`fbvm.${name}`, action);
   context.subscriptions.push(
-    output, ...view,
+    output, ...view, ...debugging.register(SELECTOR.filter((each) => each.language)),
     on('run', runProgram), on('chart', chart), on('explain', explain), on('import', importProject), on('restart', restart),
     on('debug', (given, program) => debug(given, typeof program === 'string' ? { main: program } : {})),
     on('check', async () => { const uri = await saved(); if (uri) await execute(uri, 'check', ['check', uri.fsPath]); }),
     on('test', (uri, name) => runner.runTest(uri, name)),
     on('debugTest', (uri, name) => debug(uri, { program: undefined, test: `${vscode.Uri.parse(uri).fsPath}::${name}` })),
-    vscode.debug.registerDebugAdapterDescriptorFactory('fbvm', debugging),
+    vscode.debug.registerDebugAdapterDescriptorFactory('fbvm', adapter),
     vscode.debug.registerDebugConfigurationProvider('fbvm', configurations),
     vscode.debug.registerDebugConfigurationProvider('fbvm', configurations, vscode.DebugConfigurationProviderTriggerKind.Dynamic),
     vscode.tasks.registerTaskProvider('fbvm', taskProvider),

@@ -56,7 +56,9 @@ def test_files_that_the_package_names_are_there() -> None:
 
 def test_commands_are_those_that_the_extension_has_and_the_server_names() -> None:
     commands = {each["command"].removeprefix("fbvm.") for each in package()["contributes"]["commands"]}
-    assert commands == set(re.findall(r"(?<!\.)\bon\('(\w+)', ", scripts()))
+    debugger = (HERE / "debugging.js").read_text(encoding="utf-8").partition("const commands = {")[2].partition("\n};")[0]
+    registered = {*re.findall(r"(?<!\.)\bon\('(\w+)', ", scripts()), *re.findall(r"^  (\w+): ", debugger, re.M)}
+    assert commands == registered
     assert {"run", "debug", "chart", "test", "debugTest"} <= commands
 
 
