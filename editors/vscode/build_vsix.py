@@ -12,7 +12,8 @@ from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 HERE = Path(__file__).resolve().parent
-FILES = ("package.json", "extension.js", "client.js", "debugging.js", "features.js", "tests.js", "language-configuration.json", "snippets.json",
+FILES = ("package.json", "extension.js", "client.js", "debugging.js", "features.js", "tests.js",
+         "language-configuration.json", "snippets.json",
          "README.md", "syntaxes/st.tmLanguage.json", "syntaxes/mnemonics.tmLanguage.json", "syntaxes/drawing.tmLanguage.json",
          "walkthrough/install.md", "walkthrough/write.md", "walkthrough/run.md", "walkthrough/debug.md", "walkthrough/test.md")
 """What the extension consists of."""

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,31 @@ def test_nothing_is_needed_at_run_time() -> None:
     needed = set(re.findall(r"require\('([^']+)'\)", scripts()))
     assert {name for name in needed if not name.startswith("./")} == {"child_process", "fs", "os", "path", "vscode"}
     assert "dependencies" not in package()
+
+
+SAID = """\
+diagnostic: ["S0210","Pump has no Run\\ndid you mean Runs?",[{"line":3,"character":13},{"line":3,"character":16}]]
+fixes: ["Write Runs"]
+completion: ["Level","Runs"]
+mended: []
+rename: {"main.st":1,"Pump.st":1}
+signature: ["Pump(Level := INT, Runs => BOOL)",0]
+symbols: [["Main",["P1","On"]]]
+lenses: ["Run","Debug","Chart"]
+"""
+
+
+@needs_node
+@pytest.mark.slow
+def test_the_client_of_the_extension_speaks_with_the_server(tmp_path: Path) -> None:
+    (tmp_path / "Pump.st").write_text("FUNCTION_BLOCK Pump\nVAR_INPUT Level : INT; END_VAR\nVAR_OUTPUT Runs : BOOL; END_VAR\n"
+                                      "Runs := Level < 200;\nEND_FUNCTION_BLOCK\n", encoding="utf-8")
+    (tmp_path / "main.st").write_text("PROGRAM Main\nVAR P1 : Pump; On AT %QX0.0 : BOOL; END_VAR\n    P1(Level := 100);\n"
+                                      "    On := P1.Run;\nEND_PROGRAM\n", encoding="utf-8")
+    stub = Path(__file__).parent / "vscode_stub.js"
+    done = subprocess.run(["node", stub, HERE, tmp_path, sys.executable, "-m", "fbvm", "lsp"], capture_output=True, text=True,
+                          check=False, timeout=120)
+    assert (done.stdout, done.stderr) == (SAID, "")
 
 
 @needs_node
