@@ -181,6 +181,19 @@ class Server(LanguageServer):
                 for each in other.program.diagnostics(str(path)):
                     found.setdefault((each.code, each.start, each.end, each.message), self.diagnostic(each, source))
             self._tell(self.uri(path), list(found.values()))
+        self._tell_libraries(project)
+
+    def _tell_libraries(self, project: Project) -> None:
+        """Tell what is wrong with the files of libraries that a program uses."""
+        checked = project.program.checked
+        found: dict[Path, list[types.Diagnostic]] = {path: [] for path in project.libraries_told}
+        for each in project.program.library_errors() if checked is not None else ():
+            path = checked.project.libraries.path(each.source) if checked is not None else None
+            if path is not None:
+                found.setdefault(path, []).append(self.diagnostic(each, each.source))
+        project.libraries_told = {path for path, rows in found.items() if rows}
+        for path, rows in found.items():
+            self._tell(self.uri(path), rows)
 
     def _tell_project_files(self) -> None:
         for path, found in self.projects.wrong.items():
