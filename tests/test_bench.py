@@ -88,6 +88,13 @@ def test_the_script_checking(load: Load) -> None:
     assert set(load("checking").measured(100)) == {"lines", "parse", "compile", "check", "mib"}
 
 
+def test_the_script_editing(load: Load, capsys: pytest.CaptureFixture[str]) -> None:
+    load("editing").report(600, places=2, keys=22)
+    said = capsys.readouterr().out
+    assert "(22 checked one POU alone)" in said
+    assert "memory:" in said
+
+
 @needs_machine_code
 def test_the_script_exchanges(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
     script = load("exchanges")

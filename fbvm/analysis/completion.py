@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 
 from fbvm.analysis import describe
 from fbvm.analysis.calls import open_call, pins
@@ -168,11 +169,19 @@ def _blocks(program: Program, scope: Scope) -> Iterator[Item]:
     """What the libraries have."""
     own = {fold(pou.name) for pou in scope.checker.project.pous.values() if not pou.source.library}
     for name in sorted(set(scope.checker.project.libraries.block_names())):
-        page = block_pages.page(name)
-        if page is None or fold(name) in own or name.startswith(("CX_", "SFC_", "_")):
-            continue
-        kind = "block" if "\nFUNCTION_BLOCK" in page else "function"
-        yield Item(name, kind, page.splitlines()[-1], "" if kind == "block" else f"{name}($0)", name, 4)
+        item = _block(name)
+        if item is not None and fold(name) not in own:
+            yield item
+
+
+@cache
+def _block(name: str) -> Item | None:
+    """A block or function of the shipped libraries; None for those that only the compiler calls."""
+    page = block_pages.page(name)
+    if page is None or name.startswith(("CX_", "SFC_", "_")):
+        return None
+    kind = "block" if "\nFUNCTION_BLOCK" in page else "function"
+    return Item(name, kind, page.splitlines()[-1], "" if kind == "block" else f"{name}($0)", name, 4)
 
 
 def _free_addresses(program: Program, written: str) -> Iterator[Item]:

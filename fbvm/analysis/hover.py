@@ -15,7 +15,6 @@ from fbvm.check import block_pages, instructions
 from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
-from fbvm.syntax.tree.node import walk
 
 _WORD = re.compile(r"[@%!]*[\w.]+(?:\(\d+\))?")
 
@@ -53,7 +52,7 @@ def _name(program: Program, name: str, offset: int) -> Hover | None:
 def _address(program: Program, name: str, offset: int) -> Hover | None:
     part = program.files[name].part_at(offset)
     at = offset - part.base
-    for node in walk(part.syntax):
+    for node in part.nodes:
         if isinstance(node, tree.Direct | tree.Location) and node.start <= at <= node.end:
             text = describe.address(node.text, [describe.variable(each) for each in located(program, node.text)])
             return Hover(part.base + node.start, part.base + node.end, text) if text else None
@@ -82,7 +81,7 @@ def _instruction(program: Program, name: str, offset: int) -> Hover | None:
     """The page of an instruction of ladder."""
     part = program.files[name].part_at(offset)
     at = offset - part.base
-    inside = any(isinstance(node, ladder.Ladder) and node.start <= at <= node.end for node in walk(part.syntax))
+    inside = any(isinstance(node, ladder.Ladder) and node.start <= at <= node.end for node in part.nodes)
     word = next((found for found in _WORD.finditer(part.source.text) if found.start() <= at <= found.end()), None)
     if not inside or word is None:
         return None

@@ -171,7 +171,9 @@ class _Names:
         key: Key | None = None
         if variable is not None and not (node in self.callees and variable.kind == "RESULT"):
             key = key_of(variable)
-            if key[0] == "global" and variable.kind != "VAR_GLOBAL" and self.pou is not None:  # a constant that was named early
+            if variable.kind == "PROGRAM" and name == fold(variable.type.name):  # the instance by the name of its program
+                key = "pou", variable.source.library, name
+            elif key[0] == "global" and variable.kind not in _SHARED and self.pou is not None:  # a constant that was named early
                 key = "variable", self.source.library, fold(self.pou.owner.name), name
         elif self.pou is not None and not self.pou.resolved and declared_name(self.pou.tree, name) is not None:
             key = "variable", self.source.library, fold(self.pou.name), name
@@ -313,6 +315,7 @@ class _Names:
                 yield Use(name.start, name.end, ("variable", owner.source.library, fold(owner.name), folded), role)
 
 
+_SHARED = ("VAR_GLOBAL", "PROGRAM")
 _LEAVES = frozenset(("start", "end", "op_start", "text"))
 _RULES: dict[type, Callable[[_Names, Any], Iterator[Use]]] = {
     tree.NameRef: _Names.named, tree.Member: _Names.member, tree.Call: _Names.call, tree.Assign: _Names.assignment,

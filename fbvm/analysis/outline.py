@@ -14,6 +14,7 @@ from fbvm.syntax.tree.node import walk
 
 _FOLDED = (tree.If, tree.Case, tree.For, tree.While, tree.Repeat, tree.VarSection, ladder.Ladder, ladder.Rung, sfc.Step,
            sfc.Transition, tree.Declaration, tree.StructSpec, tree.Resource)
+_HAS_ELEMENTS = re.compile(r"\b(?:LADDER|STEP|INITIAL_STEP)\b", re.I)
 _COMMENTS = re.compile(r"(?:^[ \t]*//[^\n]*\n){2,}|\(\*.*?\*\)|/\*.*?\*/", re.M | re.S)
 _REGION = re.compile(r"\{\s*(region|endregion)\b[^}]*\}", re.I)
 
@@ -104,7 +105,9 @@ def _members(part: Part, spec: tree.TypeSpec) -> Iterator[Symbol]:
 
 def _inside(part: Part, body: tree.Block) -> Iterator[Symbol]:
     """The rungs and steps of a body."""
-    for node in sorted(walk(body), key=lambda node: node.start):
+    if not _HAS_ELEMENTS.search(part.source.text):
+        return
+    for node in sorted(dict.fromkeys(walk(body)), key=lambda node: node.start):
         if isinstance(node, ladder.Rung):
             name = tree.Node(node.start, min(node.end, part.source.text.find("\n", node.start) % (len(part.source.text) + 1)))
             yield _symbol(part, node, name, f"rung {node.number} {node.comment}".strip(), "rung")
@@ -136,7 +139,7 @@ def folds(file: File) -> list[Fold]:
 
 def _ranges(file: File) -> Iterator[tuple[int, int, str]]:
     for part in file.parts:
-        for node in walk(part.syntax.declarations):
+        for node in part.nodes:
             if isinstance(node, _FOLDED) and not (isinstance(node, tree.VarSection) and node.hidden):
                 yield part.base + node.start, part.base + node.end, ""
     for found in _COMMENTS.finditer(file.text):

@@ -89,7 +89,7 @@ class Program:
         self.revision = 0
         """Counts changes of texts and of what is known about them."""
         self._uses: dict[Part, list[Use]] = {}
-        self._used_at = -1
+        """Names by part.  Keys outlive a check that changes nothing that others see."""
 
     def _searched(self) -> Libraries:
         return Libraries(self._libraries, preferred=self.dialect.libraries)
@@ -146,6 +146,8 @@ class Program:
         before, self._whole = (self._whole, changes), False
         try:
             yield from _deep(self._check(lint))
+            if before[0] or changes:
+                self._uses.clear()
         except GeneratorExit:
             self._whole, self._changes = before[0] or self._whole, [*before[1], *self._changes]
             raise
@@ -185,6 +187,7 @@ class Program:
             return False
         for old, new in self._changes:
             assert old is not None and new is not None
+            self._uses.pop(old, None)
             with _recursion():
                 self._check_pou(checked, old, new)
         self._changes = []
@@ -237,12 +240,13 @@ class Program:
 
     def uses(self, part: Part) -> list[Use]:
         """The names in a part and what they mean, with places in the part; nothing before the first check."""
-        if self._used_at != self.revision:
-            self._uses, self._used_at = {}, self.revision
-        if part not in self._uses:
+        known = self._uses.get(part)
+        if known is None:
             with _recursion():
-                self._uses[part] = uses(self.checked.checker, part) if self.checked is not None else []
-        return self._uses[part]
+                known = uses(self.checked.checker, part) if self.checked is not None else []
+            if self.is_current:
+                self._uses[part] = known
+        return known
 
     def place(self, source: Source) -> tuple[File, int] | None:
         """The file of a part's text and where that begins in it; None for the text of a library."""

@@ -13,7 +13,6 @@ from fbvm.analysis.program import Program
 from fbvm.base.types import ArrayType, EnumType, fold
 from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
-from fbvm.syntax.tree.node import walk
 
 TYPES = ("variable", "parameter", "property", "enumMember", "function", "class", "type", "method", "macro")
 MODIFIERS = ("declaration", "modification", "readonly", "static", "defaultLibrary")
@@ -44,7 +43,7 @@ def tokens(program: Program, file: File) -> list[Token]:
             kind, modifiers = known[use.key]
             extra = {"declared": {"declaration"}, "written": {"modification"}}.get(use.role, set())
             found.append(Token(part.base + use.start, part.base + use.end, kind, modifiers | extra))
-        found += [Token(part.base + node.start, part.base + node.end, "macro") for node in walk(part.syntax.declarations)
+        found += [Token(part.base + node.start, part.base + node.end, "macro") for node in part.nodes
                   if isinstance(node, tree.Direct | tree.Location) and _stands(part.source.text, node)]
     placed = {token.start: token for token in found}
     return [placed[start] for start in sorted(placed)]
@@ -93,7 +92,7 @@ def _addresses(program: Program, file: File, start: int, end: int) -> Iterator[H
     for part in file.parts:
         if part.base > end or part.base + len(part.source.text) < start:
             continue
-        elements = {node.of.end: node for node in walk(part.syntax.declarations)
+        elements = {node.of.end: node for node in part.nodes
                     if isinstance(node, tree.Index) and isinstance(node.of, tree.NameRef)}
         for use in program.uses(part):
             if use.role == "declared" or use.key[0] not in ("variable", "global") or not start <= part.base + use.start <= end:

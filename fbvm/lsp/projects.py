@@ -41,7 +41,9 @@ class Project:
     """The project file, None without one."""
     plc: str = ""
     """The name of the PLC in the project file."""
-    task: object | None = field(default=None)
+    libraries_told: set[Path] = field(default_factory=set)
+    """Files of libraries in which the editor shows mistakes."""
+    task: object | None = None
     """The check that is under way."""
 
 

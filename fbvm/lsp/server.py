@@ -12,7 +12,6 @@ from pathlib import Path
 from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
-import fbvm
 from fbvm.analysis.parts import File
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.lsp import project_file
@@ -36,8 +35,8 @@ _SEVERITY = {"error": types.DiagnosticSeverity.Error, "warning": types.Diagnosti
 class Server(LanguageServer):
     """One client's server.  The features are in `navigation`, `editing` and `appearance`."""
 
-    def __init__(self) -> None:
-        super().__init__("fbvm", fbvm.__version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
+    def __init__(self, version: str) -> None:
+        super().__init__("fbvm", version, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
         self.projects = Projects(self.open_text)
         self.open_paths: dict[Path, str] = {}
         """The files that the editor has open, and their URIs as it writes them."""
@@ -182,6 +181,19 @@ class Server(LanguageServer):
                 for each in other.program.diagnostics(str(path)):
                     found.setdefault((each.code, each.start, each.end, each.message), self.diagnostic(each, source))
             self._tell(self.uri(path), list(found.values()))
+        self._tell_libraries(project)
+
+    def _tell_libraries(self, project: Project) -> None:
+        """Tell what is wrong with the files of libraries that a program uses."""
+        checked = project.program.checked
+        found: dict[Path, list[types.Diagnostic]] = {path: [] for path in project.libraries_told}
+        for each in project.program.library_errors() if checked is not None else ():
+            path = checked.project.libraries.path(each.source) if checked is not None else None
+            if path is not None:
+                found.setdefault(path, []).append(self.diagnostic(each, each.source))
+        project.libraries_told = {path for path, rows in found.items() if rows}
+        for path, rows in found.items():
+            self._tell(self.uri(path), rows)
 
     def _tell_project_files(self) -> None:
         for path, found in self.projects.wrong.items():
@@ -216,14 +228,3 @@ class Server(LanguageServer):
         dialect, libraries = given.get("dialect") or "standard", given.get("libraries") or []
         if project_file.is_dialect(dialect) and isinstance(libraries, list):
             self.projects.settings = Settings(dialect, tuple(Path(str(each)) for each in libraries))
-
-
-def server_with_features() -> Server:
-    """A server that answers all that fbvm knows to answer."""
-    from fbvm.lsp import appearance, editing, navigation, synchronization
-
-    server = Server()
-    for module in (synchronization, navigation, editing, appearance):
-        for method, options, function in module.FEATURES:
-            server.feature(method, options)(function)
-    return server

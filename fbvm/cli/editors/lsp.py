@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 
 import click
 
+import fbvm
 from fbvm.cli.shared import status
 from fbvm.cli.shared.ending import loading
+
+COLLECTED = (50_000, 20, 1_000)
+"""New objects after which Python looks for garbage, and how rarely it looks at old ones, of which a program has many: that
+would hold up a key for tenths of a second.  The server looks at all of them when nobody types."""
 
 
 @click.command("lsp")
@@ -19,8 +25,9 @@ def command(stdio: bool) -> None:
     An editor starts it; `docs/howto` has the lines of configuration for some.  It needs the extra `editor`."""
     try:
         with loading():
-            from fbvm.lsp.server import server_with_features
+            from fbvm.lsp.features import server
     except ImportError:
         raise click.UsageError("pygls is missing: pip install 'fbvm[editor]'") from None
-    server_with_features().start_io()
+    gc.set_threshold(*COLLECTED)
+    server(fbvm.__version__).start_io()
     sys.exit(status.GOOD)

@@ -138,7 +138,7 @@ def test_every_name_of_the_corpus_has_a_declaration() -> None:
     for each in programs():
         if each.runs:
             program = Program(dialect=each.dialect)
-            program.replace("x.st", each.text)
+            program.replace(each.path.name, each.text)
             program.check_all()
             assert program.checked is not None
             lost += [(each.name, use.key) for part in program.parts() for use in program.uses(part)

@@ -86,8 +86,8 @@ def conversation(folder: Path, talk: Callable[[Editor], Awaitable[None]], *names
                 editor.open(name)
             await asyncio.wait_for(talk(editor), WAIT_S)
             await asyncio.wait_for(editor.shutdown_async(None), WAIT_S)
-            editor.exit(None)
         finally:
+            editor.exit(None)
             await editor.stop()
 
     asyncio.run(all_of_it())
@@ -176,7 +176,7 @@ def test_what_a_file_holds_and_how_it_looks(folder: Path) -> None:
         assert [(each.name, [inner.name for inner in each.children or []]) for each in symbols or []
                 if isinstance(each, types.DocumentSymbol)] == [("Main", ["P1", "On", "s"])]
         tokens = await editor.text_document_semantic_tokens_full_async(types.SemanticTokensParams(document))
-        assert tokens is not None and len(tokens.data) == 5 * 11
+        assert tokens is not None and len(tokens.data) == 5 * 12
         folds = await editor.text_document_folding_range_async(types.FoldingRangeParams(document))
         assert [(each.start_line, each.end_line) for each in folds or []] == [(0, 4)]
         whole = types.Range(types.Position(0, 0), types.Position(5, 0))

@@ -1,0 +1,228 @@
+'use strict';
+// The extension: starts the language server, gives VS Code the debugger, the tests, the tasks and the commands.
+
+const { execFile } = require('child_process');
+const fs = require('fs');
+const path = require('path');
+const vscode = require('vscode');
+const { Client } = require('./client');
+const debugging = require('./debugging');
+const features = require('./features');
+const tests = require('./tests');
+
+const OLDEST = [0, 2];
+const SELECTOR = [{ language: 'iecst' }, { language: 'st' }, { language: 'structured-text' }, { language: '61131-3-st' }, { pattern: '**/fbvm.toml' }];
+const FLAVOURS = new Set(SELECTOR.map((each) => each.language).filter(Boolean));
+
+let client = null;
+let provided = [];
+let output = null;
+
+const folder = () => vscode.workspace.workspaceFolders?.[0]?.uri.fsPath;
+const settings = (uri) => vscode.workspace.getConfiguration('fbvm', uri);
+
+// How fbvm is started for a folder: what is configured, else that of a virtual environment in the folder, else that of the PATH.
+function commandOf(where) {
+  const configured = settings().get('path');
+  if (configured) return [configured];
+  const names = process.platform === 'win32' ? ['Scripts', 'fbvm.exe'] : ['bin', 'fbvm'];
+  for (const environment of ['.venv', 'venv']) {
+    const own = where && path.join(where, environment, ...names);
+    if (own && fs.existsSync(own)) return [own];
+  }
+  return ['fbvm'];
+}
+
+function version(command) {
+  return new Promise((resolve, reject) => {
+    execFile(command[0], [...command.slice(1), '--version'], (error, stdout) => (error ? reject(error) : resolve(stdout.trim())));
+  });
+}
+
+async function usable(command) {
+  try {
+    const said = await version(command);
+    const found = (/(\d+)\.(\d+)/.exec(said) || []).slice(1).map(Number);
+    if (found.length && (found[0] < OLDEST[0] || (found[0] === OLDEST[0] && found[1] < OLDEST[1]))) {
+      vscode.window.showErrorMessage(`${said} is too old for this extension: pip install -U "fbvm[editor]"`);
+      return false;
+    }
+    return true;
+  } catch {
+    const answer = await vscode.window.showErrorMessage(
+      `${command.join(' ')} is not there. Install it by pip install "fbvm[editor]", or say in fbvm.path where it is.`, 'Settings');
+    if (answer) vscode.commands.executeCommand('workbench.action.openSettings', 'fbvm.path');
+    return false;
+  }
+}
+
+// --- the language server ---
+
+async function startServer() {
+  const command = commandOf(folder());
+  if (!(await usable(command))) return;
+  const log = settings().get('trace.server') === 'off' ? null : (line) => output.appendLine(line);
+  const begun = new Client([...command, 'lsp'], { folder: folder(), dialect: settings().get('dialect'), libraries: settings().get('libraries') }, log);
+  try {
+    const capabilities = await begun.start();
+    provided = features.register(begun, capabilities, SELECTOR);
+    begun.synchronize((document) => document.uri.scheme === 'file'
+      && (FLAVOURS.has(document.languageId) || path.basename(document.uri.fsPath) === 'fbvm.toml'));
+    begun.ended = (code) => vscode.window.showErrorMessage(`The server of fbvm ended with status ${code}.`, 'Restart')
+      .then((answer) => answer && restart());
+    client = begun;
+  } catch (error) {
+    vscode.window.showErrorMessage(`The server of fbvm does not start: ${error.message}. It needs pip install "fbvm[editor]".`);
+  }
+}
+
+async function stopServer() {
+  provided.forEach((each) => each.dispose());
+  provided = [];
+  const ending = client;
+  client = null;
+  if (ending) await ending.stop();
+}
+
+async function restart() {
+  await stopServer();
+  await startServer();
+}
+
+// --- running ---
+
+// Lenses hand over a URI as text and the name of a PROGRAM; menus hand over a URI, the palette nothing.
+function target(given) {
+  if (typeof given === 'string') return vscode.Uri.parse(given);
+  return given instanceof vscode.Uri ? given : vscode.window.activeTextEditor?.document.uri;
+}
+
+function projectOf(uri) {
+  for (let at = path.dirname(uri.fsPath); ; at = path.dirname(at)) {
+    if (fs.existsSync(path.join(at, 'fbvm.toml'))) return path.join(at, 'fbvm.toml');
+    if (at === path.dirname(at)) return null;
+  }
+}
+
+function execute(uri, name, parts) {
+  const where = vscode.workspace.getWorkspaceFolder(uri) || vscode.TaskScope.Workspace;
+  const [command, ...first] = commandOf(folder());
+  const task = new vscode.Task({ type: 'fbvm', verb: parts[0], files: parts.slice(1) }, where, name, 'fbvm',
+    new vscode.ProcessExecution(command, [...first, ...parts]), '$fbvm');
+  task.presentationOptions = { clear: true, showReuseMessage: false };
+  return vscode.tasks.executeTask(task);
+}
+
+async function saved(given) {
+  const uri = target(given);
+  if (uri) await vscode.workspace.textDocuments.find((each) => each.uri.toString() === uri.toString())?.save();
+  return uri;
+}
+
+const chosen = (program) => (typeof program === 'string' ? ['--program', program] : []);
+
+async function runProgram(given, program) {
+  const uri = await saved(given);
+  if (uri) await execute(uri, 'run', ['run', projectOf(uri) || uri.fsPath, ...(projectOf(uri) ? [] : [...chosen(program), '--for', '10s'])]);
+}
+
+async function chart(given, program) {
+  const uri = await saved(given);
+  if (!uri) return;
+  const page = path.join(fs.mkdtempSync(path.join(require('os').tmpdir(), 'fbvm-')), 'run.html');
+  const running = await execute(uri, 'chart', ['run', uri.fsPath, ...chosen(program), '--for', '10s', '--html', page]);
+  const ended = vscode.tasks.onDidEndTaskProcess((event) => {
+    if (event.execution !== running) return;
+    ended.dispose();
+    if (!fs.existsSync(page)) return;
+    const panel = vscode.window.createWebviewPanel('fbvm.chart', `Run of ${path.basename(uri.fsPath)}`, vscode.ViewColumn.Beside, { enableScripts: true });
+    panel.webview.html = fs.readFileSync(page, 'utf8');
+  });
+}
+
+function debug(given, more) {
+  const uri = target(given);
+  const configuration = { type: 'fbvm', request: 'launch', name: uri ? path.basename(uri.fsPath) : 'fbvm', ...(uri ? { program: uri.fsPath } : {}), ...more };
+  return vscode.debug.startDebugging(uri && vscode.workspace.getWorkspaceFolder(uri), configuration);
+}
+
+async function explain() {
+  const line = vscode.window.activeTextEditor;
+  const word = line && line.document.getText(line.document.getWordRangeAtPosition(line.selection.active));
+  const asked = await vscode.window.showInputBox({ prompt: 'A code such as S0301, an instruction such as MOV, a block such as TON', value: word });
+  if (!asked) return;
+  const [command, ...first] = commandOf(folder());
+  execFile(command, [...first, 'explain', asked], async (error, stdout, stderr) => {
+    const document = await vscode.workspace.openTextDocument({ language: 'markdown', content: error ? stderr : stdout });
+    await vscode.window.showTextDocument(document, { preview: true, viewColumn: vscode.ViewColumn.Beside });
+  });
+}
+
+async function importProject(uri) {
+  if (!uri) return;
+  const where = path.join(path.dirname(uri.fsPath), path.basename(uri.fsPath, '.xml'));
+  await execute(uri, 'import', ['import', uri.fsPath, '-o', where]);
+}
+
+// --- VS Code's side ---
+
+const adapter = {
+  createDebugAdapterDescriptor() {
+    const [command, ...first] = commandOf(folder());
+    return new vscode.DebugAdapterExecutable(command, [...first, 'dap']);
+  },
+};
+
+const configurations = {
+  // F5 without a launch.json: the project if there is one, else the file.
+  resolveDebugConfiguration(where, configuration) {
+    if (configuration.type) return { cwd: where?.uri.fsPath, ...configuration };
+    const document = vscode.window.activeTextEditor?.document;
+    if (!document || !FLAVOURS.has(document.languageId)) return undefined;
+    const project = projectOf(document.uri);
+    return { type: 'fbvm', request: 'launch', name: path.basename(document.uri.fsPath), cwd: where?.uri.fsPath,
+      ...(project ? { project } : { program: document.uri.fsPath }) };
+  },
+  provideDebugConfigurations() {
+    return [{ type: 'fbvm', request: 'launch', name: 'Debug this program', program: '${file}' }];
+  },
+};
+
+const taskProvider = {
+  provideTasks() {
+    const [command, ...first] = commandOf(folder());
+    const made = (verb, files, name) => new vscode.Task({ type: 'fbvm', verb, files }, vscode.TaskScope.Workspace, name, 'fbvm',
+      new vscode.ProcessExecution(command, [...first, verb, ...files]), '$fbvm');
+    const current = vscode.window.activeTextEditor?.document;
+    const open = current && FLAVOURS.has(current.languageId) ? [made('check', [current.uri.fsPath], 'check this file')] : [];
+    return [...open, made('test', [], 'test')];
+  },
+  resolveTask(task) {
+    const [command, ...first] = commandOf(folder());
+    const { verb, files = [] } = task.definition;
+    return new vscode.Task(task.definition, task.scope, task.name, 'fbvm', new vscode.ProcessExecution(command, [...first, verb, ...files]), '$fbvm');
+  },
+};
+
+async function activate(context) {
+  output = vscode.window.createOutputChannel('fbvm');
+  const view = tests.register(() => commandOf(folder()), (uri, test) => debug(uri, { program: undefined, test }));
+  const runner = view[view.length - 1];
+  const on = (name, action) => vscode.commands.registerCommand(`fbvm.${name}`, action);
+  context.subscriptions.push(
+    output, ...view, ...debugging.register(SELECTOR.filter((each) => each.language)),
+    on('run', runProgram), on('chart', chart), on('explain', explain), on('import', importProject), on('restart', restart),
+    on('debug', (given, program) => debug(given, typeof program === 'string' ? { main: program } : {})),
+    on('check', async () => { const uri = await saved(); if (uri) await execute(uri, 'check', ['check', uri.fsPath]); }),
+    on('test', (uri, name) => runner.runTest(uri, name)),
+    on('debugTest', (uri, name) => debug(uri, { program: undefined, test: `${vscode.Uri.parse(uri).fsPath}::${name}` })),
+    vscode.debug.registerDebugAdapterDescriptorFactory('fbvm', adapter),
+    vscode.debug.registerDebugConfigurationProvider('fbvm', configurations),
+    vscode.debug.registerDebugConfigurationProvider('fbvm', configurations, vscode.DebugConfigurationProviderTriggerKind.Dynamic),
+    vscode.tasks.registerTaskProvider('fbvm', taskProvider),
+    vscode.workspace.onDidChangeConfiguration((event) => event.affectsConfiguration('fbvm') && restart()),
+  );
+  await startServer();
+}
+
+module.exports = { activate, deactivate: stopServer };

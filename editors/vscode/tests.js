@@ -1,0 +1,115 @@
+'use strict';
+// The test view: each PROGRAM of a test_*.st, and the tests of test_*.py that fbvm collects, by their names in pytest.
+
+const { spawn } = require('child_process');
+const path = require('path');
+const vscode = require('vscode');
+
+const FILES = '**/test_*.st';
+const PROGRAM = /^[ \t]*PROGRAM[ \t]+([A-Za-z_]\w*)/gim;
+
+// Run a command; `line` is called with each line of its output.  Resolves with its exit status.
+function run(command, folder, line, token) {
+  return new Promise((resolve) => {
+    const child = spawn(command[0], command.slice(1), { cwd: folder });
+    let rest = '';
+    const take = (data) => {
+      const lines = (rest + data).split(/\r?\n/);
+      rest = lines.pop();
+      lines.forEach(line);
+    };
+    child.stdout.on('data', take);
+    child.stderr.on('data', take);
+    child.on('error', (error) => { line(String(error.message)); resolve(2); });
+    child.on('close', (code) => { if (rest) line(rest); resolve(code); });
+    if (token) token.onCancellationRequested(() => child.kill('SIGINT'));
+  });
+}
+
+// Register the view.  commandOf(folder) is how fbvm is started there; debug(item) begins a session for a test.
+function register(commandOf, debug) {
+  const controller = vscode.tests.createTestController('fbvm', 'fbvm');
+
+  const folderOf = (uri) => vscode.workspace.getWorkspaceFolder(uri)?.uri.fsPath || path.dirname(uri.fsPath);
+  const nodeOf = (item) => (item.parent ? `${item.uri.fsPath}::${item.label}` : item.uri.fsPath);
+
+  function discover(uri, text) {
+    const file = controller.createTestItem(uri.toString(), path.basename(uri.fsPath), uri);
+    let found;
+    PROGRAM.lastIndex = 0;
+    while ((found = PROGRAM.exec(text))) {
+      const line = text.slice(0, found.index).split('\n').length - 1;
+      const item = controller.createTestItem(`${uri}::${found[1]}`, found[1], uri);
+      item.range = new vscode.Range(line, 0, line, found[0].length);
+      file.children.add(item);
+    }
+    if (file.children.size) controller.items.add(file);
+    else controller.items.delete(uri.toString());
+  }
+
+  async function read(uri) {
+    discover(uri, Buffer.from(await vscode.workspace.fs.readFile(uri)).toString('utf8'));
+  }
+
+  controller.resolveHandler = async (item) => {
+    if (item) return;
+    for (const uri of await vscode.workspace.findFiles(FILES, '**/{.venv,node_modules}/**')) await read(uri);
+  };
+
+  async function runAll(request, token, coverage) {
+    const session = controller.createTestRun(request);
+    const items = [];
+    const add = (item) => (item.children.size ? item.children.forEach(add) : items.push(item));
+    (request.include || [...controller.items].map(([, item]) => item)).forEach(add);
+    const wanted = items.filter((item) => !(request.exclude || []).includes(item));
+    for (const folder of new Set(wanted.map((item) => folderOf(item.uri)))) {
+      const here = wanted.filter((item) => folderOf(item.uri) === folder);
+      const left = new Set(here);
+      here.forEach((item) => session.started(item));
+      const messages = new Map();
+      let failing = null;
+      const line = (text) => {
+        session.appendOutput(`${text}\r\n`);
+        const head = /^_+ (.+?) _+$/.exec(text);
+        if (head) failing = here.find((item) => item.label === head[1].split('::').pop()) || null;
+        else if (failing) messages.set(failing, `${messages.get(failing) || ''}${text}\n`);
+        const result = /^(\S.*?)::(\w+) (PASSED|FAILED|ERROR|SKIPPED)/.exec(text);
+        const item = result && here.find((each) => each.label === result[2] && each.uri.fsPath.endsWith(path.basename(result[1])));
+        if (!item) return;
+        if (result[3] === 'PASSED') { session.passed(item); left.delete(item); }
+        if (result[3] === 'SKIPPED') { session.skipped(item); left.delete(item); }
+      };
+      const command = [...commandOf(folder), 'test', '-v', '--color=no', ...(coverage ? ['--fbvm-cov'] : []), ...here.map(nodeOf)];
+      await run(command, folder, line, token);
+      for (const item of left) {
+        const message = new vscode.TestMessage(messages.get(item) || 'The test was not run; its output says why.');
+        const place = /(\d+): in \w+, scan/.exec(messages.get(item) || '');
+        if (place) message.location = new vscode.Location(item.uri, new vscode.Position(Number(place[1]) - 1, 0));
+        session.failed(item, message);
+      }
+    }
+    session.end();
+  }
+
+  controller.createRunProfile('Run', vscode.TestRunProfileKind.Run, (request, token) => runAll(request, token, false), true);
+  controller.createRunProfile('Run with coverage', vscode.TestRunProfileKind.Coverage, (request, token) => runAll(request, token, true));
+  controller.createRunProfile('Debug', vscode.TestRunProfileKind.Debug, async (request) => {
+    for (const item of request.include || []) await debug(item.uri, nodeOf(item));
+  });
+
+  const watcher = vscode.workspace.createFileSystemWatcher(FILES);
+  return [
+    controller, watcher,
+    watcher.onDidCreate(read), watcher.onDidChange(read), watcher.onDidDelete((uri) => controller.items.delete(uri.toString())),
+    vscode.workspace.onDidChangeTextDocument(({ document }) => {
+      if (/^test_.*\.st$/.test(path.basename(document.uri.fsPath))) discover(document.uri, document.getText());
+    }),
+    { runTest: (uri, name) => {
+      const file = controller.items.get(uri);
+      const item = file && file.children.get(`${uri}::${name}`);
+      return item ? runAll(new vscode.TestRunRequest([item]), undefined, false) : undefined;
+    }, dispose: () => {} },
+  ];
+}
+
+module.exports = { register };

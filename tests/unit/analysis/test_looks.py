@@ -1,0 +1,91 @@
+"""What a file holds and how it looks: outline, folding, lenses, colours, addresses behind names."""
+
+from __future__ import annotations
+
+from fbvm.analysis.outline import Symbol, folds, lenses, outline
+from fbvm.analysis.program import Program
+from fbvm.analysis.tokens import address_hints, tokens
+
+PLANT = """\
+TYPE Mode : (Off, Filling); END_TYPE
+
+(* moves
+   water *)
+FUNCTION_BLOCK Pump
+VAR_INPUT Level : INT; END_VAR
+VAR_OUTPUT Runs : BOOL; END_VAR
+    IF Level > 3 THEN
+        Runs := TRUE;
+    END_IF
+END_FUNCTION_BLOCK
+
+PROGRAM Main
+VAR
+    P1 : Pump; Words AT D100 : ARRAY [1..4] OF INT; Lamp AT %QX0.0 : BOOL; m : Mode; x : INT;
+END_VAR
+    P1(Level := Words[3]);
+    Lamp := P1.Runs AND m = Filling;
+    x := ABS(Words[x]);
+LADDER
+RUNG the lamp again
+LD P1.Runs
+OUT Lamp
+END_LADDER
+END_PROGRAM
+"""
+
+
+def plant(name: str = "pump.st", text: str = PLANT) -> Program:
+    program = Program()
+    program.replace(name, text)
+    program.check_all()
+    return program
+
+
+def tree_of(symbols: list[Symbol]) -> list[tuple[str, str, list[str]]]:
+    return [(symbol.kind, symbol.name, [each.name for each in symbol.children]) for symbol in symbols]
+
+
+def test_the_outline_has_declarations_variables_and_rungs() -> None:
+    assert tree_of(outline(plant().files["pump.st"])) == [
+        ("TYPE", "Mode", ["Off", "Filling"]), ("FUNCTION_BLOCK", "Pump", ["Level", "Runs"]),
+        ("PROGRAM", "Main", ["P1", "Words", "Lamp", "m", "x", "rung 1 the lamp again"])]
+
+
+def test_the_outline_has_actions_and_steps() -> None:
+    text = """\
+PROGRAM Main
+INITIAL_STEP Wait: END_STEP
+STEP Work: Count(N); END_STEP
+TRANSITION FROM Wait TO Work := TRUE; END_TRANSITION
+TRANSITION FROM Work TO Wait := TRUE; END_TRANSITION
+ACTION Count: ; END_ACTION
+END_PROGRAM
+"""
+    assert tree_of(outline(plant(text=text).files["pump.st"])) == [("PROGRAM", "Main", ["Wait", "Work", "Count"])]
+
+
+def test_what_has_several_lines_can_be_folded() -> None:
+    found = [(each.first + 1, each.last + 1, each.kind) for each in folds(plant().files["pump.st"])]
+    assert found == [(3, 4, "comment"), (5, 11, ""), (8, 10, ""), (13, 25, ""), (14, 16, ""), (20, 24, ""), (21, 23, "")]
+
+
+def test_programs_have_words_above_them_and_tests_have_others() -> None:
+    assert [(each.command, each.name) for each in lenses(plant().files["pump.st"])] == [
+        ("run", "Main"), ("debug", "Main"), ("chart", "Main")]
+    assert [each.command for each in lenses(plant("test_pump.st").files["test_pump.st"])] == ["test", "debug test"]
+
+
+def test_names_have_colours_by_what_they_are() -> None:
+    program = plant()
+    found = {(PLANT[each.start:each.end], each.type, *sorted(each.modifiers)) for each in tokens(program, program.files["pump.st"])}
+    assert {("Pump", "class", "declaration"), ("Level", "parameter", "modification"), ("ABS", "function", "defaultLibrary"),
+            ("Filling", "enumMember"), ("Mode", "type"), ("D100", "macro"), ("Lamp", "variable", "modification"),
+            ("Runs", "parameter"), ("m", "variable")} <= found
+
+
+def test_addresses_stand_behind_names_and_elements() -> None:
+    program = plant()
+    hints = address_hints(program, program.files["pump.st"], 0, len(PLANT))
+    assert [(PLANT[each.at - 4:each.at], each.text) for each in hints][:2] == [("s[3]", "D102"), ("Lamp", "%QX0.0")]
+    assert all(each.text != "D100" for each in hints), "an element whose number is not known has no address"
