@@ -19,6 +19,7 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import with_e_banks
 from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
+from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.sources import compile_options, report_diagnostics
 from fbvm.cli.shared.terminal import named
 from fbvm.code.compiler import compile_sources
@@ -35,7 +36,7 @@ def start_journal(
     """Starts a journal in a file, with the texts of the program and the `options` of the run; `stack` closes it."""
     with writing(path):
         file = stack.enter_context(TextIOWrapper(growing_file(path), encoding="utf-8", newline="\n"))
-    texts = [read(name, str(name)) for name in files]
+    texts = [Source(name, one) if isinstance(one, str) else read(one, name) for name, one in given_sources(files).items()]
     journal = held()(Journal)(file, {
         "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": compile_options(),
         "libraries": [str(folder) for folder in libraries], "banks": list(banks),

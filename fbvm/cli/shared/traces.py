@@ -14,6 +14,7 @@ from fbvm.base.digits import whole_number
 from fbvm.base.files import reason, write_file
 from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
+from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named, say
 from fbvm.code.image import Image
@@ -153,4 +154,4 @@ def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Se
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
     """The source lines with statements, by file and line number."""
-    return source_lines(image, source_texts(image, {str(path): path for path in files}, libraries))
+    return source_lines(image, source_texts(image, given_sources(files), libraries))
