@@ -132,7 +132,8 @@ class Reader:
         self.printed = ""
         self.declared = ""
         self.shown = "".join(block.text for block in self.all if block.language == "console")
-        self.ports = {port: str(_free_port()) for port in re.findall(r"--port (\d+).* &$", self.shown, re.M)}
+        left_running = " ".join(re.findall(r"^\$ .* &$", self.shown, re.M))
+        self.ports = {port: str(_free_port()) for port in re.findall(r"port (\d+)", left_running)}
         self.running: list[subprocess.Popen[bytes]] = []
 
     def read(self) -> None:
@@ -162,7 +163,8 @@ class Reader:
             path.write_text(block.text, encoding="utf-8")
         if block.language == "console":
             for command, output in block.commands:
-                compare(command, self._command(self._placed(command)), self._placed(output))
+                printed = self._command(self._placed(command), len(output.splitlines()))
+                compare(command, printed, self._placed(output))
         elif block.language == "iecst":
             self._compile(block)
         elif block.language == "python":
@@ -183,9 +185,9 @@ class Reader:
             text = re.sub(rf"\b{port}\b", free, text)
         return text
 
-    def _command(self, line: str) -> str:
+    def _command(self, line: str, lines: int) -> str:
         if line.endswith(" &"):
-            return self._start(line.removesuffix(" &"))
+            return self._start(line.removesuffix(" &"), lines)
         if line.startswith("cd "):
             os.chdir(line.removeprefix("cd "))
             return ""
@@ -195,14 +197,14 @@ class Reader:
             return _process(line)
         return CliRunner().invoke(main, shlex.split(command)[1:], input=fed[1].replace("\\n", "\n") if fed else None).output
 
-    def _start(self, line: str) -> str:
-        """What a program prints first, which then goes on."""
+    def _start(self, line: str, lines: int) -> str:
+        """The first lines that a program prints, which then goes on."""
         log = Path(f"{len(self.running)}.log")
         command = [sys.executable, "-u", "-m", *shlex.split(line)]
         with log.open("wb") as out:
             self.running.append(subprocess.Popen(command, stdout=out, stderr=out))
         until = time.monotonic() + 30
-        while not log.read_text(encoding="utf-8").endswith("\n") and time.monotonic() < until:
+        while log.read_text(encoding="utf-8").count("\n") < max(lines, 1) and time.monotonic() < until:
             time.sleep(0.05)
         return log.read_text(encoding="utf-8")
 

@@ -20,7 +20,7 @@ from fbvm.base.host import ending_signals, handling, saving_signals
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
 from fbvm.cli.shared.files import OutputError, growing_file, writing
-from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, open_fins
+from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, say_fins, try_fins
 from fbvm.cli.shared.networks import mailbox_names
 from fbvm.cli.shared.options import address, bind_option, time_ns, watch_cycle_option
 from fbvm.cli.shared.sources import compile_or_exit, source_options
@@ -93,8 +93,8 @@ def command(
         for unit in usual_units(mailbox_names(plc.image), fins=door.unit if door else None):
             plc.attach(unit, network)
         if door:
-            open_fins(network, door)
-        reason, saved = _start(plc, network, signals), True
+            try_fins(network, door)
+        reason, saved = _start(plc, network, signals, door), True
         while reason != "trap" and not signals.end:
             try:
                 reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)
@@ -166,13 +166,14 @@ def _network(bind: str, port: int, backlog: bool, fins: FinsDoor | None) -> TcpN
     return network
 
 
-def _start(plc: Plc, network: TcpNetwork, signals: Signals) -> str:
+def _start(plc: Plc, network: TcpNetwork, signals: Signals, fins: FinsDoor | None) -> str:
     """Runs until a unit listens, and prints where; returns the reason of the end."""
     doors: list[Notice] = []
     say_notice = notice_teller(HOW_TO_MAP)
 
     def tell(notice: Notice) -> None:
-        if notice.endpoint == ENDPOINT and notice.kind is NoticeKind.LISTENING:
+        if fins and notice.endpoint == ENDPOINT and notice.kind is NoticeKind.LISTENING:
+            say_fins(fins, notice.real)
             return
         if notice.endpoint != ENDPOINT and notice.kind in (NoticeKind.LISTENING, NoticeKind.UNUSABLE) and not doors:
             doors.append(notice)

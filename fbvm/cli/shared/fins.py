@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from ipaddress import IPv4Address
@@ -72,9 +73,8 @@ def fins_door(bind: str, port: int, node: int | None, control: bool, read_only: 
     return FinsDoor(Peer(host, port), known, access)
 
 
-def open_fins(network: TcpNetwork, door: FinsDoor) -> None:
-    """Tries the port for TCP and UDP, says where FINS is served, and warns where others reach it.  Ends with status 5 if the host
-    does not give the port."""
+def try_fins(network: TcpNetwork, door: FinsDoor) -> None:
+    """Tries the port for TCP and UDP, and warns where others reach it.  Ends with status 5 if the host does not give the port."""
     try:
         network.try_door(door.real)
         real = network.host_endpoint(ENDPOINT)
@@ -82,10 +82,14 @@ def open_fins(network: TcpNetwork, door: FinsDoor) -> None:
     except OSError as error:
         network.close()
         unusable(error)
-    say(f"FINS: {LISTENING}{real}, node {door.node or 'any'}")
     if is_reachable(real.host):
         mode = "; it cannot change the mode without --fins-control" if door.access == "no-control" else (
             " and stop the PLC" if door.access == "full" else "")  # fmt: skip
         may = "read" if door.access == "read-only" else "read and write" + mode
         say(f"Other computers can reach {real} by FINS, which knows no password: whoever sends may {may}.", fg="yellow", err=True)
 
+
+def say_fins(door: FinsDoor, real: Peer) -> None:
+    """Says where FINS is served, as soon as it is: a datagram that came before would be lost."""
+    say(f"FINS: {LISTENING}{real}, node {door.node or 'any'}")
+    sys.stdout.flush()

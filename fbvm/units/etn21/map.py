@@ -11,6 +11,7 @@ from enum import IntEnum
 SOCKETS = range(1, 9)
 AREAS = range(1, 9)
 UNIT_NUMBERS = range(16)
+CONNECTIONS = range(1, 17)  # of FINS/TCP, W420 3-2
 
 # --- offsets from n (CIO), W420 4-1 p80-85, W421 6-6 p111 ------------------------------------------------------------
 UDP_STATUS = 0  # + socket number: n+1..n+8

@@ -25,6 +25,10 @@ FLAG_NAMES = {
     13: "Data Received Flag",
     15: "Open Flag",
 }
+ERROR_NAMES = {2: "IP Address Setting Error", 3: "IP Address Table Error", 4: "IP Router Table Error", 5: "DNS Server Error",
+               6: "Routing Table Error", 11: "SNTP Server Error", 12: "SMTP Server Error", 13: "POP Server Error",
+               14: "Address Disagreement", 15: "EEPROM Error"}  # fmt: skip
+"""Bits of n+18.  W420 4-1 p84; 2 to 4 from the EIP21 (W465)."""
 PARAMETER_NAMES = {
     at.OPTION_AND_SOCKET: "Option and Socket Number",
     at.LOCAL_PORT: "Local Port",
@@ -43,9 +47,15 @@ def descriptions(layout: Layout) -> dict[str, str]:
     """The name of each bit and word by its address, such as `CIO 1519.02`; area and socket 1 go unnumbered."""
     names = {
         f"CIO {layout.n}.02": "Socket Force-close Switch",
+        f"CIO {layout.n + at.SERVICE_STATUS}.14": "Link Status",
+        f"D{layout.m + at.LOCAL_IP}": "Local IP Address, high",
+        f"D{layout.m + at.LOCAL_IP + 1}": "Local IP Address, low",
         f"A{at.INITIALIZING}.{layout.bit:02}": "CPU Bus Unit Initializing Flag",
         f"A{at.RESTART}.{layout.bit:02}": "CPU Bus Unit Restart Bit",
     }
+    names |= {f"CIO {layout.n + at.ERROR_STATUS}.{bit:02}": name for bit, name in ERROR_NAMES.items()}
+    names |= {f"CIO {layout.n + at.FINS_TCP_STATUS}.{connection - 1:02}": _numbered("FINS/TCP Connection Flag", connection)
+              for connection in at.CONNECTIONS}  # fmt: skip
     for area in at.AREAS:
         word, first = layout.switches(area)
         for switch, name in SWITCH_NAMES.items():

@@ -19,7 +19,7 @@ from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.fins.service import FinsService
-from fbvm.units.etn21.fins.state import ACCESS, FinsSettings, nodes_of
+from fbvm.units.etn21.fins.state import ACCESS, FinsSettings, FinsState, nodes_of
 from fbvm.units.etn21.inside import Inside, power_on
 from fbvm.units.etn21.map import Layout
 from fbvm.units.etn21.names import descriptions, meanings
@@ -121,7 +121,7 @@ class Etn21:
         twin._service_status, twin._error_status = self._service_status, self._error_status
         twin._words, twin.changed_words = self._words, self.changed_words
         if self._fins and twin._fins:
-            twin._fins.state = self._fins.state.copy()
+            twin._fins.state = FinsState.of(self._fins.state.plain)
         return twin
 
     @property
@@ -134,7 +134,7 @@ class Etn21:
         """All that the unit knows now, beside its arguments."""
         inside = self._processor
         memory, mail = (inside.own.memory.snapshot(), inside.mail.state) if inside else (None, None)
-        fins = self._fins.state.copy() if self._fins else None
+        fins = self._fins.state.plain if self._fins else None
         return UnitState(memory, (self._service_status, self._error_status, self.changed_words, mail, fins))
 
     def resume(self, state: UnitState, memory: AreaMemory) -> None:
@@ -142,7 +142,7 @@ class Etn21:
         self._words = Words(self.layout, memory)
         self._service_status, self._error_status, self.changed_words, mail, fins = state.other
         if self._fins and fins:
-            self._fins.state = fins.copy()
+            self._fins.state = FinsState.of(fins)
         if state.memory is None:
             self._processor = None
         else:

@@ -36,11 +36,8 @@ class EndCode(IntEnum):
     """The end codes that are given here."""
 
     NORMAL = 0x0000
-    NO_BUFFER = 0x0103
     NOT_IN_NETWORK = 0x0101
-    NO_DESTINATION = 0x0201
     NO_UNIT = 0x0202
-    BUSY = 0x0204
     TIMED_OUT = 0x0205
     UNDEFINED = 0x0401
     NOT_SUPPORTED = 0x0402

@@ -11,6 +11,8 @@ from fbvm import Plc, Recording, RecordingFile, RecordingWriter, compile_text
 from fbvm.net.journal import Journal, open_journal
 from fbvm.record.recording import recording as recording_module
 from fbvm.record.recording.journal_replay import Replay
+from fbvm.units.etn21.unit import Etn21
+from fbvm.wire.link import Event
 
 CONVERSATION = [
     (0x0102, "82 0064 00 0002 1234 5678"), (0x2301, "0001 0001 30 0064 01"), (0x0101, "82 01F4 00 0001"),
@@ -116,3 +118,28 @@ def test_a_request_is_answered_beside_units_that_run_in_machine_code() -> None:
     assert rig.plc.read("CIO 1523") == 1
 
 
+
+
+def test_the_state_of_the_service_is_plain_data_and_comes_back_whole() -> None:
+    """A connection with half a message, a learned node, events that wait: files of recordings keep only plain data."""
+    rig = FinsRig()
+    rig.command(0x0601)
+    client = TcpClient(rig)
+    client.connect()
+    client.say(b"FINS\0\0")
+    rig.plc.run(scans=2)
+    for _ in range(300):
+        rig.say(bytes.fromhex("800002000100001900010601"))
+    rig.plc.scan()
+    state = rig.unit.state.other[-1]
+    assert state
+
+    def is_plain(item: object) -> bool:
+        if isinstance(item, tuple):
+            return all(map(is_plain, item))
+        return isinstance(item, bool | int | str | bytes | Event)
+
+    assert is_plain(state)
+    twin = Etn21(**rig.unit.configuration)
+    twin.resume(rig.unit.state, rig.plc.memory)
+    assert twin.state.other == rig.unit.state.other

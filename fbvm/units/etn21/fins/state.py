@@ -8,7 +8,7 @@ from typing import Any
 
 from fbvm.units.contract import FinsAccess
 from fbvm.wire.fins.frames import LAST_NODE, PORT
-from fbvm.wire.link import Event, Peer, Request
+from fbvm.wire.link import Event, Peer, Send, SendTo
 
 UDP_CHANNEL = 100
 TCP_CHANNELS = range(101, 121)
@@ -91,7 +91,7 @@ class Connection:
 
 @dataclass
 class FinsState:
-    """What the service knows: plain values, which are copied as a whole."""
+    """What the service knows."""
 
     busy: set[int] = field(default_factory=set)
     """Channels in use, from the request to open on."""
@@ -106,15 +106,29 @@ class FinsState:
     """Endpoints from which nodes have sent by UDP."""
     events: list[Event] = field(default_factory=list)
     """What the network told and has not been served yet."""
-    outgoing: list[Request] = field(default_factory=list)
+    outgoing: list[Send | SendTo] = field(default_factory=list)
     """What network instructions send in the next servicing."""
 
-    def copy(self) -> FinsState:
-        """The same state, of which no part is shared that changes."""
-        connections = {channel: Connection(**_fields(found)) for channel, found in self.connections.items()}
-        return FinsState(set(self.busy), set(self.closing), set(self.failed), self.udp_open, connections, dict(self.learned),
-                         list(self.events), list(self.outgoing))  # fmt: skip
+    @property
+    def plain(self) -> tuple[Any, ...]:
+        """All of it as tuples, numbers, texts and events, as recordings keep it."""
+        connections = tuple((channel, found.number, found.remote.host, found.remote.port, found.since_ns, found.node, found.held)
+                            for channel, found in self.connections.items())  # fmt: skip
+        learned = tuple((node, peer.host, peer.port) for node, peer in self.learned.items())
+        outgoing = tuple((request.channel, request.remote.host, request.remote.port, request.data)
+                         if isinstance(request, SendTo) else (request.channel, "", 0, request.data)
+                         for request in self.outgoing)  # fmt: skip
+        return (tuple(sorted(self.busy)), tuple(sorted(self.closing)), tuple(sorted(self.failed)), self.udp_open, connections,
+                learned, tuple(self.events), outgoing)  # fmt: skip
 
-
-def _fields(connection: Connection) -> dict[str, Any]:
-    return dict(vars(connection))
+    @classmethod
+    def of(cls, plain: tuple[Any, ...]) -> FinsState:
+        """The state of which these are the `plain` values."""
+        busy, closing, failed, udp_open, connections, learned, events, outgoing = plain
+        return cls(
+            set(busy), set(closing), set(failed), udp_open,
+            {channel: Connection(number, Peer(host, port), since_ns, node, held)
+             for channel, number, host, port, since_ns, node, held in connections},
+            {node: Peer(host, port) for node, host, port in learned}, list(events),
+            [SendTo(channel, Peer(host, port), data) if host else Send(channel, data) for channel, host, port, data in outgoing],
+        )  # fmt: skip
