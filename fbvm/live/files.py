@@ -16,6 +16,7 @@ HTML, SCRIPT, STYLE = "text/html; charset=utf-8", "text/javascript; charset=utf-
 FILES = {
     "/": ("live.html", HTML),
     "/live.css": ("live.css", STYLE),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
     **{f"/{name}.js": (f"{name}.js", SCRIPT)
        for name in ("main", "socket", "dom", "scan", "program", "watch", "trend", "units", "network", "memory")},
 }  # fmt: skip

@@ -21,8 +21,8 @@ SLICE_NS = 20_000_000
 """So long scans may follow one another in virtual time before the loop looks at who looks on."""
 AS_FAST_AS_POSSIBLE = 0.0
 """The speed of virtual time that never waits."""
-STOPPED = "stopped"
-"""The reason of a run that `Control.end` has ended."""
+TRAP, STOPPED = "trap", "stopped"
+"""Reasons of an end: a trap, after which a PLC can be switched off and on, and `Control.end`."""
 
 
 class Audience(Protocol):
@@ -110,6 +110,9 @@ class _Loop:
     def turn(self, interrupts: Interrupts) -> None:
         """Serves, waits until something is due, and scans what is."""
         control = self._control
+        for run in self._runs:
+            if run.reason == TRAP and run.plc.trap is None:  # somebody has switched it off and on
+                run.reason, run.due_ns = "", max(run.due_ns, self._now_ns)
         due_ns = min((run.due_ns for run in self._runs if not run.reason), default=None)
         stands = due_ns is None or control.is_paused and not control.steps
         self._advance(stands, due_ns)

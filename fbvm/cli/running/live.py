@@ -27,7 +27,7 @@ from fbvm.net.tcp import TcpNetwork
 from fbvm.record.recording.recording import Recording
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.run.interactive import Control, run_interactive
-from fbvm.run.plant import Plant
+from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import Project
 from fbvm.run.running import Running
 from fbvm.watch.paths import UnknownPlace
@@ -96,7 +96,7 @@ def command(
             network.notices.tell = notice_teller(HOW_TO_MAP, found)
         own = {str(file): file for file in files} | {file.name: file for file in files}
         texts = source_texts(image, own, libraries)
-        page.run({files[0].stem: (plc, texts)}, [Running(plc)], repeated=files if network.virtual_time and not mappings else (),
+        page.run({files[0].stem: (plc, texts)}, [Running(plc, scans=ENDLESS)], repeated=files if network.virtual_time and not mappings else (),
                  program=program, remark=written.remark if written else None)  # fmt: skip
 
 
@@ -129,7 +129,7 @@ class _Page:
                                  | {str(path): path for path in kind.row.sources}, kind.row.libraries)  # fmt: skip
             for name, run in zip(kind.names, kind.runs, strict=True):
                 plcs[name] = run.plc, texts
-        self.run(plcs, [Running(run.plc, writes=run.writes) for run in plant.runs])
+        self.run(plcs, [Running(run.plc, scans=ENDLESS, writes=run.writes) for run in plant.runs])
 
     def run(self, plcs: dict[str, tuple[Plc, dict[str, str]]], runs: list[Running], repeated: Sequence[Path] = (),
             program: str | None = None, remark: object = None) -> None:  # fmt: skip
