@@ -114,8 +114,8 @@ class Workbench:
         if self.writable is not None:
             places = found.places if isinstance(found, Span) else (found,)
             for place in places:
-                if not any(place.name == allowed or place.name.startswith((f"{allowed}.", f"{allowed}["))
-                           for allowed in self.writable):  # fmt: skip
+                inside = () if place.hops else self.writable  # what a reference points to may be anywhere
+                if place.name not in self.writable and not any(place.name.startswith((f"{name}.", f"{name}[")) for name in inside):
                     raise MessageError(f"{place.name} may not be written: --allow-write names {', '.join(self.writable)}")
         return found
 
