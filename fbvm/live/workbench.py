@@ -115,7 +115,8 @@ class Workbench:
             places = found.places if isinstance(found, Span) else (found,)
             for place in places:
                 inside = () if place.hops else self.writable  # what a reference points to may be anywhere
-                if place.name not in self.writable and not any(place.name.startswith((f"{name}.", f"{name}[")) for name in inside):
+                heads = tuple(f"{name}{mark}" for name in inside for mark in ".[")
+                if place.name not in self.writable and not place.name.startswith(heads):
                     raise MessageError(f"{place.name} may not be written: --allow-write names {', '.join(self.writable)}")
         return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
@@ -79,25 +79,41 @@ def command(
                 raise click.UsageError("--journal, --map and --door: what a project does stands in its file")
             page.run_project(project, net)
             return
-        image = compile_or_exit(files, program, libraries, runnable=True)
-        kind = net or ("tcp" if doors else "loop")
-        if kind == "loop" and (doors or any(row.host is not None for row in mappings)):
-            raise click.UsageError("--door and --map to a real host leave memory: add --net tcp")
-        network = build_network(kind, mappings, 0, "127.0.0.1", doors)
-        stack.callback(network.close)
-        said = {"net": kind, "pace": "cyclic", "timing": "exact", "seed": 0, "engine": "auto"}
-        written = start_journal(stack, journal, files, program, libraries, (), said) if journal else None
-        plc = Plc(image, cycle_ns, journal=written)
-        for unit in usual_units(mailbox_names(image)):
-            plc.attach(unit, network)
-        if isinstance(network, TcpNetwork):
+        _run_files(page, stack, files, program, libraries, cycle_ns, _kind(net, mappings, doors), mappings, doors, journal)
+
+
+def _kind(net: str | None, mappings: tuple[Mapping, ...], doors: tuple[Door, ...]) -> str:
+    """"loop" or "tcp".  Raises UsageError for options that do not fit it."""
+    kind = net or ("tcp" if doors else "loop")
+    if kind == "loop" and (doors or any(row.host is not None for row in mappings)):
+        raise click.UsageError("--door and --map to a real host leave memory: add --net tcp")
+    return kind
+
+
+def _run_files(
+    page: _Page, stack: ExitStack, files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int,
+    net: str, mappings: tuple[Mapping, ...], doors: tuple[Door, ...], journal: Path | None,
+) -> None:  # fmt: skip
+    """Runs a program, with its units and a network, under the page."""
+    image = compile_or_exit(files, program, libraries, runnable=True)
+    network = build_network(net, mappings, 0, "127.0.0.1", doors)
+    stack.callback(network.close)
+    said = {"net": net, "pace": "cyclic", "timing": "exact", "seed": 0, "engine": "auto"}
+    written = start_journal(stack, journal, files, program, libraries, (), said) if journal else None
+    plc = Plc(image, cycle_ns, journal=written)
+    for unit in usual_units(mailbox_names(image)):
+        plc.attach(unit, network)
+    if isinstance(network, TcpNetwork):
+        try:
             found = network.try_doors([given.endpoint for given in doors if given.endpoint])
-            say_doors(found)
-            network.notices.tell = notice_teller(HOW_TO_MAP, found)
-        own = {str(file): file for file in files} | {file.name: file for file in files}
-        texts = source_texts(image, own, libraries)
-        page.run({files[0].stem: (plc, texts)}, [Running(plc, scans=ENDLESS)], repeated=files if network.virtual_time and not mappings else (),
-                 program=program, remark=written.remark if written else None)  # fmt: skip
+        except OSError as error:
+            unusable(error)
+        say_doors(found)
+        network.notices.tell = notice_teller(HOW_TO_MAP, found)
+    texts = source_texts(image, {str(file): file for file in files} | {file.name: file for file in files}, libraries)
+    page.run({files[0].stem: (plc, texts)}, [Running(plc, scans=ENDLESS)], program=program,
+             repeated=files if network.virtual_time and not mappings else (),
+             remark=written.remark if written else None)  # fmt: skip
 
 
 class _Page:
@@ -132,7 +148,7 @@ class _Page:
         self.run(plcs, [Running(run.plc, scans=ENDLESS, writes=run.writes) for run in plant.runs])
 
     def run(self, plcs: dict[str, tuple[Plc, dict[str, str]]], runs: list[Running], repeated: Sequence[Path] = (),
-            program: str | None = None, remark: object = None) -> None:  # fmt: skip
+            program: str | None = None, remark: Callable[[str], None] | None = None) -> None:  # fmt: skip
         """Serves the page and runs until Ctrl-C."""
         from fbvm.live.host import LiveHost
         from fbvm.live.plcs import LivePlc
@@ -144,7 +160,7 @@ class _Page:
         test = partial(pytest_text, files=[file.resolve() for file in repeated], program=program) if repeated else None
         try:
             bench = Workbench(lives, self._control, read_only=self._read_only, writable=self._writable or None, test=test,
-                              remark=remark if callable(remark) else lambda text: None)  # fmt: skip
+                              remark=remark or (lambda text: None))  # fmt: skip
         except UnknownPlace as error:
             raise click.UsageError(f"--allow-write: {error}") from None
         try:

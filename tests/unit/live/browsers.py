@@ -46,7 +46,8 @@ def request(path: str = f"/live?token={TOKEN}", host: str | None = HOST, origin:
 def frame(data: bytes, opcode: int = 1, fin: bool = True, masked: bool = True) -> bytes:
     """A WebSocket frame of a client (RFC 6455 5.2), masked with zeros."""
     size = len(data)
-    length = bytes([size]) if size < 126 else b"\x7e" + size.to_bytes(2, "big") if size < 1 << 16 else b"\x7f" + size.to_bytes(8, "big")
+    width = 0 if size < 126 else 2 if size < 1 << 16 else 8
+    length = bytes([size]) if not width else bytes([126 if width == 2 else 127]) + size.to_bytes(width, "big")
     head = bytes([opcode | 0x80 * fin, length[0] | 0x80 * masked]) + length[1:]
     return head + (bytes(4) if masked else b"") + data
 
