@@ -140,7 +140,7 @@ def test_the_scan_is_paused_stepped_and_taken_back_by_keys(live: Any) -> None:
     state(page, "pause")
     level = watch(page, "Main.Level")
     value(level, "20")
-    page.locator("h1").click()
+    page.locator("#where").click()
     for _ in range(3):
         page.keyboard.press("s")
         page.wait_for_timeout(0)
@@ -215,13 +215,15 @@ def test_every_control_has_a_name_for_screen_readers(live: Any) -> None:
     watch(page, "Main.Level")
     for panel in ("units", "network", "memory"):
         page.click(f"[data-panel={panel}]")
-    nameless = page.evaluate("""[...document.querySelectorAll('button, input, select')].filter((one) =>
-        !(one.textContent.trim() || one.getAttribute('aria-label') || one.title || one.labels?.length)).map((one) => one.outerHTML)""")
+    nameless = page.evaluate("""[...document.querySelectorAll('button, input, select')]
+        .filter((one) => !(one.textContent.trim() || one.getAttribute('aria-label') || one.title || one.labels?.length))
+        .map((one) => one.outerHTML)""")
     assert nameless == []
 
 
 def test_a_thousand_signals_are_watched(live: Any) -> None:
-    text = "PROGRAM Main VAR a : ARRAY[1..1000] OF INT; i : INT; END_VAR FOR i := 1 TO 1000 DO a[i] := a[i] + 1; END_FOR END_PROGRAM"
+    text = """PROGRAM Main VAR a : ARRAY[1..1000] OF INT; i : INT; END_VAR
+        FOR i := 1 TO 1000 DO a[i] := a[i] + 1; END_FOR END_PROGRAM"""
     page = (run := live("--speed", "100", text=text)).window()
     state(page, "run")
     row = watch(page, "Main.a")

@@ -42,7 +42,7 @@ def test_with_bind_to_all_a_name_gets_nothing_all_the_same(name: str) -> None:
 
 
 @pytest.mark.parametrize("query", ["", "?token=", "?token=a-secret-toke", f"?token={TOKEN}x", f"?Token={TOKEN}",
-                                   f"?token={TOKEN}&token=x", "?token=%FF%FE", "?a=1&a=2&a=3&a=4&a=5&a=6", "?token=é"])  # fmt: skip
+                                   f"?token={TOKEN}&token=x", "?token=%FF%FE", "?token=é"])  # fmt: skip
 def test_without_the_token_there_is_no_socket(query: str) -> None:
     assert answered(request(f"/live{query}".encode("ascii", "replace").decode()))[0] == 403
 
