@@ -91,7 +91,7 @@ def test_the_readme_is_short_and_names_every_verb() -> None:
 def test_the_two_commands_of_the_readme_stand_on_their_lines() -> None:
     commands = re.findall(r"^python3 -m venv .*$", ALL["README.md"], re.M)
     assert [command.split(" && ")[1:] for command in commands] == [
-        [".venv/bin/pip install -q -e '.[peer]'", ".venv/bin/fbvm demo"],
+        [".venv/bin/pip install -q -e '.[peer,live]'", ".venv/bin/fbvm demo"],
         [".venv/bin/pip install -q -e '.[test]'", ".venv/bin/python -m pytest -n auto"],
     ]
     pattern = re.search(r"sed -n 's/(.*?)/", (HOUSE / ".ci" / "run").read_text(encoding="utf-8"))

@@ -86,8 +86,9 @@ SEPARATE = {("units", "net"), ("net", "units"), ("units", "engine"), ("engine", 
             *((one, other) for one in SHOPS for other in SHOPS - {one} if (one, other) not in BETWEEN_SHOPS)}  # fmt: skip
 """Neighbours that do not import each other."""
 ONLY_IN = {
-    "socket": {"net/tcp.py", "net/udp.py", "net/streams.py"},
-    "selectors": {"net", "base/host.py"},
+    "socket": {"net/tcp.py", "net/udp.py", "net/streams.py", "live/sockets.py"},
+    "selectors": {"net", "base/host.py", "live/sockets.py"},
+    "websockets": {"live"},
     "time": {"run", "base/host.py"},
     "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap", "cli/shared/ending.py"},
     "subprocess": {"engine/apart.py", "engine/native/llvm/worker.py", "cli", "campaign", "testing"},

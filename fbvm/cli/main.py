@@ -26,6 +26,7 @@ VERB_GROUPS = {
     "running": ("Run PLCs", {
         "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
         "run": "Run a program, in virtual time or over real TCP.",
+        "live": "Run a program with a page in the browser, to see and to touch.",
         "step": "Step through the scans of a program, forth and back.",
         "dap": "Debug programs from an editor, forth and back.",
         "replay": "Do a run again from its journal.",

@@ -1,0 +1,176 @@
+"""`fbvm live`: runs a program or a project and serves a page on which it can be seen and touched."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+
+import click
+
+from fbvm.base.diagnostics import errors
+from fbvm.cli.shared import status
+from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
+from fbvm.cli.shared.journals import start_journal
+from fbvm.cli.shared.networks import build_network, mailbox_names
+from fbvm.cli.shared.options import CYCLE_NS, Door, Mapping, address, door, mapping, time_ns
+from fbvm.cli.shared.paths import SourcePath
+from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument, read_given_project
+from fbvm.cli.shared.sources import compile_or_exit, report_diagnostics, source_options
+from fbvm.cli.shared.terminal import say
+from fbvm.machine.backplane import usual_units
+from fbvm.machine.plc import Plc
+from fbvm.net.tcp import TcpNetwork
+from fbvm.record.recording.recording import Recording
+from fbvm.record.trace.source_texts import source_texts
+from fbvm.run.interactive import Control, run_interactive
+from fbvm.run.plant import ENDLESS, Plant
+from fbvm.run.project import Project
+from fbvm.run.running import Running
+from fbvm.watch.paths import UnknownPlace
+
+HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
+MISSING = "the live page needs websockets: pip install 'fbvm[live]'"
+
+
+@click.command("live")
+@source_options
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
+@click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
+              help="Cycle of programs without a TASK, and how often the PLC scans.")
+@click.option("--net", type=click.Choice(["loop", "tcp"]), show_default="loop",
+              help="loop: in memory, virtual time.  tcp: real connections, real time.")
+@click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
+              help="Where an endpoint that the program names really is.")
+@click.option("--door", "doors", type=door, multiple=True, metavar="[IP:PORT=][HOST:]PORT",
+              help="With tcp: where others reach the program.")
+@allow_outside_option
+@click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="any free one", help="The port of the page.")
+@click.option("--bind", default="127.0.0.1", show_default=True, metavar="ADDRESS",
+              help="Where the page is served; others than this computer reach it with another address.")
+@click.option("--read-only", is_flag=True, help="Let pages look and nothing else.")
+@click.option("--allow-write", "writable", multiple=True, metavar="NAME",
+              help="Let pages write and force this variable or address and what is in it, and nothing else; may be repeated.")
+@click.option("--paused", is_flag=True, help="Wait before the first scan.")
+@click.option("--speed", type=click.FloatRange(0, 1000), default=1.0, show_default=True, metavar="N",
+              help="How fast virtual time passes: 1 as the clock, 0.1 ten times slower, 0 as fast as it goes.")
+@click.option("--journal", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Write every input of every scan, and what is done on the page, for `fbvm replay`.")
+def command(
+    files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, net: str | None,
+    mappings: tuple[Mapping, ...], doors: tuple[Door, ...], port: int, bind: str, read_only: bool, writable: tuple[str, ...],
+    paused: bool, speed: float, journal: Path | None,
+) -> None:  # fmt: skip
+    """Run a program or a PROJECT and print the address of a page on which it lives: values, rungs with power, the scan that
+    stops, steps and goes back, units, frames and faults.
+
+    Ends by Ctrl-C.  The address has a token: who does not have it sees nothing.  Status 3 if the program has errors, 5 if the
+    network or the port of the page cannot be used."""
+    if find_spec("websockets") is None:
+        raise click.UsageError(MISSING)
+    control = Control(is_paused=paused, speed=speed)
+    with ExitStack() as stack:
+        page = _Page(stack, control, bind=address(bind), port=port, read_only=read_only, writable=writable)
+        if project := project_argument(files):
+            if journal or mappings or doors:
+                raise click.UsageError("--journal, --map and --door: what a project does stands in its file")
+            page.run_project(project, net)
+            return
+        _run_files(page, stack, files, program, libraries, cycle_ns, _kind(net, mappings, doors), mappings, doors, journal)
+
+
+def _kind(net: str | None, mappings: tuple[Mapping, ...], doors: tuple[Door, ...]) -> str:
+    """"loop" or "tcp".  Raises UsageError for options that do not fit it."""
+    kind = net or ("tcp" if doors else "loop")
+    if kind == "loop" and (doors or any(row.host is not None for row in mappings)):
+        raise click.UsageError("--door and --map to a real host leave memory: add --net tcp")
+    return kind
+
+
+def _run_files(
+    page: _Page, stack: ExitStack, files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int,
+    net: str, mappings: tuple[Mapping, ...], doors: tuple[Door, ...], journal: Path | None,
+) -> None:  # fmt: skip
+    """Runs a program, with its units and a network, under the page."""
+    image = compile_or_exit(files, program, libraries, runnable=True)
+    network = build_network(net, mappings, 0, "127.0.0.1", doors)
+    stack.callback(network.close)
+    said = {"net": net, "pace": "cyclic", "timing": "exact", "seed": 0, "engine": "auto"}
+    written = start_journal(stack, journal, files, program, libraries, (), said) if journal else None
+    plc = Plc(image, cycle_ns, journal=written)
+    for unit in usual_units(mailbox_names(image)):
+        plc.attach(unit, network)
+    if isinstance(network, TcpNetwork):
+        try:
+            found = network.try_doors([given.endpoint for given in doors if given.endpoint])
+        except OSError as error:
+            unusable(error)
+        say_doors(found)
+        network.notices.tell = notice_teller(HOW_TO_MAP, found)
+    texts = source_texts(image, {str(file): file for file in files} | {file.name: file for file in files}, libraries)
+    page.run({files[0].stem: (plc, texts)}, [Running(plc, scans=ENDLESS)], program=program,
+             repeated=files if network.virtual_time and not mappings else (),
+             remark=written.remark if written else None)  # fmt: skip
+
+
+class _Page:
+    """The page of a run, with its options."""
+
+    def __init__(self, stack: ExitStack, control: Control, *, bind: str, port: int, read_only: bool,
+                 writable: Sequence[str]) -> None:  # fmt: skip
+        self._stack, self._control = stack, control
+        self._bind, self._port, self._read_only, self._writable = bind, port, read_only, writable
+
+    def run_project(self, file: Path, net: str | None) -> None:
+        """Runs all PLCs of a project under one page."""
+        project = read_given_project(file)
+        if not isinstance(project, Project):
+            report_diagnostics(project, False)
+            sys.exit(status.PROGRAM_ERRORS)
+        try:
+            plant = Plant(project, net=net)
+        except OSError as error:
+            unusable(error)
+        report_diagnostics(plant.diagnostics, False)
+        if errors(plant.diagnostics):
+            sys.exit(status.PROGRAM_ERRORS)
+        self._stack.callback(plant.close)
+        say_doors(plant.doors)
+        plcs = {}
+        for kind in plant.kinds:
+            texts = source_texts(kind.runs[0].plc.image, {path.name: path for path in kind.row.sources}
+                                 | {str(path): path for path in kind.row.sources}, kind.row.libraries)  # fmt: skip
+            for name, run in zip(kind.names, kind.runs, strict=True):
+                plcs[name] = run.plc, texts
+        self.run(plcs, [Running(run.plc, scans=ENDLESS, writes=run.writes) for run in plant.runs])
+
+    def run(self, plcs: dict[str, tuple[Plc, dict[str, str]]], runs: list[Running], repeated: Sequence[Path] = (),
+            program: str | None = None, remark: Callable[[str], None] | None = None) -> None:  # fmt: skip
+        """Serves the page and runs until Ctrl-C."""
+        from fbvm.live.host import LiveHost
+        from fbvm.live.plcs import LivePlc
+        from fbvm.live.pytest_text import pytest_text
+        from fbvm.live.workbench import Workbench
+
+        recording = Recording()
+        lives = [LivePlc(name, plc, recording.add(name, plc), texts) for name, (plc, texts) in plcs.items()]
+        test = partial(pytest_text, files=[file.resolve() for file in repeated], program=program) if repeated else None
+        try:
+            bench = Workbench(lives, self._control, read_only=self._read_only, writable=self._writable or None, test=test,
+                              remark=remark or (lambda text: None))  # fmt: skip
+        except UnknownPlace as error:
+            raise click.UsageError(f"--allow-write: {error}") from None
+        try:
+            host = LiveHost(bench, self._bind, self._port)
+        except OSError as error:
+            unusable(OSError(f"the page cannot be served at {self._bind}:{self._port}: {error.strerror}"))
+        self._stack.callback(host.close)
+        if self._bind != "127.0.0.1":
+            say(f"--bind {self._bind}: who reaches this address and has the token can write into the PLC; nothing is encrypted",
+                fg="yellow", err=True)  # fmt: skip
+        say(host.address)
+        sys.stdout.flush()
+        run_interactive(runs, self._control, host)

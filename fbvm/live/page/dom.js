@@ -1,0 +1,55 @@
+// Elements of the page.  Texts of users only ever become text nodes; drawings are parsed as XML and hold no script.
+
+export const at = (id) => document.getElementById(id);
+
+export function make(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name === "on") for (const [event, call] of Object.entries(value)) element.addEventListener(event, call);
+    else if (value === true) element.setAttribute(name, "");
+    else if (value !== false && value !== undefined) element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+export function options(select, names, chosen) {
+  select.replaceChildren(...names.map((name) => make("option", { value: name }, name)));
+  if (names.includes(chosen)) select.value = chosen;
+}
+
+const DRAWN = new Set(["svg", "path", "text", "style", "rect", "line", "g"]);
+
+export function drawing(text, label) {
+  const found = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
+  if (found.nodeName !== "svg" || [...found.querySelectorAll("*")].some((one) => !DRAWN.has(one.nodeName))) return make("p", {}, label);
+  const svg = document.importNode(found, true);
+  svg.setAttribute("role", "img");
+  svg.setAttribute("aria-label", label);
+  return svg;
+}
+
+// An integer in another radix; every other value as it is.
+export function inRadix(text, radix, bytes) {
+  if (radix === 10 || !/^-?\d+$/.test(text)) return text;
+  const number = BigInt.asUintN(8 * (bytes || 8), BigInt(text));
+  return `${radix}#${number.toString(radix).toUpperCase().padStart(radix === 16 ? 2 * (bytes || 0) : 8 * (bytes || 0), "0")}`;
+}
+
+export function save(name, text, kind = "text/plain") {
+  const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: kind })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+export function remember(key, value) {
+  sessionStorage.setItem(`fbvm.${key}`, JSON.stringify(value));
+}
+
+export function remembered(key, otherwise) {
+  try {
+    return JSON.parse(sessionStorage.getItem(`fbvm.${key}`)) ?? otherwise;
+  } catch {
+    return otherwise;
+  }
+}

@@ -1,0 +1,137 @@
+// The page of a running PLC: what it looks at, and what an update brings.
+
+import { at, make, options, remember, remembered } from "/dom.js";
+import { MemoryPanel } from "/memory.js";
+import { NetworkPanel } from "/network.js";
+import { ProgramPanel } from "/program.js";
+import { ScanTools } from "/scan.js";
+import { Connection } from "/socket.js";
+import { TrendPanel } from "/trend.js";
+import { UnitsPanel } from "/units.js";
+import { WatchPanel } from "/watch.js";
+
+const PANELS = { program: "Program", watch: "Watch", trend: "Trend", units: "Units", network: "Network", memory: "Memory",
+  acts: "What was done" };
+const isWide = () => matchMedia("(min-width: 70rem)").matches;
+
+class Page {
+  constructor() {
+    this.shown = new Set(remembered("shown", isWide() ? ["program", "watch", "trend", "acts"] : ["program"]));
+    this.plc = remembered("plc", "");
+    this.about = null;
+    this.state = {};
+    this.panels = { program: new ProgramPanel(this), watch: new WatchPanel(this), trend: new TrendPanel(this),
+      units: new UnitsPanel(this), network: new NetworkPanel(this), memory: new MemoryPanel(this) };
+    this.scan = new ScanTools(this);
+    at("tabs").append(...Object.entries(PANELS).map(([id, name], number) =>
+      make("button", { "data-panel": id, title: `${name} (${number + 1})`, on: { click: () => this.toggle(id) } }, name)));
+    at("plc").addEventListener("change", () => this.choose(at("plc").value));
+    addEventListener("keydown", (event) => this.key(event));
+    this.show();
+    this.connection = new Connection(() => this.begin(), (update) => this.update(update), (tries, has) => this.lost(tries, has));
+  }
+
+  async begin() {
+    try {
+      this.about = await this.connection.ask("hello", { version: 1 });
+    } catch (error) {
+      this.fail(error.message);
+      return;
+    }
+    this.fail("");
+    const names = this.about.plcs.map((plc) => plc.name);
+    if (!names.includes(this.plc)) this.plc = names[0];
+    options(at("plc"), names, this.plc);
+    document.title = `fbvm live: ${names.join(", ")}`;
+    at("log").replaceChildren();
+    this.scan.begin();
+    await this.choose(this.plc);
+  }
+
+  async choose(name) {
+    this.plc = name;
+    remember("plc", name);
+    this.state = {};
+    for (const panel of Object.values(this.panels)) await panel.begin(this.about.plcs.find((plc) => plc.name === name));
+    await this.look();
+  }
+
+  // Tells fbvm what the page sees: nothing else is sent.
+  async look() {
+    if (!this.about) return;
+    const seen = { plc: this.plc, names: [...this.names()], units: this.shown.has("units"), network: this.shown.has("network") };
+    if (this.shown.has("program")) Object.assign(seen, { scan: true, instance: this.panels.program.instance });
+    if (this.shown.has("memory")) Object.assign(seen, this.panels.memory.seen());
+    const found = await this.ask("look", seen);
+    if (found) this.panels.watch.told(found);
+  }
+
+  names() {
+    const names = new Set(this.panels.watch.names());
+    if (this.shown.has("program")) for (const name of this.panels.program.names()) names.add(name);
+    return [...names].slice(0, 1000);
+  }
+
+  // Asks and shows a refusal; returns undefined then.
+  async ask(what, fields = {}) {
+    try {
+      const done = await this.connection.ask(what, fields);
+      this.fail("");
+      return done;
+    } catch (error) {
+      this.fail(error.message);
+      return undefined;
+    }
+  }
+
+  fail(text) {
+    at("failure").hidden = !text;
+    at("failure").textContent = text;
+  }
+
+  lost(tries, hasToken) {
+    this.about = null;
+    at("state").textContent = "no connection";
+    at("state").dataset.state = "lost";
+    if (!hasToken) this.fail("The token is missing: open the whole address that fbvm has printed.");
+    else if (tries > 1) this.fail("fbvm does not answer; the page comes back by itself when it runs again with the same address.");
+  }
+
+  update(update) {
+    Object.assign(this.state, update);
+    this.scan.update(update, this.state);
+    for (const panel of Object.values(this.panels)) panel.update(update, this.state);
+    for (const [plc, scan, text] of update.acts ?? []) at("log").prepend(make("li", {}, `${plc}, before scan ${scan}: ${text}`));
+  }
+
+  toggle(id) {
+    if (isWide()) this.shown.has(id) ? this.shown.delete(id) : this.shown.add(id);
+    else this.shown = new Set([id]);
+    this.show();
+    this.look();
+  }
+
+  show() {
+    remember("shown", [...this.shown]);
+    for (const id of Object.keys(PANELS)) {
+      at(id).classList.toggle("shown", this.shown.has(id));
+      document.querySelector(`[data-panel=${id}]`).setAttribute("aria-pressed", this.shown.has(id));
+    }
+  }
+
+  key(event) {
+    if (event.target.closest("input, select, textarea, dialog") || event.ctrlKey || event.metaKey || event.altKey) {
+      if (event.key === "Escape") event.target.blur?.();
+      return;
+    }
+    const number = Number(event.key);
+    if (number >= 1 && number <= 7) this.toggle(Object.keys(PANELS)[number - 1]);
+    else if (event.key === "/") {
+      if (!this.shown.has("watch")) this.toggle("watch");
+      at("find").focus();
+    } else if (!this.scan.key(event)) return;
+    event.preventDefault();
+  }
+}
+
+new Page();

@@ -1,0 +1,44 @@
+// The network panel: frames with their scans, and faults that are switched on and off.
+
+import { at, make, options } from "/dom.js";
+
+const MOST_FRAMES = 500;
+
+export class NetworkPanel {
+  constructor(page) {
+    this.page = page;
+    this.frames = [];
+    at("only").addEventListener("input", () => this.draw());
+    at("break").addEventListener("click", () => page.ask("fault", { kind: at("kind").value, ...(at("peer").value.trim() ? { peer: at("peer").value.trim() } : {}) }));
+  }
+
+  begin() {
+    this.frames = [];
+    const { about } = this.page;
+    options(at("kind"), Object.keys(about.faults));
+    for (const option of at("kind").options) option.title = about.faults[option.value];
+    at("break").disabled = about.read_only || about.writable !== null;
+    this.draw();
+  }
+
+  update(update) {
+    if (update.faults) {
+      at("faults").replaceChildren(...update.faults.map((fault, number) => make("li", {}, `${fault.kind} at ${fault.peer}: ${fault.meaning} `,
+        make("button", { on: { click: () => this.page.ask("mend", { number }) }, "aria-label": `End the fault ${fault.kind}` }, "end"))));
+    }
+    if (!update.frames) return;
+    const known = new Set(this.frames.map((frame) => frame.number));
+    this.frames = [...this.frames, ...update.frames.filter((frame) => !known.has(frame.number))].slice(-MOST_FRAMES);
+    this.draw();
+  }
+
+  draw() {
+    const wanted = at("only").value.toLowerCase();
+    const rows = this.frames.filter((frame) => `${frame.from} ${frame.to} ${frame.info}`.toLowerCase().includes(wanted)).slice(-200).reverse();
+    at("frames").replaceChildren(...rows.map((frame) => make("li", {},
+      make("button", { class: "chip", title: "Look at this scan", on: { click: () => this.page.scan.view(frame.scan) } }, `scan ${frame.scan}`),
+      make("span", { class: frame.out ? "out" : "in" }, `${frame.out ? "→" : "←"} ${frame.from} to ${frame.to}`), `  ${frame.info}`,
+      frame.data ? make("code", {}, frame.data.replace(/(..)/g, "$1 ")) : "")));
+    if (!rows.length) at("frames").append(make("li", { class: "dim" }, "No frame has passed yet."));
+  }
+}

@@ -1,0 +1,87 @@
+"""A PLC as its pages see it: its recording, its source, its frames, and what somebody did to it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from contextlib import ExitStack
+from typing import Any
+
+from fbvm.live.program import Drawn, ScanView, instances
+from fbvm.machine.plc import Plc
+from fbvm.record.recording.recording import PlcRecording
+from fbvm.record.recording.scans import RecordedScans
+from fbvm.record.trace.observing import observing
+from fbvm.record.trace.packets import Dissector, Packet, add_tap
+from fbvm.record.trace.writer import descriptions, meanings, source_lines
+from fbvm.watch.names import Names
+from fbvm.wire.tap import TapEvent
+
+MOST_PACKETS = 2000
+"""Frames that are kept of a PLC, the latest ones."""
+
+
+class LivePlc:
+    """A PLC under the name that pages know, with `texts`, its sources by name, and its recording."""
+
+    def __init__(self, name: str, plc: Plc, recorded: PlcRecording, texts: Mapping[str, str]) -> None:
+        self.name, self.plc, self.recorded, self.texts = name, plc, recorded, texts
+        self.names = Names.of(plc.image, plc.memory.areas)
+        self.described, self.meanings = descriptions(plc), meanings(plc)
+        self.instances = instances(plc.image)
+        self.past = RecordedScans(recorded, source_lines(plc.image, texts))
+        self.view: ScanView | None = None
+        """What happened inside the scan that was observed last."""
+        self._drawn: Drawn = {}
+        self.wants_view = False
+        """True if the next scan is to be observed."""
+        self._observing = ExitStack()
+        self.packets: deque[tuple[int, int, Packet]] = deque(maxlen=MOST_PACKETS)
+        """Number, scan and content of frames; numbers count on."""
+        self.frames = 0
+        self._addresses = {attached.unit.address for attached in plc.units}
+        self._dissector = Dissector()
+        for network in {id(attached.network): attached.network for attached in plc.units}.values():
+            add_tap(network, self._passed)
+
+    def wish_view(self, is_paused: bool) -> None:
+        """Has the next scan observed.  With real connections only while the run is paused and goes scan by scan: Python alone
+        observes, which would take time from the peers."""
+        self.wants_view = is_paused or not self.is_real
+
+    @property
+    def is_real(self) -> bool:
+        """True if the PLC has real connections, and so real time."""
+        return not all(attached.network.virtual_time for attached in self.plc.units)
+
+    def before_scan(self) -> None:
+        """Observes the next scan if somebody wants to see inside."""
+        if self.wants_view and not self.plc.trap and not self.plc.halted:
+            self.wants_view = False
+            view = ScanView(self.plc.image, self.plc.memory.areas, self.names, self._drawn)
+            self._observing.enter_context(observing(self.plc, view))
+            self.view = view
+
+    def after_scan(self) -> None:
+        """The scan has ended: it is observed no longer."""
+        self._observing.close()
+
+    def past_view(self, scan: int) -> ScanView:
+        """What happened inside a recorded scan, which is executed again."""
+        view = ScanView(self.plc.image, self.plc.memory.areas, self.names, self._drawn)
+        self.recorded.follow(view, range(scan, scan + 1))
+        return view
+
+    def frame_rows(self, after: int, scan: int | None, most: int = 200) -> list[dict[str, Any]]:
+        """The frames with numbers from `after` on, the latest ones; with `scan` those up to this scan."""
+        rows = [(number, at, packet) for number, at, packet in self.packets if number >= after and (scan is None or at <= scan)]
+        return [{"number": number, "scan": at, "ns": packet.now_ns, "from": str(packet.source), "to": str(packet.destination),
+                 "info": packet.info, "data": packet.data[:1500].hex(),
+                 "out": packet.source.host in self._addresses} for number, at, packet in rows[-most:]]  # fmt: skip
+
+    def _passed(self, now_ns: int, unit: str, event: TapEvent) -> None:
+        """Keeps what passes at a unit of this PLC, with the number of the scan that it belongs to."""
+        if unit in self._addresses:
+            for packet in self._dissector.dissect(now_ns, event):
+                self.packets.append((self.frames, self.plc.scans, packet))
+                self.frames += 1

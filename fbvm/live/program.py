@@ -1,0 +1,164 @@
+"""What the program panel shows: the source of an instance with the variables on its lines, and its rungs and charts as they were
+executed in one scan."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from fbvm.base.types import ArrayType, Field, StructType
+from fbvm.code.image import Image
+from fbvm.machine.plc import Phase
+from fbvm.record.draw.ladder_svg import rung_svg
+from fbvm.record.draw.ladder_text import ladder_surface
+from fbvm.record.draw.power import PowerFlow, RungExecution
+from fbvm.record.draw.rung_values import RungValues
+from fbvm.record.draw.sfc_recorder import ChartCall, ChartRecorder
+from fbvm.record.draw.sfc_text import sfc_surface
+from fbvm.record.draw.table import ScanState
+from fbvm.record.trace.events import Event, Statement
+from fbvm.syntax.ladder.drawing.widths import Annotations
+from fbvm.watch.names import Names, is_single
+from fbvm.watch.paths import Place, UnknownPlace, find
+
+MOST_INSTANCES = 2000
+MOST_PICTURES = 200
+"""Rungs and charts of one instance that are drawn."""
+MOST_ON_LINE = 8
+"""Values beside one line."""
+RUNG_WIDTH = 90
+MOST_DRAWN = 2000
+"""Drawings that are kept; those with the same states and values are made once."""
+Drawn = dict[tuple[object, ...], tuple[str, str]]
+"""Headline and SVG of rungs and charts by their states."""
+_PATH = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[\s*\d+\s*\])*")
+_HIDDEN = re.compile(r"//.*|\(\*.*?\*\)|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
+"""Comments and texts on one line, in which no variable stands."""
+
+
+def instances(image: Image) -> list[dict[str, str]]:
+    """Path and type of each program and function block instance that has statements, rungs or charts of its own."""
+    kinds = {body.name.upper() for body in image.bodies}
+    return [{"path": path, "pou": kind} for path, kind in _instances(image.symbols) if kind.upper() in kinds]
+
+
+def _instances(symbols: Mapping[str, Field]) -> Iterator[tuple[str, str]]:
+    waiting = [(field.name, field.type) for field in symbols.values() if not field.reference]
+    found = 0
+    while waiting and found < MOST_INSTANCES:
+        path, kind = waiting.pop(0)
+        if isinstance(kind, ArrayType):
+            low, high = kind.bounds[0]
+            if len(kind.bounds) == 1 and isinstance(kind.element, StructType) and kind.element.block:
+                waiting += [(f"{path}[{number}]", kind.element) for number in range(low, min(high, low + 99) + 1)]
+        elif isinstance(kind, StructType):
+            if kind.block:
+                found += 1
+                yield path, kind.name
+            waiting += [(f"{path}.{field.name}", field.type) for field in kind.fields.values()
+                        if not field.reference and not field.absolute and "$" not in field.name]  # fmt: skip
+
+
+def source_of(image: Image, areas: Any, texts: Mapping[str, str], instance: str) -> dict[str, Any]:
+    """The source of an instance: file, number of the first line, and its lines, each with the names of the single values on it.
+
+    Raises UnknownPlace for what is no instance."""
+    place = find(image.symbols, areas, instance)
+    if not isinstance(place, Place) or not isinstance(place.type, StructType):
+        raise UnknownPlace(f"{instance} is no instance of a program or a function block")
+    body_name = place.type.name
+    sites = [site for site in image.sites if site.pou.upper().split(".")[0] == body_name.upper()]
+    bodies = {*(rung.body for rung in image.rungs), *(chart.body for chart in image.charts)}
+    drawn = any(image.bodies[body].name.upper() == body_name.upper() for body in bodies)
+    if not sites or sites[0].file not in texts:
+        return {"file": "", "first": 1, "lines": [], "drawn": drawn, "pou": body_name}
+    file = sites[0].file
+    rows = texts[file].split("\n")
+    first = _begin(rows, min(site.line for site in sites if site.file == file), body_name)
+    last = min(len(rows), max(site.line for site in sites if site.file == file) + 3)
+    end = next((at for at in range(max(0, last - 4), len(rows))
+                if re.match(r"\s*END_(PROGRAM|FUNCTION_BLOCK|FUNCTION|METHOD)\b", rows[at], re.I)), last - 1)  # fmt: skip
+    lines = [{"text": row, "names": list(_names_on(row, image.symbols, areas, instance))} for row in rows[first - 1 : end + 1]]
+    return {"file": file, "first": first, "lines": lines, "drawn": drawn, "pou": body_name}
+
+
+def _begin(rows: Sequence[str], line: int, pou: str) -> int:
+    """The line at which the declaration of a POU begins, whose first statement is on `line`."""
+    head = re.compile(rf"\s*(PROGRAM|FUNCTION_BLOCK|FUNCTION)\b.*\b{re.escape(pou)}\b", re.I)
+    return next((at + 1 for at in range(min(line, len(rows)) - 1, -1, -1) if head.match(rows[at])), 1)
+
+
+def _names_on(row: str, symbols: Mapping[str, Field], areas: Any, instance: str) -> Iterator[str]:
+    """The full names of the single values that a line mentions, in order, each once."""
+    seen: set[str] = set()
+    for match in _PATH.finditer(_HIDDEN.sub(" ", row)):
+        word = re.sub(r"\s", "", match[0])
+        for path in (f"{instance}.{word}", word):
+            try:
+                place = find(symbols, areas, path)
+            except (UnknownPlace, ValueError):
+                continue
+            if isinstance(place, Place) and is_single(place) and place.name not in seen and len(seen) < MOST_ON_LINE:
+                seen.add(place.name)
+                yield path
+            break
+
+
+class ScanView:
+    """A listener for one scan: which lines each instance executed, and its rungs and charts with power, as SVG."""
+
+    def __init__(self, image: Image, areas: Any, names: Names, drawn: Drawn) -> None:
+        self._image, self._names, self._drawn = image, names, drawn
+        self._values = RungValues(image, areas)
+        self._power = PowerFlow(image.rungs, lambda scan: True, self._values.keep)
+        self._charts = ChartRecorder(image.charts, lambda scan: True)
+        self.scan = -1
+        self._executed: dict[int, set[int]] = {}
+
+    def phase(self, plc: ScanState, phase: Phase) -> None:
+        """Called at the end of a phase."""
+        self._power.phase(plc, phase)
+        self._charts.phase(plc, phase)
+        if phase is Phase.INPUTS:
+            self.scan = plc.scans
+
+    def event(self, plc: ScanState, event: Event) -> None:
+        """Called for each event of the scan."""
+        self._power.event(plc, event)
+        self._charts.event(plc, event)
+        if isinstance(event, Statement):
+            self._executed.setdefault(event.frame.base, set()).add(event.site)
+
+    def of(self, instance: str) -> dict[str, Any]:
+        """What an instance did: numbers of the executed lines, and pictures with their headlines."""
+        bases = {base for base in self._executed if self._names.instance(base).upper() == instance.upper()}
+        lines = {self._image.sites[site].line for base in bases for site in self._executed[base]}
+        pictures: dict[int, tuple[str, str]] = {}
+        for made in self._power.executed:
+            if self._names.instance(made.base).upper() == instance.upper() and len(pictures) < MOST_PICTURES:
+                key = (made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items()),
+                       *sorted(made.values.items(), key=repr))  # fmt: skip
+                pictures[made.picture.site] = self._picture(key, partial(self._rung, made))
+        for called in self._charts.calls:
+            if self._names.instance(called.base).upper() == instance.upper() and len(pictures) < MOST_PICTURES:
+                key = called.picture.site, tuple(sorted(called.tested.items())), called.active
+                pictures[called.picture.site] = self._picture(key, partial(_chart, called))
+        return {"scan": self.scan, "executed": sorted(lines), "pictures": [list(pictures[site]) for site in sorted(pictures)]}
+
+    def _picture(self, key: tuple[object, ...], draw: Callable[[], tuple[str, str]]) -> tuple[str, str]:
+        """A drawing, made once for the same states and values."""
+        if key not in self._drawn:
+            if len(self._drawn) >= MOST_DRAWN:
+                self._drawn.clear()
+            self._drawn[key] = draw()
+        return self._drawn[key]
+
+    def _rung(self, made: RungExecution) -> tuple[str, str]:
+        head, surface = ladder_surface(made.picture, RUNG_WIDTH, Annotations(made.states, values=self._values.of(made)))
+        return head, rung_svg(surface) if made.picture.steps else ""
+
+
+def _chart(called: ChartCall) -> tuple[str, str]:
+    return "", rung_svg(sfc_surface(called.picture, RUNG_WIDTH, called.state))

@@ -1,0 +1,89 @@
+"""Search over all variables and addresses of a PLC, and the tree of an array or a structure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fbvm.base.types import ArrayType, EnumType, Field, StructType, base
+from fbvm.machine.plc import Plc
+from fbvm.watch.names import is_single
+from fbvm.watch.paths import Place, Span, UnknownPlace, element, find, member
+
+MOST_FOUND = 200
+MOST_PARTS = 500
+"""Elements or members that are listed of one array or structure."""
+MOST_SEARCHED = 200_000
+
+
+def search(plc: Plc, described: Mapping[str, str], text: str) -> list[dict[str, Any]]:
+    """The variables and addresses whose names, types or descriptions have all words of `text`; programs' own variables first.
+
+    What is an address or a range as it stands comes before all."""
+    found: dict[str, dict[str, Any]] = {}
+    if text.strip():
+        try:
+            place = plc.find(text.strip())
+            found[place.name] = row(place, described)
+        except (UnknownPlace, ValueError):
+            pass
+    words = text.upper().split()
+    for place in _places(plc.image.symbols):
+        if len(found) >= MOST_FOUND:
+            break
+        if all(word in f"{place.name} {place.type.name}".upper() for word in words):
+            found.setdefault(place.name, row(place, described))
+    for address, said in described.items():
+        if len(found) >= MOST_FOUND:
+            break
+        if all(word in f"{address} {said}".upper() for word in words):
+            found.setdefault(address, row(plc.find(address), described))
+    return list(found.values())
+
+
+def row(place: Place | Span, described: Mapping[str, str]) -> dict[str, Any]:
+    """What the page shows of a place beside its value: name, type, description, whether it has parts, and what it can be."""
+    if isinstance(place, Span):
+        return {"name": place.name, "type": f"{len(place.places)} x {place.places[0].type.name}", "said": "", "tree": False}
+    kind = base(place.type)
+    made: dict[str, Any] = {"name": place.name, "type": place.type.name, "said": described.get(place.name, ""),
+                            "tree": not is_single(place), "bytes": kind.size, "constant": place.constant}  # fmt: skip
+    if isinstance(kind, EnumType):
+        made["members"] = list(kind.shown.values())[:200]
+    return made
+
+
+def parts(plc: Plc, described: Mapping[str, str], name: str) -> list[dict[str, Any]]:
+    """The elements of an array, the members of a structure or an instance.  Raises UnknownPlace."""
+    place = plc.find(name)
+    if isinstance(place, Span):
+        return [row(one, described) for one in place.places[:MOST_PARTS]]
+    return [row(part, described) for part in _parts(place)]
+
+
+def _parts(place: Place) -> Iterator[Place]:
+    kind = base(place.type)
+    if isinstance(kind, ArrayType):
+        for number in range(min(kind.count, MOST_PARTS)):
+            yield element(place, kind, number)
+    elif isinstance(kind, StructType):
+        for field in list(kind.fields.values())[:MOST_PARTS]:
+            if "$" not in field.name:
+                yield member(place, field.name)
+
+
+def _places(symbols: Mapping[str, Field]) -> Iterator[Place]:
+    """All variables by breadth, so that a program's own come before those of its blocks; elements of arrays are left out, and
+    what lies behind references is not followed."""
+    areas: dict[str, Any] = {}
+    waiting = [found for field in symbols.values() if isinstance(found := find(symbols, areas, field.name), Place)]
+    count = 0
+    while waiting and count < MOST_SEARCHED:
+        level, waiting = waiting, []
+        for place in level:
+            if place.is_generated:
+                continue
+            count += 1
+            yield place
+            if isinstance(base(place.type), StructType) and not place.hops:
+                waiting += _parts(place)

@@ -1,0 +1,279 @@
+"""The PLCs of a run and all that can be done to them from a page.  Every change is kept as an act, with who and when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fbvm.live.messages import MessageError
+from fbvm.live.plcs import LivePlc
+from fbvm.machine.plc import Mode
+from fbvm.net.faults import KINDS, NAMED, Fault, fault
+from fbvm.run.interactive import Control
+from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.places import parse_for
+from fbvm.watch.values import parse_time_ns, show
+from fbvm.wire.link import Peer
+
+MOST_STEPS = 100_000
+SLOWEST, FASTEST = 0.001, 1000.0
+"""Bounds of the speed of virtual time; 0 is as fast as it goes."""
+REFUSED = (UnknownPlace, ValueError, TypeError)
+"""What an action raises whose names or values do not fit the program."""
+
+
+@dataclass(frozen=True)
+class Act:
+    """Something that was done from a page: to which PLC, before which of its scans, and as a sentence."""
+
+    plc: str
+    scan: int
+    now_ns: int
+    what: str
+    """The action's name in `messages.ACTIONS`."""
+    text: str
+    name: str = ""
+    """The variable, if it is about one."""
+    value: object = None
+    """As `Plc.write` takes it."""
+
+
+class Workbench:
+    """All PLCs of a run, their `control`, and the faults of their networks.
+
+    With `read_only` nothing can be changed; with `writable` only values of these names, and of what is inside them.
+    `remark` is told of acts that no journal knows by itself."""
+
+    def __init__(self, plcs: Sequence[LivePlc], control: Control, *, read_only: bool = False,
+                 writable: Collection[str] | None = None, remark: Callable[[str], None] = lambda text: None,
+                 test: Callable[[Sequence[Act], LivePlc, Sequence[str]], str] | None = None) -> None:  # fmt: skip
+        self.plcs = {plc.name: plc for plc in plcs}
+        self.control, self.read_only = control, read_only
+        self.writable = None if writable is None else [self._checked(name) for name in writable]
+        self._remark = remark
+        self.make_test = test
+        """Writes the acts as a pytest; None where a run cannot be repeated by one."""
+        self.acts: list[Act] = []
+        networks: dict[int, Any] = {id(unit.network): unit.network for live in plcs for unit in live.plc.units}
+        self.networks = list(networks.values())
+
+    def _checked(self, name: str) -> str:
+        """The name of a place as PLCs know it.  Raises UnknownPlace if no PLC has it."""
+        for number, live in enumerate(self.plcs.values(), 1):
+            try:
+                return live.plc.find(name).name
+            except UnknownPlace:
+                if number == len(self.plcs):
+                    raise
+        return name
+
+    def plc(self, name: str) -> LivePlc:
+        """The PLC of that name.  Raises MessageError."""
+        if name not in self.plcs:
+            raise MessageError(f"there is no PLC {name[:40]!r}; there are {', '.join(list(self.plcs)[:8])}")
+        return self.plcs[name]
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    def write(self, plc: str, name: str, value: str) -> str:
+        """Writes a value once, before the next scan; returns it as it is read now."""
+        live = self.plc(plc)
+        found = self._to_change(live, name)
+        given = parse_for(found, value)
+        live.plc.write(found, given)
+        self._note(live, "write", f"{found.name} := {_text(found, given)}", found.name, given)
+        return _text(found, live.plc.read(found))
+
+    def force(self, plc: str, name: str, value: str) -> None:
+        """Holds a value before and behind the program until it is released."""
+        live = self.plc(plc)
+        found = self._to_change(live, name)
+        if isinstance(found, Span):
+            raise MessageError(f"{found.name} is a range; force its places one by one")
+        given = parse_for(found, value)
+        live.plc.force(found.name, given)
+        self._note(live, "force", f"{found.name} forced to {_text(found, given)}", found.name, given)
+
+    def release(self, plc: str, name: str | None = None) -> None:
+        """Ends a force, or all of a PLC."""
+        live = self.plc(plc)
+        if name is None:
+            if self.writable is not None:
+                raise MessageError("with --allow-write forces are released one by one")
+            live.plc.unforce()
+            self._note(live, "release", "all forces released")
+            return
+        found = self._to_change(live, name)
+        live.plc.unforce(found.name)
+        self._note(live, "release", f"{found.name} released", found.name)
+
+    def _to_change(self, live: LivePlc, name: str) -> Place | Span:
+        """The place that a page wants to change.  Raises MessageError if it may not."""
+        found = live.plc.find(name)
+        if self.writable is not None:
+            places = found.places if isinstance(found, Span) else (found,)
+            for place in places:
+                inside = () if place.hops else self.writable  # what a reference points to may be anywhere
+                heads = tuple(f"{name}{mark}" for name in inside for mark in ".[")
+                if place.name not in self.writable and not place.name.startswith(heads):
+                    raise MessageError(f"{place.name} may not be written: --allow-write names {', '.join(self.writable)}")
+        return found
+
+    # --- the scan -----------------------------------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        self.control.pause()
+
+    def go_on(self) -> None:
+        self.control.go_on()
+
+    def step(self, scans: int) -> None:
+        """Executes so many scans of each PLC and pauses."""
+        if not 1 <= scans <= MOST_STEPS:
+            raise MessageError(f"a step has 1 to {MOST_STEPS:,} scans, not {scans}")
+        self.control.step(scans)
+
+    def speed(self, factor: float) -> None:
+        """Sets how fast virtual time passes."""
+        if any(live.is_real for live in self.plcs.values()):
+            raise MessageError("with real connections time passes as it does")
+        if factor != 0 and not SLOWEST <= factor <= FASTEST:
+            raise MessageError(f"a speed is 0, as fast as it goes, or {SLOWEST} to {FASTEST:g}")
+        self.control.speed = float(factor)
+
+    def set_mode(self, plc: str, mode: str) -> None:
+        """PROGRAM or RUN."""
+        live = self._to_control(plc)
+        try:
+            live.plc.mode = Mode(mode)
+        except ValueError:
+            raise MessageError(f"a mode is {' or '.join(one.value for one in Mode)}, not {mode[:20]!r}") from None
+        self._note(live, "mode", f"mode {mode}", value=mode)
+
+    def start(self, plc: str, kind: str) -> None:
+        """Power off and on, "warm" or "cold"."""
+        live = self._to_control(plc)
+        if kind not in ("warm", "cold"):
+            raise MessageError(f"a start is warm or cold, not {kind[:20]!r}")
+        if live.plc.halted:
+            raise MessageError("the scan stands at a breakpoint: let it go on first")
+        live.plc.warm_start() if kind == "warm" else live.plc.cold_start()
+        self._note(live, "start", f"{kind} start", value=kind)
+
+    def _to_control(self, plc: str) -> LivePlc:
+        if self.writable is not None:
+            raise MessageError("with --allow-write only values can be changed")
+        return self.plc(plc)
+
+    # --- units and network --------------------------------------------------------------------------------------------
+
+    def cable(self, plc: str, unit: str, plugged: bool) -> None:
+        """Pulls or plugs the cable of a unit: its status word says so, and nothing passes."""
+        live = self._to_control(plc)
+        found = next((attached for attached in live.plc.units if attached.unit.name == unit), None)
+        if found is None:
+            raise MessageError(f"there is no unit {unit[:40]!r} in {plc}")
+        row = Fault(Peer(found.unit.address, 0), silent=True)
+        rows = found.network.faults  # type: ignore[attr-defined]
+        if plugged:
+            rows[:] = [fault for fault in rows if fault != row]
+        elif row not in rows:
+            rows.insert(0, row)
+        settings = found.unit.settings
+        if "link_up" in settings:
+            found.unit.settings = {**settings, "link_up": plugged}
+        text = f"cable of {unit} {'plugged' if plugged else 'pulled'}"
+        self._note(live, "cable", text, unit, plugged)
+        self._remark(text)
+
+    def is_plugged(self, attached: Any) -> bool:
+        """False if somebody has pulled the cable of a unit."""
+        return Fault(Peer(attached.unit.address, 0), silent=True) not in attached.network.faults
+
+    @property
+    def faults(self) -> list[Fault]:
+        """The faults of all networks."""
+        return [row for network in self.networks for row in network.faults]
+
+    def add_fault(self, kind: str, peer: str | None = None, percent: int | None = None, time: str | None = None) -> None:
+        """Switches a fault on, for one peer or for all."""
+        self._check_free()
+        if kind not in KINDS:
+            raise MessageError(f"there is no fault {kind[:20]!r}; there are {', '.join(NAMED)}")
+        fields: dict[str, Any] = {}
+        if peer:
+            fields["peer"] = _peer(peer)
+        for name in NAMED[kind].needed:
+            fields[name] = parse_time_ns(time or "100ms") if name.endswith("_ns") else 16
+            if fields[name] <= 0:
+                raise MessageError(f"{time} is not a time that can pass")
+        if percent is not None:
+            if not 0 <= percent <= 100:
+                raise MessageError(f"{percent} is not 0 to 100 percent")
+            fields |= {"lossy": {"lose_percent": percent}, "doubled": {"duplicate_percent": percent}}.get(kind, {})
+        for network in self.networks:
+            network.faults.append(fault(kind, **fields))
+        self._note_all("fault", f"fault {kind}" + (f" at {peer}" if peer else ""))
+
+    def mend(self, number: int | None = None) -> None:
+        """Ends the fault with that number in `faults`, or all."""
+        self._check_free()
+        rows = self.faults
+        if number is not None and not 0 <= number < len(rows):
+            raise MessageError(f"there is no fault {number}")
+        for network in self.networks:
+            network.faults[:] = [] if number is None else [row for row in network.faults if row is not rows[number]]
+        self._note_all("mend", "all faults ended" if number is None else f"fault {_named(rows[number])} ended")
+
+    def _check_free(self) -> None:
+        if self.writable is not None:
+            raise MessageError("with --allow-write only values can be changed")
+        if not self.networks:
+            raise MessageError("this program has no network")
+
+    # --- acts ---------------------------------------------------------------------------------------------------------
+
+    def _note(self, live: LivePlc, what: str, text: str, name: str = "", value: object = None) -> None:
+        self.acts.append(Act(live.name, live.plc.scans, live.plc.now_ns, what, text, name, value))
+
+    def _note_all(self, what: str, text: str) -> None:
+        for live in self.plcs.values():
+            self._note(live, what, text)
+        self._remark(text)
+
+
+def _text(found: Place | Span, value: object) -> str:
+    if isinstance(found, Span):
+        return ", ".join(show(place.type, one) for place, one in zip(found.places, value, strict=True))  # type: ignore[call-overload]
+    return show(found.type, value)  # type: ignore[arg-type]
+
+
+def _peer(text: str) -> Peer:
+    """`192.168.250.1:502`, or an address alone for all its ports.  Raises MessageError."""
+    host, _, port = text.partition(":")
+    parts = host.split(".")
+    if len(parts) != 4 or not all(part.isascii() and part.isdecimal() and len(part) < 4 and int(part) < 256 for part in parts):
+        raise MessageError(f"{text[:40]!r} is no IPv4 address with a port, such as 192.168.250.1:502")
+    if port and not (port.isascii() and port.isdecimal() and len(port) < 6 and int(port) < 65536):
+        raise MessageError(f"{port[:20]!r} is no port")
+    return Peer(host, int(port or 0))
+
+
+def _named(row: Fault) -> str:
+    """The name of a fault's kind as it is known, without its peer and times."""
+    for name, kind in KINDS.items():
+        fields = [field for field in ("silent", "error", "reset", "random_cut", "segment_bytes") if getattr(kind, field)]
+        marks = [field for field in ("latency_ns", "jitter_ns", "join_ns", "lose_percent", "duplicate_percent",
+                                     "reset_after_bytes") if getattr(kind, field)]  # fmt: skip
+        same = all(getattr(row, field) == getattr(kind, field) for field in ("silent", "error", "reset", "random_cut",
+                                                                              "segment_bytes"))  # fmt: skip
+        if same and all(getattr(row, field) for field in marks) and (fields or marks):
+            return name
+    return "fault"
+
+
+def fault_rows(rows: Sequence[Fault]) -> list[dict[str, Any]]:
+    """The faults as the page lists them."""
+    return [{"kind": _named(row), "peer": "all" if row.peer.host == "0.0.0.0" else str(row.peer).removesuffix(":0"),
+             "meaning": NAMED[_named(row)].meaning if _named(row) in NAMED else ""} for row in rows]  # fmt: skip

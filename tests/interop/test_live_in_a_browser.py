@@ -1,0 +1,233 @@
+"""The live page in a real browser against PLCs that run: Chromium through playwright, where both are there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.slow
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+PUMP = """
+PROGRAM Main
+VAR
+    Level : INT := 20;      (* <script>document.title = 'broken'</script> *)
+    Pump, Hand : BOOL;
+    High AT D10 : INT := 90;
+    Said : STRING[60] := '<img src=x onerror=document.title=1>';
+END_VAR
+IF Level >= High THEN Pump := TRUE; ELSIF Level <= 10 THEN Pump := FALSE; END_IF
+IF Hand THEN
+    Level := 0;
+ELSIF Pump THEN
+    Level := Level - 2;
+ELSE
+    Level := Level + 1;
+END_IF
+END_PROGRAM
+"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'fbvm[browser]'")
+    program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if program is None:
+        pytest.skip(f"needs a browser: {' or '.join(BROWSERS)}")
+    with playwright.sync_playwright() as running:
+        root = hasattr(os, "geteuid") and os.geteuid() == 0
+        started = running.chromium.launch(executable_path=program, args=["--no-sandbox"] if root else [])
+        yield started
+        started.close()
+
+
+class Live:
+    """`fbvm live` in a process of its own, and its page in windows."""
+
+    def __init__(self, browser: Any, folder: Path, text: str, *options: str) -> None:
+        file = folder / "pump.st"
+        file.write_text(text)
+        self._browser = browser
+        self.process = subprocess.Popen([sys.executable, "-m", "fbvm", "live", str(file), *options], stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True)  # fmt: skip
+        assert self.process.stdout is not None
+        self.url = self.process.stdout.readline().strip()
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#token=[\w-]{32,}", self.url), self.process.stderr
+        self.complaints: list[str] = []
+
+    def window(self, url: str = "", **settings: Any) -> Any:
+        """The page in a window of its own; what it complains about is in `complaints`."""
+        page = self._browser.new_context(**{"viewport": {"width": 1400, "height": 1000}, **settings}).new_page()
+        page.set_default_timeout(20_000)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("console", lambda message: self.complaints.append(message.text) if message.type == "error" else None)
+        page.goto(url or self.url)
+        return page
+
+    def close(self) -> None:
+        for context in self._browser.contexts:
+            context.close()
+        self.process.terminate()
+        self.process.communicate(timeout=30)
+
+
+@pytest.fixture
+def live(browser: Any, tmp_path: Path) -> Iterator[Any]:
+    made: list[Live] = []
+
+    def start(*options: str, text: str = PUMP) -> Live:
+        made.append(Live(browser, tmp_path, text, *options))
+        return made[-1]
+
+    yield start
+    for one in made:
+        one.close()
+
+
+def watch(page: Any, name: str) -> Any:
+    """Searches a name and watches it; returns its row."""
+    page.fill("#find", name)
+    page.locator("#found button").first.wait_for()
+    page.press("#find", "Enter")
+    row = page.locator(f"#watched tr[data-name='{name}']")
+    row.wait_for()
+    return row
+
+
+def value(row: Any, text: str) -> None:
+    row.locator(".value", has_text=re.compile(f"^{re.escape(text)}$")).wait_for()
+
+
+def state(page: Any, name: str) -> None:
+    page.locator(f"#state[data-state={name}]").wait_for()
+
+
+def test_values_are_seen_written_held_and_released(live: Any) -> None:
+    run = live()
+    page = run.window()
+    state(page, "run")
+    level = watch(page, "Main.Level")
+    hand = watch(page, "Main.Hand")
+    value(hand, "FALSE")
+    hand.get_by_role("button", name="Write the other value into").click()
+    value(hand, "TRUE")
+    value(level, "0")
+    level.locator("input").fill("77")
+    level.locator("input").press("Shift+Enter")
+    level.locator(".value.forced").wait_for()
+    assert page.locator(".chip.forced").count() >= 1
+    level.get_by_role("button", name="End the force of").click()
+    level.locator(".value:not(.forced)").wait_for()
+    level.locator("input").fill("a word")
+    level.locator("input").press("Enter")
+    page.locator("#failure:not([hidden])").wait_for()
+    assert "Main.Level" in page.locator("#failure").inner_text()
+    assert page.locator("#log li").count() == 3
+    assert page.title() == "fbvm live: pump" and page.locator("#source img, #source script").count() == 0
+    assert run.complaints == []
+
+
+def test_the_scan_is_paused_stepped_and_taken_back_by_keys(live: Any) -> None:
+    run = live("--paused")
+    page = run.window()
+    state(page, "pause")
+    level = watch(page, "Main.Level")
+    value(level, "20")
+    page.locator("#where").click()
+    for _ in range(3):
+        page.keyboard.press("s")
+        page.wait_for_timeout(0)
+    value(level, "23")
+    page.keyboard.press("ArrowLeft")
+    state(page, "past")
+    value(level, "22")
+    page.keyboard.press("ArrowLeft")
+    value(level, "21")
+    page.keyboard.press("End")
+    state(page, "pause")
+    value(level, "23")
+    page.locator("#source tr.executed").first.wait_for()
+    level.get_by_role("button", name="Which statement gave its value to").click()
+    page.locator("#cause", has_text="Level := Level + 1").wait_for()
+    assert run.complaints == []
+
+
+def test_a_reload_comes_back_to_what_was_watched_and_two_pages_see_one_plc(live: Any) -> None:
+    run = live("--paused")
+    page, other = run.window(), run.window()
+    watch(page, "Main.Level")
+    page.reload()
+    value(page.locator("#watched tr[data-name='Main.Level']"), "20")
+    other_row = watch(other, "Main.Level")
+    row = page.locator("#watched tr[data-name='Main.Level']")
+    row.locator("input").fill("55")
+    row.locator("input").press("Enter")
+    value(other_row, "55")
+    other.locator("#log li", has_text="Main.Level := 55").wait_for()
+    assert run.complaints == []
+
+
+def test_a_cable_is_pulled_and_a_fault_switched_on(live: Any) -> None:
+    page = (run := live()).window()
+    state(page, "run")
+    page.click("[data-panel=units]")
+    page.get_by_role("button", name="pull the cable").click()
+    page.locator("#backplane h3", has_text="cable pulled").wait_for()
+    page.click("[data-panel=network]")
+    page.select_option("#kind", "slow")
+    page.fill("#peer", "192.168.250.1:502")
+    page.click("#break")
+    page.locator("#faults li", has_text="slow at 192.168.250.1:502").wait_for()
+    assert run.complaints == []
+
+
+def test_without_the_token_nothing_is_shown(live: Any) -> None:
+    run = live()
+    page = run.window(run.url.partition("#")[0])
+    page.locator("#failure", has_text="The token is missing").wait_for()
+    assert page.locator("#source td").count() == 0
+
+
+def test_read_only_pages_only_look(live: Any) -> None:
+    page = live("--read-only").window()
+    level = watch(page, "Main.Level")
+    assert level.get_by_role("button", name="Write once").is_disabled() and page.locator("#pause").is_disabled()
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1400, "dark"), (2560, "light")])
+def test_no_panel_is_wider_than_the_window(live: Any, width: int, scheme: str) -> None:
+    page = live().window(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    state(page, "run")
+    for panel in ("watch", "trend", "units", "network", "memory", "acts"):
+        page.click(f"[data-panel={panel}]")
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), panel
+
+
+def test_every_control_has_a_name_for_screen_readers(live: Any) -> None:
+    page = live().window()
+    watch(page, "Main.Level")
+    for panel in ("units", "network", "memory"):
+        page.click(f"[data-panel={panel}]")
+    nameless = page.evaluate("""[...document.querySelectorAll('button, input, select')]
+        .filter((one) => !(one.textContent.trim() || one.getAttribute('aria-label') || one.title || one.labels?.length))
+        .map((one) => one.outerHTML)""")
+    assert nameless == []
+
+
+def test_a_thousand_signals_are_watched(live: Any) -> None:
+    text = """PROGRAM Main VAR a : ARRAY[1..1000] OF INT; i : INT; END_VAR
+        FOR i := 1 TO 1000 DO a[i] := a[i] + 1; END_FOR END_PROGRAM"""
+    page = (run := live("--speed", "100", text=text)).window()
+    state(page, "run")
+    row = watch(page, "Main.a")
+    row.get_by_role("button", name="Watch the parts of").click()
+    page.locator("#watched tr").nth(500).wait_for()
+    page.locator("#where", has_text=re.compile(r"scan \d{4,}")).wait_for()
+    assert run.complaints == []

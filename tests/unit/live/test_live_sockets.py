@@ -1,0 +1,107 @@
+"""The server of the live page on real sockets: dead, slow and many browsers cost nothing, and all of it ends."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Iterator
+
+import pytest
+from browsers import Page, frame
+
+from fbvm.live.host import LiveHost
+from fbvm.live.session import UPDATE_NS
+from fbvm.live.sockets import IDLE_SERVES, MOST_CONNECTIONS
+
+WAIT_NS = 2_000_000_000
+
+
+@pytest.fixture
+def host() -> Iterator[LiveHost]:
+    made = LiveHost(Page().bench, token="t")
+    yield made
+    made.close()
+
+
+def called(host: LiveHost) -> socket.socket:
+    """A browser's socket, accepted by the server."""
+    made = socket.create_connection(("127.0.0.1", host.server.guard.port))
+    host.serve(WAIT_NS)
+    return made
+
+
+def opened(host: LiveHost) -> socket.socket:
+    """A browser's socket whose WebSocket is open and whose page has said hello."""
+    sock, name = called(host), f"127.0.0.1:{host.server.guard.port}"
+    sock.sendall(f"GET /live?token=t HTTP/1.1\r\nHost: {name}\r\nOrigin: http://{name}\r\n"
+                 "Upgrade: websocket\r\nConnection: Upgrade\r\n"
+                 "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())  # fmt: skip
+    host.serve(WAIT_NS)
+    assert sock.recv(4096).startswith(b"HTTP/1.1 101 ")
+    sock.sendall(frame(json.dumps({"id": 1, "do": "hello"}).encode()))
+    host.serve(WAIT_NS)
+    return sock
+
+
+def test_a_page_is_opened_and_asks(host: LiveHost) -> None:
+    with opened(host) as sock:
+        assert b'"re":1' in sock.recv(65536)
+        assert len(host.server.sessions) == 1
+
+
+def test_a_browser_that_goes_without_a_word_is_forgotten(host: LiveHost) -> None:
+    with opened(host) as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    host.serve(WAIT_NS)
+    assert host.server.sessions == []
+
+
+def test_a_browser_that_never_reads_gets_one_update_and_holds_nothing_up(host: LiveHost) -> None:
+    with opened(host):
+        live = host.workbench.plcs["pump"]
+        for number in range(1, 200):
+            live.plc.scan()
+            host.update(number * UPDATE_NS)
+        assert len(host.server.sessions) == 1
+
+
+def test_callers_who_say_nothing_are_sent_away(host: LiveHost) -> None:
+    with called(host) as sock:
+        sock.settimeout(5)
+        for _ in range(IDLE_SERVES + 1):
+            host.serve(0)
+        assert sock.recv(10) == b""
+
+
+def test_there_are_so_many_connections_and_no_more(host: LiveHost) -> None:
+    callers = [called(host) for _ in range(MOST_CONNECTIONS)]
+    try:
+        with called(host) as late:
+            late.settimeout(5)
+            assert late.recv(10) == b""
+    finally:
+        for caller in callers:
+            caller.close()
+
+
+def test_who_hangs_up_inside_a_request_leaves_nothing(host: LiveHost) -> None:
+    with called(host) as sock:
+        sock.sendall(b"GET / HT")
+        host.serve(WAIT_NS)
+    host.serve(WAIT_NS)
+    host.serve(0)
+    with opened(host):
+        assert len(host.server.sessions) == 1
+
+
+def test_a_file_comes_whole_over_a_socket(host: LiveHost) -> None:
+    with called(host) as sock:
+        sock.settimeout(5)
+        sock.sendall(f"GET /main.js HTTP/1.1\r\nHost: localhost:{host.server.guard.port}\r\n\r\n".encode())
+        host.serve(WAIT_NS)
+        answer = b""
+        while piece := sock.recv(65536):
+            answer += piece
+            host.serve(0)
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert f"Content-Length: {len(body)}".encode() in head and body.endswith(b"new Page();\n")

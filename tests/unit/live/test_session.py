@@ -1,0 +1,229 @@
+"""What a page sees and does, in virtual time and without a browser: messages in, messages out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from browsers import Page
+
+from fbvm import Plc
+from fbvm.live.plcs import LivePlc
+from fbvm.live.pytest_text import pytest_text
+from fbvm.live.session import UPDATE_NS
+
+
+@pytest.fixture
+def page() -> Page:
+    made = Page()
+    made.done("hello", version=1)
+    return made
+
+
+def test_only_what_is_seen_is_sent_and_only_when_it_changes(page: Page) -> None:
+    page.done("look", plc="pump", names=["Main.Level", "D10"])
+    first = page.update()
+    assert first["values"] == {"Main.Level": "20", "D10": "90"}
+    assert not {"memory", "units", "frames", "inside"} & set(first)
+    page.scan()
+    assert page.update()["values"] == {"Main.Level": "21"}
+    assert page.update() == {}
+
+
+def test_updates_are_100_ms_apart(page: Page) -> None:
+    assert page.session.update(UPDATE_NS) is not None
+    page.ask("ready")
+    page.scan()
+    assert page.session.update(2 * UPDATE_NS - 1) is None
+    assert page.session.update(2 * UPDATE_NS) is not None
+
+
+def test_a_name_that_does_not_exist_is_said_and_the_others_are_shown(page: Page) -> None:
+    found = page.done("look", plc="pump", names=["Main.Levl", "Main.Level", "D10..D12"])
+    assert list(found["unknown"]) == ["Main.Levl"]
+    assert page.update()["values"] == {"Main.Level": "20", "D10..D12": "[90, 0, 0]"}
+
+
+def test_a_value_is_written_once_and_the_program_goes_on_with_it(page: Page) -> None:
+    assert page.done("write", plc="pump", name="Main.Level", value="50") == {"value": "50"}
+    page.scan()
+    assert page.plc.read("Main.Level") == 51
+
+
+def test_a_force_holds_until_it_is_released_and_is_shown_where_it_acts(page: Page) -> None:
+    page.done("force", plc="pump", name="main.level", value="5")
+    page.scan(3)
+    assert page.plc.read("Main.Level") == 5
+    assert page.update()["forces"] == {"Main.Level": "5"}
+    page.done("release", plc="pump", name="Main.Level")
+    page.scan()
+    assert page.plc.read("Main.Level") == 6
+    assert page.update()["forces"] == {}
+
+
+def test_search_finds_names_types_addresses_and_words_of_units(page: Page) -> None:
+    def names(text: str) -> list[str]:
+        return [row["name"] for row in page.done("search", plc="pump", text=text)["found"]]
+
+    assert names("leve") == ["Main.Level"]
+    assert names("bool pump") == ["Main.Pump"]
+    assert names("D100..D102")[0] == "D100..D102"
+    assert any("CIO 15" in name for name in names("send request"))
+
+
+def test_an_array_opens_into_its_elements(page: Page) -> None:
+    parts = page.done("parts", plc="pump", name="Main.Curve")["parts"]
+    assert [part["name"] for part in parts] == ["Main.Curve[1]", "Main.Curve[2]", "Main.Curve[3]"]
+    assert "Main.Level" in [part["name"] for part in page.done("parts", plc="pump", name="Main")["parts"]]
+
+
+def test_the_source_has_the_values_that_stand_on_each_line(page: Page) -> None:
+    found = page.done("source", plc="pump", instance="Main")
+    line = next(line for line in found["lines"] if line["text"].startswith("IF Pump"))
+    assert line["names"] == ["Main.Pump", "Main.Level"]
+
+
+def test_an_observed_scan_says_which_lines_it_executed(page: Page) -> None:
+    page.done("look", plc="pump", names=[], instance="Main", scan=True)
+    page.scan(2)
+    found = page.done("source", plc="pump", instance="Main")
+    texts = {found["first"] + at: line["text"] for at, line in enumerate(found["lines"])}
+    executed = [texts[number] for number in page.update()["inside"]["executed"]]
+    assert any("Curve[1] := Level" in text for text in executed)
+
+
+def test_the_past_is_looked_at_and_not_written(page: Page) -> None:
+    page.done("look", plc="pump", names=["Main.Level"])
+    page.scan(30)
+    page.done("view", plc="pump", scan=9)
+    update = page.update()
+    assert (update["state"], update["scan"], update["values"]) == ("past", 9, {"Main.Level": "30"})
+    assert "past" in page.ask("write", plc="pump", name="Main.Level", value="1")["error"]
+    page.done("view", plc="pump")
+    assert page.update()["values"] == {"Main.Level": "50"}
+    assert "recorded" in page.ask("view", plc="pump", scan=99)["error"]
+
+
+def test_history_has_every_one_of_the_last_scans(page: Page) -> None:
+    page.scan(30)
+    found = page.done("history", plc="pump", names=["Main.Level", "Main.Pump"], scans=4)
+    assert (found["first"], found["values"]) == (26, {"Main.Level": ["47", "48", "49", "50"], "Main.Pump": ["FALSE"] * 4})
+    assert found["times"][1] - found["times"][0] == page.plc.cycle_ns
+
+
+def test_why_names_the_statement_that_gave_a_value(page: Page) -> None:
+    page.scan(80)
+    text = page.done("why", plc="pump", name="Main.Pump")["text"]
+    assert "Main.Pump" in text and "Level >= High" in text
+
+
+def test_a_pulled_cable_lets_nothing_pass_and_the_unit_says_so(page: Page) -> None:
+    page.done("look", plc="pump", names=[], units=True)
+    [unit] = page.update()["units"]
+    assert (unit["name"], unit["plugged"]) == ("ETN21 0", True)
+    page.done("cable", plc="pump", unit="ETN21 0", plugged=False)
+    page.scan(2)
+    [unit] = page.update()["units"]
+    assert not unit["plugged"] and page.network.faults[0].silent and not page.plc.units[0].unit.settings["link_up"]
+    page.done("cable", plc="pump", unit="ETN21 0", plugged=True)
+    assert page.network.faults == [] and page.plc.units[0].unit.settings["link_up"]
+
+
+def test_faults_are_switched_on_and_off_by_name(page: Page) -> None:
+    page.done("look", plc="pump", names=[], network=True)
+    page.done("fault", kind="slow", peer="192.168.250.1:502", time="30ms")
+    page.done("fault", kind="lossy", percent=50)
+    assert [row.lose_percent for row in page.network.faults] == [0, 50] and page.network.faults[0].latency_ns == 30_000_000
+    assert [(row["kind"], row["peer"]) for row in page.update()["faults"]] == [("slow", "192.168.250.1:502"), ("lossy", "all")]
+    page.done("mend", number=0)
+    assert [row.lose_percent for row in page.network.faults] == [50]
+    page.done("mend")
+    assert page.network.faults == []
+
+
+def test_memory_is_shown_from_a_word_on(page: Page) -> None:
+    page.plc.write("D201", 7)
+    page.done("look", plc="pump", names=[], memory="D", first=200)
+    assert page.update()["memory"]["words"][:3] == [0, 7, 0]
+
+
+def test_a_trap_is_shown_and_a_start_ends_it() -> None:
+    page = Page("PROGRAM Main VAR a, b : INT; END_VAR a := 1 / b; END_PROGRAM")
+    page.done("hello")
+    page.scan()
+    assert (update := page.update())["state"] == "trap" and "Main" in update["trap"]
+    page.done("start", plc="pump", kind="warm")
+    assert page.update()["state"] == "run"
+
+
+def test_modes_and_starts_are_acts(page: Page) -> None:
+    page.scan(5)
+    page.done("mode", plc="pump", mode="PROGRAM")
+    page.scan(5)
+    assert page.plc.read("Main.Level") == 25
+    page.done("start", plc="pump", kind="cold")
+    assert page.plc.read("Main.Level") == 20
+    assert [text for _, _, text in page.update()["acts"]] == ["mode PROGRAM", "cold start"]
+
+
+def test_two_pages_see_the_same_plc_and_what_the_other_did(page: Page) -> None:
+    from fbvm.live.session import Session
+
+    other = Session(page.bench)
+    other.answer('{"do":"hello"}')
+    page.done("write", plc="pump", name="Main.Level", value="70")
+    text = other.update(UPDATE_NS)
+    assert text is not None and "Main.Level := 70" in text
+
+
+def test_what_was_done_by_hand_becomes_a_pytest_that_passes(tmp_path: Any) -> None:
+    from browsers import PUMP
+
+    source = tmp_path / "pump.st"
+    source.write_text(PUMP)
+
+    def made(acts: Any, live: LivePlc, seen: Any) -> str:
+        return pytest_text(acts, live, seen, [source])
+
+    page = Page(test=made)
+    page.done("hello")
+    page.done("look", plc="pump", names=["Main.Level", "Main.Pump", "Main.Said"])
+    page.scan(7)
+    page.done("write", plc="pump", name="Main.Level", value="88")
+    page.scan(2)
+    page.done("force", plc="pump", name="Main.Pump", value="FALSE")
+    page.scan(5)
+    page.done("release", plc="pump", name="Main.Pump")
+    page.done("fault", kind="silent")
+    page.scan(3)
+    text = page.done("test", plc="pump")["text"]
+    assert "plc.write('Main.Level', 88)" in text and "# not repeated: fault silent" in text
+    space: dict[str, Any] = {}
+    exec(compile(text, "test_by_hand.py", "exec"), space)
+    space["test_what_was_done_by_hand"]()
+
+
+def test_every_act_is_in_the_journal(tmp_path: Any) -> None:
+    import io
+
+    from browsers import PUMP
+
+    from fbvm import Journal, Recording, compile_text
+    from fbvm.live.session import Session
+    from fbvm.live.workbench import Workbench
+    from fbvm.run.interactive import Control
+
+    file = io.StringIO()
+    image = compile_text(PUMP).image
+    assert image is not None
+    journal = Journal(file)
+    plc = Plc(image, journal=journal)
+    live = LivePlc("pump", plc, Recording().add("pump", plc), {})
+    session = Session(Workbench([live], Control(), remark=journal.remark))
+    session.answer('{"do":"write","plc":"pump","name":"Main.Level","value":"70"}')
+    plc.scan()
+    session.answer('{"do":"force","plc":"pump","name":"Main.Pump","value":"TRUE"}')
+    plc.scan()
+    journal.close()
+    lines = file.getvalue().splitlines()
+    assert "Main.Level := 70" in lines[1] and '"force":{"Main.Pump":true}' in lines[2]
