@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from io import BytesIO, StringIO, TextIOWrapper
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named
-from fbvm.cli.shared.traces import SUFFIX, open_trace, scans_option, trace_options, waveforms_of
+from fbvm.cli.shared.traces import SUFFIX, open_trace, require_scans, samples_of, scans_option, trace_options, waveforms_of
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd
@@ -31,20 +32,21 @@ Names = Sequence[str]
 
 
 def _csv(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
-    made = waveforms_of(trace, names, scans)
+    found = samples_of(trace, names, scans)
     with new_file(path) as file:
         text = TextIOWrapper(file, encoding="utf-8", newline="")
-        write_csv(made, text)
+        write_csv(found, text)
         text.detach()
 
 
 def _vcd(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
-    text = StringIO()
-    try:
-        write_vcd(waveforms_of(trace, names, scans), text)
-    except ModuleNotFoundError:
-        raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
-    write_file(path, text.getvalue().encode("ascii", "replace"))
+    if find_spec("vcd") is None:
+        raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'")
+    found = samples_of(trace, names, scans)
+    with new_file(path) as file:
+        text = TextIOWrapper(file, encoding="ascii", errors="replace", newline="\n")
+        write_vcd(found, text)
+        text.detach()
 
 
 def _svg(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
@@ -53,7 +55,7 @@ def _svg(trace: ScanSource, names: Names, scans: range | None, path: Path) -> No
 
 
 def _html(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
-    waveforms_of(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
+    require_scans(trace, scans)
     write_file(path, page(page_data(trace, names, scans, path.stem)))
 
 
