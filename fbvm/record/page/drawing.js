@@ -32,7 +32,7 @@ class Drawing {
 
   /** One column of dots after another; neighbours with the same single value are one piece. */
   rough(signal, y, from, to, x) {
-    const step = (to - from) / Math.max(1, Math.round(x(to) - x(from))), {column} = signal;
+    const step = (to - from) / Math.max(1, Math.round(x(to) - x(from))), {column} = signal, busy = [];
     let begun = -1, held = NaN;
     const end = at => {
       if (begun >= 0) this.piece(signal, y, x(begun), x(at), column.at(begun), begun > from);
@@ -47,24 +47,30 @@ class Drawing {
         continue;
       }
       end(first);
-      this.busy(signal, y, x(first), low, high);
+      busy.push(x(first), low, high);
     }
     end(to);
+    this.busy(signal, y, busy);
   }
 
-  /** A column of dots in which a signal had several values. */
-  busy(signal, y, x, low, high) {
-    const {pen} = this;
+  /** Columns of dots in which a signal had several values: x, least, greatest value, x, ...  One colour after the other. */
+  busy(signal, y, columns) {
+    const {pen} = this, foot = y + ROW - 5;
     if (signal.isLevel) {
-      const top = this.level(signal, high), foot = this.level(signal, low);
       pen.fillStyle = this.colour.fill;
-      pen.fillRect(x, y + ROW - 5 - top, 1, top + 1);
+      for (let at = 0; at < columns.length; at += 3) {
+        const top = this.level(signal, columns[at + 2]);
+        pen.fillRect(columns[at], foot - top, 1, top + 1);
+      }
       pen.fillStyle = this.colour.word;
-      pen.fillRect(x, y + ROW - 5 - top, 1, Math.max(1.5, top - foot));
+      for (let at = 0; at < columns.length; at += 3) {
+        const top = this.level(signal, columns[at + 2]);
+        pen.fillRect(columns[at], foot - top, 1, Math.max(1.5, top - this.level(signal, columns[at + 1])));
+      }
     } else {
       pen.fillStyle = signal.bit ? this.colour.on : this.colour.word;
       pen.globalAlpha = .45;
-      pen.fillRect(x, y + 5, 1, ROW - 11);
+      for (let at = 0; at < columns.length; at += 3) pen.fillRect(columns[at], y + 5, 1, ROW - 11);
       pen.globalAlpha = 1;
     }
   }
