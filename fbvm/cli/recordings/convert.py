@@ -15,7 +15,16 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named
-from fbvm.cli.shared.traces import SUFFIX, open_trace, require_scans, samples_of, scans_option, trace_options, waveforms_of
+from fbvm.cli.shared.traces import (
+    SUFFIX,
+    ScanRange,
+    open_trace,
+    require_scans,
+    samples_of,
+    scans_option,
+    trace_options,
+    waveforms_of,
+)
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd
@@ -27,7 +36,7 @@ from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.signals import network_events, packets
 from fbvm.record.trace.writer import Depth
 
-CSV = ".csv"
+CSV, HTML = ".csv", ".html"
 Names = Sequence[str]
 
 
@@ -54,9 +63,9 @@ def _svg(trace: ScanSource, names: Names, scans: range | None, path: Path) -> No
     write_file(path, SvgChart(made, packets(trace, made.scans), path.stem).text())
 
 
-def _html(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
+def _html(trace: ScanSource, names: Names, scans: range | None, path: Path, inside: Sequence[range] = ()) -> None:
     require_scans(trace, scans)
-    write_file(path, page(page_data(trace, names, scans, path.stem)))
+    write_file(path, page(page_data(trace, names, scans, path.stem, inside=inside)))
 
 
 def _pcapng(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
@@ -71,7 +80,7 @@ def _pcapng(trace: ScanSource, names: Names, scans: range | None, path: Path) ->
 
 
 FORMATS: dict[str, Callable[[ScanSource, Names, range | None, Path], None]] = {
-    ".html": _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd, ".pcapng": _pcapng,
+    HTML: _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd, ".pcapng": _pcapng,
 }  # fmt: skip
 
 
@@ -81,8 +90,10 @@ FORMATS: dict[str, Callable[[ScanSource, Names, range | None, Path], None]] = {
 @click.argument("names", nargs=-1, metavar="[NAME|ADDRESS|FIRST..LAST]...")
 @scans_option
 @trace_options
+@click.option("--inside", type=ScanRange(), multiple=True,
+              help="Scans that a page shows statement by statement even if it cannot do so for all; may be given several times.")
 def command(source: Path, target: Path, names: tuple[str, ...], scans: range | None, plc: str | None,
-            libraries: tuple[Path, ...]) -> None:  # fmt: skip
+            libraries: tuple[Path, ...], inside: tuple[range, ...]) -> None:  # fmt: skip
     """Write a trace as a page that shows all of it, a picture, or a table; or a table as a trace.
 
     \b
@@ -93,6 +104,8 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
     .pcapng  what passed the network, for Wireshark
 
     Without names, all variables that changed are written."""
+    if inside and target.suffix.lower() != HTML:
+        raise click.UsageError(f"--inside is about pages; {named(target)} is none")
     with writing(target):
         if source.suffix.lower() == CSV:
             _to_trace(source, target)
@@ -102,7 +115,11 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
             raise click.UsageError(f"{named(target)}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
         depth = None if write is _html else Depth.SCANS
         with open_trace(source, plc, libraries, depth) as trace:
-            write(trace, [name for text in names for name in split_names(text)], scans, target)
+            chosen = [name for text in names for name in split_names(text)]
+            if inside:
+                _html(trace, chosen, scans, target, inside)
+            else:
+                write(trace, chosen, scans, target)
 
 
 def _to_trace(source: Path, target: Path) -> None:
