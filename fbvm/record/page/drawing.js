@@ -1,7 +1,7 @@
 // How the values of one signal are drawn: scan by scan where there is room, else a column of the picture for several scans.
 
 const ROW = 26;
-const MOST_SCANS_A_DOT = 4;
+const MOST_SCANS_A_DOT = .5;
 
 class Drawing {
   /** `x` gives the place of a scan in the picture, `from` and `to` are those that are seen, of all that there are. */
@@ -35,11 +35,16 @@ class Drawing {
     const step = (to - from) / Math.max(1, Math.round(x(to) - x(from))), {column} = signal, busy = [];
     let begun = -1, held = NaN;
     const end = at => {
-      if (begun >= 0) this.piece(signal, y, x(begun), x(at), column.at(begun), begun > from);
+      if (begun < 0) return;
+      const left = x(begun), right = x(at);
+      if (signal.isLevel && right - left < 1.5) busy.push(left, held, held);
+      else this.piece(signal, y, left, right, column.at(begun), begun > from);
       begun = -1;
     };
     for (let at = from; at < to; at += step) {
-      const first = Math.floor(at), [low, high] = column.extremes(first, Math.min(to, Math.max(first + 1, Math.floor(at + step))));
+      const first = Math.floor(at);
+      column.extremes(first, Math.min(to, Math.max(first + 1, Math.floor(at + step))));
+      const low = column.least, high = column.most;
       if (low === high) {
         if (begun >= 0 && low !== held) end(first);
         if (begun < 0) begun = first;
