@@ -30,10 +30,10 @@ from fbvm.record.recording.file_reader import RecordingFile  # noqa: E402
 from fbvm.record.recording.file_writer import Described, RecordingWriter  # noqa: E402
 from fbvm.record.recording.program_text import ProgramText  # noqa: E402
 from fbvm.record.recording.recording import Recording  # noqa: E402
+from fbvm.record.recording.scans import RecordedScans  # noqa: E402
 from fbvm.record.trace.events import Event  # noqa: E402
 from fbvm.record.trace.observing import observing  # noqa: E402
-from fbvm.record.trace.reader import Trace  # noqa: E402
-from fbvm.record.trace.writer import Depth, TraceWriter  # noqa: E402
+from fbvm.record.trace.writer import Depth, TraceWriter, source_lines  # noqa: E402
 
 PROGRAM = Path(__file__).parent / "programs" / "lines100.st"
 SCANS = 10_000
@@ -133,15 +133,25 @@ def recorded(image: Image, scans: int) -> None:
         taken = seconds(lambda plc=plc: plc.run(scans=scans)) + seconds(writer.close)
         row(f"added by recording {scans} scans, depth {depth.value}", f"{taken - plain:.2f} s", f"<= {0.3 * share:.2g} s")
         row("  size", f"{writer.size_bytes / 1e6:.2f} MB", f"<= {1 + 20e-6 * scans:.2f} MB")
-        text = ""
 
-        def make(file: io.BytesIO = file) -> None:
-            nonlocal text
-            text = page(page_data(Trace(io.BytesIO(file.getvalue())), title="lines100"))
 
-        row("  a page of it, made in", f"{seconds(make):.1f} s", f"<= {2 * share:.2g} s")
-        row("  a page of it, size", f"{len(text) / 1e6:.2f} MB", f"<= {3 * share:.2g} MB")
-        opening(text)
+def paged(image: Image, scans: int) -> None:
+    """A page of a run that was recorded in memory."""
+    plc, text = Plc(image), ""
+    recorded = Recording().add("lines100", plc)
+    plc.run(scans=scans)
+    lines = source_lines(image, {"lines100.st": PROGRAM.read_text(encoding="utf-8")})
+
+    def make() -> None:
+        nonlocal text
+        data = page_data(RecordedScans(recorded, lines), title="lines100")
+        windows = ", ".join(f"{first} to {last}" for first, last in data.head["windows"])
+        row("  scans of which it has each statement", windows)
+        text = page(data)
+
+    row(f"a page of {scans} scans, made in", f"{seconds(make):.1f} s", f"<= {max(1, scans / SCANS) * 2:.2g} s")
+    row("  size", f"{len(text) / 1e6:.2f} MB", "<= 3 MB")
+    opening(text)
 
 
 def shown(image: Image, scans: int) -> None:
@@ -187,7 +197,7 @@ def opening(text: str) -> None:
     """A page, opened by a browser where playwright and one are there."""
     program = shutil.which("chromium") or shutil.which("google-chrome")
     if program is None or find_spec("playwright") is None:
-        row("  a page of it, opens in", "not measured", "<= 1 s, needs playwright and chromium")
+        row("  opens in", "not measured", "<= 1 s, needs playwright and chromium")
         return
     from playwright.sync_api import sync_playwright
 
@@ -203,8 +213,8 @@ def opening(text: str) -> None:
         for _ in range(100):
             there.keyboard.press("ArrowRight")
         there.wait_for_function("document.getElementById('where').textContent.startsWith('scan 100,')")
-        row("  a page of it, opens in", f"{opened - begun:.2f} s", "<= 1 s")
-        row("  a step of its cursor", f"{(time.monotonic() - opened) * 10:.1f} ms")
+        row("  opens in", f"{opened - begun:.2f} s", "<= 1 s")
+        row("  a step of the cursor", f"{(time.monotonic() - opened) * 10:.1f} ms")
         browser.close()
 
 
@@ -217,6 +227,7 @@ def main() -> None:
     shown(image, LEAST_SCANS)
     in_a_file(image, scans)
     recorded(image, scans)
+    paged(image, scans)
 
 
 if __name__ == "__main__":

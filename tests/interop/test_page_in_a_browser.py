@@ -5,20 +5,26 @@ from __future__ import annotations
 import io
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from page_rig import NUMBERS
 
 from fbvm.code.compiler import compile_files, compile_text
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.record.page.data import page_data
+from fbvm.record.page import columns
+from fbvm.record.page import data as data_module
+from fbvm.record.page.data import PageData, page_data
 from fbvm.record.page.page import page
+from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import signals_at
+from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 from fbvm.units.etn21.unit import Etn21
 from fbvm.watch.paths import Place
@@ -27,6 +33,7 @@ from fbvm.wire.link import Peer
 pytestmark = pytest.mark.slow
 HOUSE = Path(__file__).resolve().parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+Opener = Callable[[PageData], Any]
 SCANS = 40
 SENDING = 4
 """The scan in which the demo sends its first request."""
@@ -45,6 +52,16 @@ def trace() -> Trace:
     plc.run(scans=SCANS)
     writer.close()
     return Trace(io.BytesIO(file.getvalue()))
+
+
+def recorded_scans(text: str, scans: int) -> RecordedScans:
+    """A run of a program that was recorded in memory."""
+    image = compile_text(text).image
+    assert image is not None
+    plc = Plc(image)
+    recorded = Recording().add("run", plc)
+    plc.run(scans=scans)
+    return RecordedScans(recorded, {})
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +105,23 @@ def shown(browser: Any, url: str) -> Iterator[Any]:
     made.context.close()
 
 
+@pytest.fixture
+def made_page(browser: Any, tmp_path: Path) -> Iterator[Opener]:
+    """Opens a page of some data."""
+    made = []
+
+    def open_page(data: PageData) -> Any:
+        path = tmp_path / f"{len(made)}.html"
+        path.write_text(page(data), encoding="utf-8")
+        made.append(opened(browser, path.as_uri()))
+        return made[-1]
+
+    yield open_page
+    for one in made:
+        assert one.complaints == []
+        one.context.close()
+
+
 def where(shown: Any) -> str:
     """What stands in the heading after the next picture."""
     shown.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
@@ -115,19 +149,108 @@ def test_keys_move_the_cursor(shown: Any) -> None:
     assert press(shown, "Home", "ArrowLeft") == "scan 0, 0 ms"
 
 
+def labels_of(shown: Any) -> dict[str, str]:
+    """The values beside the names, when all have been written."""
+    shown.wait_for_function("window.fbvm.written()")
+    rows = shown.eval_on_selector_all(".label", "rows => rows.map(row => [row.title, row.children[1].textContent])")
+    return {title.partition(": ")[0]: text for title, text in rows}
+
+
+def shown_at(source: ScanSource, scan: int, names: Iterable[str]) -> dict[str, str]:
+    """The same values as Python writes them."""
+    moment, made = source.at(scan), {}
+    for name in names:
+        place = source.find(name)
+        assert isinstance(place, Place)
+        [signal], value = signals_at(place, {}, source.meanings), source.names.read(moment.read, place)
+        made[name] = str(value).upper() if isinstance(value, bool) else signal.display(value)
+    return made
+
+
+def test_numbers_are_written_as_everywhere(made_page: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(columns, "BLOCK_SCANS", 7)
+    source = recorded_scans(NUMBERS, 40)
+    shown = made_page(page_data(source))
+    for scan in (0, 1, 6, 7, 8, 29, 39):
+        where(shown)
+        shown.evaluate(f"window.fbvm.move({{scan: {scan}}})")
+        assert where(shown).startswith(f"scan {scan},")
+        labels = labels_of(shown)
+        assert {"Main.r", "Main.lr", "Main.lw", "Main.t", "Main.text"} <= set(labels)
+        assert labels == shown_at(source, scan, labels)
+
+
+REALS = ["0.0", "-0.0", "0.1", "1.0", "1E-4", "1E-5", "123456.79", "1E15", "1E16", "1.5E20", "-2.5E-7", "16777217.0", "3.4E38",
+         "1E-40"]  # fmt: skip
+
+
+def test_numbers_with_fractions(made_page: Opener) -> None:
+    cases = "\n".join(f"{at}: r := REAL#{text}; lr := LREAL#{text};" for at, text in enumerate(REALS))
+    source = recorded_scans(f"""PROGRAM Main VAR n : INT := -1; r : REAL; lr : LREAL; zero : LREAL; t : TIME; d : LTIME; END_VAR
+        n := n + 1; t := T#-1d2h3m4s5ms * n; d := LTIME#1ns * n;
+        CASE n OF {cases} {len(REALS)}: r := LREAL_TO_REAL(1.0 / zero); lr := -1.0 / zero;
+        {len(REALS) + 1}: lr := zero / zero; r := LREAL_TO_REAL(lr); END_CASE END_PROGRAM""", len(REALS) + 2)
+    shown = made_page(page_data(source))
+    for scan in source.scans:
+        assert where(shown).startswith(f"scan {scan},")
+        labels = labels_of(shown)
+        assert labels == shown_at(source, scan, labels)
+        press(shown, "ArrowRight")
+
+
+def test_a_page_says_of_which_scans_it_has_the_inside(made_page: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(data_module, "MOST_ROWS", 200)
+    data = page_data(recorded_scans(NUMBERS, 100))
+    (_, first_end), (last_begin, _) = data.head["windows"]
+    shown = made_page(data)
+    assert shown.locator("#rows tbody tr").count() > 3
+    shown.evaluate("window.fbvm.move({scan: 50})")
+    where(shown)
+    text = shown.inner_text("#rows tbody")
+    assert "not on the page" in text and f"scans 0 to {first_end}" in text and f"scans {last_begin} to 99" in text
+    shown.click("#rows button.window >> nth=1")
+    assert where(shown).startswith(f"scan {last_begin},")
+    assert shown.locator("#rows tbody tr").count() > 3
+    press(shown, "Home", "0")
+    assert press(shown, "ArrowDown").startswith("scan 0, 0 ms, step 1")
+
+
+LIT = """([y]) => {
+    const canvas = document.getElementById('canvas'), left = document.getElementById('labels').offsetWidth + 12;
+    const {data} = canvas.getContext('2d').getImageData(left, y, canvas.width - left, 1);
+    const colour = at => data.slice(4 * at, 4 * at + 3).join();
+    return Array.from({length: data.length / 4}, (_, at) => at).filter(at => colour(at) !== colour(0));
+}"""
+"""The dots of a line of the chart that have another colour than its first one."""
+
+
+def test_a_long_run_is_drawn_from_what_its_blocks_hold(made_page: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of 20,000 scans in view: a bit that was ON in one scan only is seen, and found by the key for its next change."""
+    monkeypatch.setattr(columns, "BLOCK_SCANS", 1000)
+    source = recorded_scans("""PROGRAM Main VAR n : DINT; rare, never : BOOL; END_VAR
+        n := n + 1; rare := n = 12346; END_PROGRAM""", 20_000)
+    shown = made_page(page_data(source, ["Main.rare", "Main.never", "Main.n"]))
+    press(shown, "0")
+    shown.wait_for_function("window.fbvm.written()")
+    rare, never = (shown.evaluate(LIT, [38 + row * 26 + 12]) for row in (0, 1))
+    wide = shown.evaluate("document.getElementById('canvas').width - document.getElementById('labels').offsetWidth")
+    marks = set(rare) - set(never)  # both have the lines of the grid
+    assert marks and all(abs(at + 12 - 12345 / 20_000 * wide) < 4 for at in marks)
+    press(shown, "Home")
+    assert press(shown, "n").startswith("scan 12345,")
+    assert press(shown, "n").startswith("scan 12346,")
+    assert press(shown, "p").startswith("scan 12345,")
+    assert press(shown, "p").startswith("scan 12345,")
+
+
 def test_values_are_those_of_the_trace(shown: Any, trace: Trace) -> None:
     for scan in (0, SENDING, 9, SCANS - 1):
         shown.evaluate(f"location.hash = '#{scan}'")
         shown.reload()
         assert where(shown).startswith(f"scan {scan},")
-        moment = trace.at(scan)
-        labels = shown.eval_on_selector_all(".label", "rows => rows.map(row => [row.title, row.children[1].textContent])")
+        labels = labels_of(shown)
         assert len(labels) > 100
-        for title, text in labels:
-            place = trace.find(title.partition(": ")[0])
-            assert isinstance(place, Place)
-            [signal], value = signals_at(place, {}, trace.meanings), moment.read(place)
-            assert text == (str(value).upper() if isinstance(value, bool) else signal.display(value)), title
+        assert labels == shown_at(trace, scan, labels)
 
 
 def test_steps_inside_a_scan(shown: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from io import BytesIO, StringIO, TextIOWrapper
 from pathlib import Path
 
@@ -14,7 +15,16 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named
-from fbvm.cli.shared.traces import SUFFIX, open_trace, scans_option, trace_options, waveforms_of
+from fbvm.cli.shared.traces import (
+    SUFFIX,
+    ScanRange,
+    open_trace,
+    require_scans,
+    samples_of,
+    scans_option,
+    trace_options,
+    waveforms_of,
+)
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd
@@ -26,25 +36,26 @@ from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.signals import network_events, packets
 from fbvm.record.trace.writer import Depth
 
-CSV = ".csv"
+CSV, HTML = ".csv", ".html"
 Names = Sequence[str]
 
 
 def _csv(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
-    made = waveforms_of(trace, names, scans)
+    found = samples_of(trace, names, scans)
     with new_file(path) as file:
         text = TextIOWrapper(file, encoding="utf-8", newline="")
-        write_csv(made, text)
+        write_csv(found, text)
         text.detach()
 
 
 def _vcd(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
-    text = StringIO()
-    try:
-        write_vcd(waveforms_of(trace, names, scans), text)
-    except ModuleNotFoundError:
-        raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
-    write_file(path, text.getvalue().encode("ascii", "replace"))
+    if find_spec("vcd") is None:
+        raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'")
+    found = samples_of(trace, names, scans)
+    with new_file(path) as file:
+        text = TextIOWrapper(file, encoding="ascii", errors="replace", newline="\n")
+        write_vcd(found, text)
+        text.detach()
 
 
 def _svg(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
@@ -52,9 +63,9 @@ def _svg(trace: ScanSource, names: Names, scans: range | None, path: Path) -> No
     write_file(path, SvgChart(made, packets(trace, made.scans), path.stem).text())
 
 
-def _html(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
-    waveforms_of(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
-    write_file(path, page(page_data(trace, names, scans, path.stem)))
+def _html(trace: ScanSource, names: Names, scans: range | None, path: Path, inside: Sequence[range] = ()) -> None:
+    require_scans(trace, scans)
+    write_file(path, page(page_data(trace, names, scans, path.stem, inside=inside)))
 
 
 def _pcapng(trace: ScanSource, names: Names, scans: range | None, path: Path) -> None:
@@ -69,7 +80,7 @@ def _pcapng(trace: ScanSource, names: Names, scans: range | None, path: Path) ->
 
 
 FORMATS: dict[str, Callable[[ScanSource, Names, range | None, Path], None]] = {
-    ".html": _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd, ".pcapng": _pcapng,
+    HTML: _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd, ".pcapng": _pcapng,
 }  # fmt: skip
 
 
@@ -79,8 +90,10 @@ FORMATS: dict[str, Callable[[ScanSource, Names, range | None, Path], None]] = {
 @click.argument("names", nargs=-1, metavar="[NAME|ADDRESS|FIRST..LAST]...")
 @scans_option
 @trace_options
+@click.option("--inside", type=ScanRange(), multiple=True,
+              help="Scans that a page shows statement by statement even if it cannot do so for all; may be given several times.")
 def command(source: Path, target: Path, names: tuple[str, ...], scans: range | None, plc: str | None,
-            libraries: tuple[Path, ...]) -> None:  # fmt: skip
+            libraries: tuple[Path, ...], inside: tuple[range, ...]) -> None:  # fmt: skip
     """Write a trace as a page that shows all of it, a picture, or a table; or a table as a trace.
 
     \b
@@ -91,6 +104,8 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
     .pcapng  what passed the network, for Wireshark
 
     Without names, all variables that changed are written."""
+    if inside and target.suffix.lower() != HTML:
+        raise click.UsageError(f"--inside is about pages; {named(target)} is none")
     with writing(target):
         if source.suffix.lower() == CSV:
             _to_trace(source, target)
@@ -100,7 +115,11 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
             raise click.UsageError(f"{named(target)}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
         depth = None if write is _html else Depth.SCANS
         with open_trace(source, plc, libraries, depth) as trace:
-            write(trace, [name for text in names for name in split_names(text)], scans, target)
+            chosen = [name for text in names for name in split_names(text)]
+            if inside:
+                _html(trace, chosen, scans, target, inside)
+            else:
+                write(trace, chosen, scans, target)
 
 
 def _to_trace(source: Path, target: Path) -> None:

@@ -23,6 +23,7 @@ from fbvm.record.recording.file_scans import FileScans
 from fbvm.record.trace.format import TraceError
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Waveforms
+from fbvm.record.trace.samples import ScanSamples, samples, some_scans
 from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.source_texts import source_texts
@@ -146,13 +147,23 @@ def chosen_plc(recording: RecordingFile, name: str | None) -> FileRecordedPlc:
     return recording[name]
 
 
+def samples_of(trace: ScanSource, names: Sequence[str], scans: range | None) -> ScanSamples:
+    """The values of some variables in some scans, to be gone through.  Raises UsageError if the trace has no such scans."""
+    require_scans(trace, scans)
+    return samples(trace, names, scans)
+
+
 def waveforms_of(trace: ScanSource, names: Sequence[str], scans: range | None) -> Waveforms:
     """The waveforms of some variables in some scans.  Raises UsageError if the trace has no such scans."""
-    made = waveforms(trace, names, scans)
-    if not made.times_ns:
+    require_scans(trace, scans)
+    return waveforms(trace, names, scans)
+
+
+def require_scans(trace: ScanSource, scans: range | None) -> None:
+    """Raises UsageError if the trace has none of these scans; without `scans`, if it has none at all."""
+    if not some_scans(trace, scans):
         held = f"scans {trace.scans[0]} to {trace.scans[-1]}" if trace.scans else "no scans yet"
         raise click.UsageError(f"the trace has {held}")
-    return made
 
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:

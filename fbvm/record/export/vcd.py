@@ -7,47 +7,43 @@ value changes at the time of the scan at whose end it is new.  Times of the prog
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from itertools import chain
 from typing import Any, TextIO
 
 from fbvm.base.types import Elementary, EnumType, RefType, StringType, Type, base, families
-from fbvm.record.trace.recorder import Signal, Track, Waveforms
+from fbvm.record.trace.recorder import Signal
+from fbvm.record.trace.samples import Samples
 from fbvm.watch.values import Value
 
 AREAS_SCOPE = "memory"
 COMMENT = "fbvm"
 
 
-def write_vcd(waveforms: Waveforms, file: TextIO) -> None:
-    """Writes waveforms as VCD to a text file.  Raises ModuleNotFoundError without the package pyvcd."""
+def write_vcd(samples: Samples, file: TextIO) -> None:
+    """Writes the values of signals as VCD to a text file, scan by scan: `waveforms`, or what `samples` goes through.
+
+    Raises ModuleNotFoundError without the package pyvcd."""
     import vcd  # type: ignore[import-not-found,unused-ignore]
 
+    signals, steps = samples.signals, samples.steps()
+    first = next(steps, None)
     with vcd.VCDWriter(file, timescale="1 ns", date="", comment=COMMENT) as writer:
-        number = writer.register_var(COMMENT, "scan", "integer", 64, init=waveforms.first)
-        variables = [_register(writer, track) for track in waveforms.tracks]
-        for scan, (now_ns, changed) in _scans(waveforms):
-            writer.change(number, now_ns, scan)
+        number = writer.register_var(COMMENT, "scan", "integer", 64, init=first[0] if first else 0)
+        begun = dict(first[2]) if first else {}
+        variables = [_register(writer, signal, begun.get(at)) for at, signal in enumerate(signals)]
+        end_ns = 0
+        for scan, end_ns, changed in chain([first] if first else [], steps):
+            writer.change(number, end_ns, scan)
             for at, value in changed:
-                writer.change(variables[at], now_ns, _plain(waveforms.tracks[at].signal, value))
-        if waveforms.times_ns:
-            writer.close(waveforms.times_ns[-1])
+                writer.change(variables[at], end_ns, _plain(signals[at], value))
+        if first:
+            writer.close(end_ns)
 
 
-def _scans(waveforms: Waveforms) -> Iterator[tuple[int, tuple[int, list[tuple[int, Value]]]]]:
-    """Scan, time, and the tracks that change in it with their new values."""
-    changes: dict[int, list[tuple[int, Value]]] = {}
-    for at, track in enumerate(waveforms.tracks):
-        for scan, value in track.changes:
-            changes.setdefault(scan, []).append((at, value))
-    for scan, now_ns in zip(waveforms.scans, waveforms.times_ns, strict=True):
-        yield scan, (now_ns, changes.get(scan, []))
-
-
-def _register(writer: Any, track: Track) -> Any:
-    signal = track.signal
+def _register(writer: Any, signal: Signal, value: Value) -> Any:
     scope, name = _scope(signal)
     kind, size = _kind(signal)
-    init = _plain(signal, track.changes[0][1]) if track.changes else None
+    init = _plain(signal, value) if value is not None else None
     if init is None:
         init = {"string": "", "real": 0.0}.get(kind, 0)
     return writer.register_var(scope, name, kind, size, init=init)

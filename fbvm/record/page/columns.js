@@ -3,7 +3,7 @@
 
 const ARRAYS = {bit: Uint8Array, i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array, u32: Uint32Array,
                 i64: BigInt64Array, u64: BigUint64Array, f32: Float32Array, f64: Float64Array, text: Uint32Array};
-const GROUP = 64;
+const GROUP = 16;
 const MOST_UNPACKED = 96 << 20;
 
 /** The least and greatest values of groups of a block's scans: a chart needs no more of them. */
@@ -139,26 +139,30 @@ class Column {
     return found ? found.values[scan - this.columns.starts[block]] : this.first(block);
   }
 
-  /** The least and the greatest value from one scan to before another; of a block in part roughly, if that has to be quick. */
+  /** Finds the least and the greatest value from one scan to before another: `least` and `most`.
+   *
+   * Of a block in part it takes those of the whole block, if that has to be quick, or if there are as many scans as in a block;
+   * of a group in part those of the whole group, if there are several groups: a dot of a chart shows no less. */
   extremes(from, to) {
-    if (this.row < 0) return [Number(this.only), Number(this.only)];
-    const {columns, row} = this;
+    this.least = this.most = Number(this.only);
+    if (this.row < 0) return;
+    const {columns, row} = this, isMany = to - from >= columns.even, byGroups = to - from >= 2 * GROUP;
     let low = Infinity, high = -Infinity;
     for (let block = columns.block(from); block < columns.blocks && columns.starts[block] < to; block++) {
       const start = columns.starts[block], end = columns.starts[block + 1], at = row + block;
-      const whole = from <= start && to >= end;
-      if (whole || !columns.lengths[at] || !this.isNear(at)) {
-        low = Math.min(low, columns.low[at]);
-        high = Math.max(high, columns.high[at]);
+      if (isMany || from <= start && to >= end || !columns.lengths[at] || !this.isNear(at)) {
+        if (columns.low[at] < low) low = columns.low[at];
+        if (columns.high[at] > high) high = columns.high[at];
         continue;
       }
       const found = this.unpack(block), values = found.values, last = Math.min(to, end) - start;
       found.groups ??= groups(values);
       for (let place = Math.max(0, from - start); place < last;) {
-        if (place % GROUP === 0 && place + GROUP <= last) {
-          low = Math.min(low, found.groups.low[place / GROUP]);
-          high = Math.max(high, found.groups.high[place / GROUP]);
-          place += GROUP;
+        if (byGroups || place % GROUP === 0 && place + GROUP <= last) {
+          const group = place / GROUP | 0;
+          if (found.groups.low[group] < low) low = found.groups.low[group];
+          if (found.groups.high[group] > high) high = found.groups.high[group];
+          place = (group + 1) * GROUP;
         } else {
           const value = Number(values[place++]);
           if (value < low) low = value;
@@ -166,7 +170,8 @@ class Column {
         }
       }
     }
-    return [low, high];
+    this.least = low;
+    this.most = high;
   }
 
   /** True if a block is unpacked, or there is time for it. */

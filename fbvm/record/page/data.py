@@ -22,8 +22,8 @@ from fbvm.record.page.windows import chosen_windows
 from fbvm.record.trace.events import Event, NetworkEvent
 from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.recorder import Signal, signals_at
+from fbvm.record.trace.samples import chosen_signals
 from fbvm.record.trace.scan_source import Moment, ScanSource
-from fbvm.record.trace.signals import chosen_signals
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import UnknownPlace
 

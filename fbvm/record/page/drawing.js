@@ -1,7 +1,7 @@
 // How the values of one signal are drawn: scan by scan where there is room, else a column of the picture for several scans.
 
 const ROW = 26;
-const MOST_SCANS_A_DOT = 4;
+const MOST_SCANS_A_DOT = .5;
 
 class Drawing {
   /** `x` gives the place of a scan in the picture, `from` and `to` are those that are seen, of all that there are. */
@@ -32,14 +32,19 @@ class Drawing {
 
   /** One column of dots after another; neighbours with the same single value are one piece. */
   rough(signal, y, from, to, x) {
-    const step = (to - from) / Math.max(1, Math.round(x(to) - x(from))), {column} = signal;
+    const step = (to - from) / Math.max(1, Math.round(x(to) - x(from))), {column} = signal, busy = [];
     let begun = -1, held = NaN;
     const end = at => {
-      if (begun >= 0) this.piece(signal, y, x(begun), x(at), column.at(begun), begun > from);
+      if (begun < 0) return;
+      const left = x(begun), right = x(at);
+      if (signal.isLevel && right - left < 1.5) busy.push(left, held, held);
+      else this.piece(signal, y, left, right, column.at(begun), begun > from);
       begun = -1;
     };
     for (let at = from; at < to; at += step) {
-      const first = Math.floor(at), [low, high] = column.extremes(first, Math.min(to, Math.max(first + 1, Math.floor(at + step))));
+      const first = Math.floor(at);
+      column.extremes(first, Math.min(to, Math.max(first + 1, Math.floor(at + step))));
+      const low = column.least, high = column.most;
       if (low === high) {
         if (begun >= 0 && low !== held) end(first);
         if (begun < 0) begun = first;
@@ -47,24 +52,30 @@ class Drawing {
         continue;
       }
       end(first);
-      this.busy(signal, y, x(first), low, high);
+      busy.push(x(first), low, high);
     }
     end(to);
+    this.busy(signal, y, busy);
   }
 
-  /** A column of dots in which a signal had several values. */
-  busy(signal, y, x, low, high) {
-    const {pen} = this;
+  /** Columns of dots in which a signal had several values: x, least, greatest value, x, ...  One colour after the other. */
+  busy(signal, y, columns) {
+    const {pen} = this, foot = y + ROW - 5;
     if (signal.isLevel) {
-      const top = this.level(signal, high), foot = this.level(signal, low);
       pen.fillStyle = this.colour.fill;
-      pen.fillRect(x, y + ROW - 5 - top, 1, top + 1);
+      for (let at = 0; at < columns.length; at += 3) {
+        const top = this.level(signal, columns[at + 2]);
+        pen.fillRect(columns[at], foot - top, 1, top + 1);
+      }
       pen.fillStyle = this.colour.word;
-      pen.fillRect(x, y + ROW - 5 - top, 1, Math.max(1.5, top - foot));
+      for (let at = 0; at < columns.length; at += 3) {
+        const top = this.level(signal, columns[at + 2]);
+        pen.fillRect(columns[at], foot - top, 1, Math.max(1.5, top - this.level(signal, columns[at + 1])));
+      }
     } else {
       pen.fillStyle = signal.bit ? this.colour.on : this.colour.word;
       pen.globalAlpha = .45;
-      pen.fillRect(x, y + 5, 1, ROW - 11);
+      for (let at = 0; at < columns.length; at += 3) pen.fillRect(columns[at], y + 5, 1, ROW - 11);
       pen.globalAlpha = 1;
     }
   }

@@ -20,7 +20,7 @@ function durationText(ns) {
 /** A number with a fraction as fbvm writes it: 0.1, 1.0, 1e-05, 1e+16, inf, nan; of 32 bits the shortest text. */
 function realText(value, isSingle) {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "nan" : value < 0 ? "-inf" : "inf";
-  if (isSingle) {
+  if (isSingle && value !== 0) {
     for (let digits = 1; digits < 10; digits++) {
       const short = Number(value.toPrecision(digits));
       if (Math.fround(short) === value) {

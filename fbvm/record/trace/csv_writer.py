@@ -15,7 +15,8 @@ from typing import TextIO
 
 from fbvm.base.arithmetic import shortest
 from fbvm.base.types import REAL, EnumType, base, families
-from fbvm.record.trace.recorder import Signal, Waveforms
+from fbvm.record.trace.recorder import Signal
+from fbvm.record.trace.samples import Samples
 from fbvm.watch.values import Value, show
 
 SCAN, TIME_MS = "scan", "time_ms"
@@ -23,14 +24,16 @@ MS = " [ms]"
 DURATIONS = frozenset(("TIME", "LTIME"))
 
 
-def write_csv(waveforms: Waveforms, file: TextIO) -> None:
-    """Writes waveforms as CSV to a text file that was opened with `newline=""`."""
+def write_csv(samples: Samples, file: TextIO) -> None:
+    """Writes the values of signals as CSV to a text file that was opened with `newline=""`, scan by scan: `waveforms`, or what
+    `samples` goes through."""
     writer = csv.writer(file, lineterminator="\n")
-    signals = [track.signal for track in waveforms.tracks]
+    signals = samples.signals
     writer.writerow([SCAN, TIME_MS, *(_heading(signal) for signal in signals)])
-    columns = [track.values(waveforms.scans) for track in waveforms.tracks]
-    for scan, now_ns, *values in zip(waveforms.scans, waveforms.times_ns, *columns, strict=True):
-        cells = [_cell(signal, value) for signal, value in zip(signals, values, strict=True)]
+    cells = [""] * len(signals)
+    for scan, now_ns, changed in samples.steps():
+        for at, value in changed:
+            cells[at] = _cell(signals[at], value)
         writer.writerow([scan, _milliseconds(now_ns), *cells])
 
 

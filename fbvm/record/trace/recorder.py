@@ -81,6 +81,20 @@ class Waveforms:
         """Numbers of the scans that are recorded, counted from 0 at power-on."""
         return range(self.first, self.first + len(self.times_ns))
 
+    @property
+    def signals(self) -> list[Signal]:
+        """The signals, in the order of the tracks."""
+        return [track.signal for track in self.tracks]
+
+    def steps(self) -> Iterator[tuple[int, int, list[tuple[int, Value]]]]:
+        """Scan, time, and the signals that have a new value at its end, by number; of the first scan all."""
+        changes: dict[int, list[tuple[int, Value]]] = {}
+        for at, track in enumerate(self.tracks):
+            for scan, value in track.changes:
+                changes.setdefault(scan, []).append((at, value))
+        for scan, now_ns in zip(self.scans, self.times_ns, strict=True):
+            yield scan, now_ns, changes.get(scan, [])
+
     def relabelled(self, prefix: str) -> Waveforms:
         """The same waveforms without a prefix of the labels."""
         tracks = [Track(replace(track.signal, label=track.signal.label.removeprefix(prefix)), track.changes)

@@ -22,7 +22,8 @@ from fbvm.record.export.vcd import write_vcd
 from fbvm.record.page.data import page_data
 from fbvm.record.trace.csv_writer import write_csv
 from fbvm.record.trace.reader import Trace
-from fbvm.record.trace.signals import chosen_signals, waveforms
+from fbvm.record.trace.samples import chosen_signals
+from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.writer import Depth
 from fbvm.step.session import Session
 from fbvm.step.stop_report import StopReport

@@ -55,6 +55,9 @@ def test_a_page_and_a_picture_of_a_trace(fbvm: Fbvm) -> None:
     for target in ("run.html", "run.svg"):
         assert fbvm("convert", "run.fbtrace", target, "Main.Nobody").exit_code == 2
         assert fbvm("convert", "run.fbtrace", target, "--scans", "900..").exit_code == 2
+    assert fbvm("convert", "run.fbtrace", "run.html", "--inside", "3..5", "--inside", "8").exit_code == 0
+    refused = fbvm("convert", "run.fbtrace", "run.csv", "--inside", "3..5")
+    assert refused.exit_code == 2 and "--inside is about pages" in refused.output
 
 
 @pytest.mark.slow

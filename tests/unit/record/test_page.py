@@ -8,7 +8,7 @@ import re
 from xml.etree import ElementTree
 
 import pytest
-from page_rig import ReadPage
+from page_rig import NUMBERS, ReadPage
 from trace_rig import image, record, traced
 
 from fbvm.machine.plc import Plc
@@ -27,22 +27,6 @@ from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.link import Peer
-
-NUMBERS = """\
-PROGRAM Main
-VAR
-    n : INT; s : SINT; b : BYTE; u : UINT; d : DINT; dw : DWORD; l : LINT; lw : LWORD; r : REAL; lr : LREAL; t : TIME; low : BOOL;
-    located AT D7 : WORD; bit AT D9.3 : BOOL; text : STRING[20]; day : DATE := D#2024-02-28; far : ARRAY[0..400] OF LINT;
-    p : REF_TO INT;
-END_VAR
-    n := n + 1;
-    s := INT_TO_SINT(n * 7 MOD 100 - 50); b := BYTE#250 OR INT_TO_BYTE(n MOD 4); u := INT_TO_UINT(n) * 999; d := -70000 * n;
-    dw := ROL(DWORD#16#8000_0001, n); l := l * 3 - 12345678901; lw := LWORD#16#FFFF_FFFF_0000_0000 OR INT_TO_LWORD(n);
-    r := r / 3.0 + 1.5; lr := SQRT(INT_TO_LREAL(n)); t := t + T#1ms500us; low := n MOD 3 = 0; bit := n > 20;
-    IF n MOD 10 = 0 THEN text := CONCAT('at ', INT_TO_STRING(n)); END_IF
-    far[n] := n; far[30] := n; p := REF(n);
-END_PROGRAM
-"""
 
 
 def text(trace: Trace, name: str, scan: int) -> str:

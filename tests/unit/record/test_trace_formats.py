@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, TextIO
 
 import pytest
 from hypothesis import given
@@ -17,6 +18,8 @@ from fbvm.record.trace.csv_reader import CsvError, read_csv
 from fbvm.record.trace.csv_writer import write_csv
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Recorder, Waveforms
+from fbvm.record.trace.samples import Samples, samples
+from fbvm.record.trace.scan_source import Moment
 from fbvm.record.trace.signals import waveforms
 
 
@@ -186,3 +189,47 @@ def test_negative_numbers_and_texts_with_blanks() -> None:
     assert changes["Main.n"][-1][0] == 10_000_000
     assert changes["Main.n"][-1][1] & 0xFFFF == 0xFFFE
     assert changes["Main.s"] == [(0, "a_b")]
+
+
+class _Read:
+    """Goes through the scans of a trace, and knows how far it has come."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, trace: Trace) -> None:
+        self.scans = 0
+        moments = trace.moments
+
+        def counted(scans: range | None = None) -> Iterator[Moment]:
+            for moment in moments(scans):
+                self.scans = moment.scans
+                yield moment
+
+        monkeypatch.setattr(trace, "moments", counted)
+
+
+@pytest.mark.parametrize("write", [write_csv, write_vcd])
+def test_each_scan_is_written_when_it_has_been_read(
+    write: Callable[[Samples, TextIO], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is written follows what is read: nothing waits in memory for the end of the run."""
+    pytest.importorskip("vcd")
+    trace = traced(300)
+    read = _Read(monkeypatch, trace)
+    reached: list[int] = []
+
+    class File(io.StringIO):
+        def write(self, text: str) -> int:
+            reached.append(read.scans)
+            return super().write(text)
+
+    found, whole = File(), io.StringIO()
+    write(samples(trace, ["Main.Pump", "Main.Both[2].b"]), found)
+    assert set(range(1, 300)) <= set(reached)
+    write(waveforms(trace, ["Main.Pump", "Main.Both[2].b"]), whole)
+    assert found.getvalue() == whole.getvalue()
+
+
+def test_without_names_what_changes_is_written() -> None:
+    trace = traced(30)
+    assert [signal.label for signal in samples(trace).signals] == [track.signal.label for track in waveforms(trace).tracks]
+    assert [signal.label for signal in samples(trace, scans=range(2)).signals] == [
+        track.signal.label for track in waveforms(trace, scans=range(2)).tracks]

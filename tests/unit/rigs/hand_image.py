@@ -50,7 +50,8 @@ def image(*codes: Block, size: int = 64, counters: int = 2) -> Image:
     tasks = tuple(TaskRow(f"Task{n}", n, 0, "", (run,)) for n, run in enumerate(runs))
     sites = tuple(Site("Main.st", "Main", line, 5) for line in range(40))
     return Image(Layout(SLOTS_BYTES + size * len(codes)), bodies, tasks, {}, (), (), sites,
-                 counters=counters if any(node[0] == "count" for code in codes for node in statements(code)) else 0)
+                 counters=counters if any(node[0] == "count" for code in codes for node in statements(code)) else 0,
+                 marks=2 if any(node[0] == "mark" for code in codes for node in statements(code)) else 0)
 
 
 def operations_in(item: Any) -> set[str]:

@@ -16,6 +16,23 @@ from fbvm.record.page.data import PageData
 
 LETTERS = {BIT: "B", TEXT: "I"} | {code: FORMATS[code] for code in SIZES if code not in (BIT, TEXT)}
 
+NUMBERS = """\
+PROGRAM Main
+VAR
+    n : INT; s : SINT; b : BYTE; u : UINT; d : DINT; dw : DWORD; l : LINT; lw : LWORD; r : REAL; lr : LREAL; t : TIME; low : BOOL;
+    located AT D7 : WORD; bit AT D9.3 : BOOL; text : STRING[20]; day : DATE := D#2024-02-28; far : ARRAY[0..400] OF LINT;
+    p : REF_TO INT;
+END_VAR
+    n := n + 1;
+    s := INT_TO_SINT(n * 7 MOD 100 - 50); b := BYTE#250 OR INT_TO_BYTE(n MOD 4); u := INT_TO_UINT(n) * 999; d := -70000 * n;
+    dw := ROL(DWORD#16#8000_0001, n); l := l * 3 - 12345678901; lw := LWORD#16#FFFF_FFFF_0000_0000 OR INT_TO_LWORD(n);
+    r := r / 3.0 + 1.5; lr := SQRT(INT_TO_LREAL(n)); t := t + T#1ms500us; low := n MOD 3 = 0; bit := n > 20;
+    IF n MOD 10 = 0 THEN text := CONCAT('at ', INT_TO_STRING(n)); END_IF
+    far[n] := n; far[30] := n; p := REF(n);
+END_PROGRAM
+"""
+"""Numbers of every size, bits and texts that change."""
+
 
 def unpacked(stream: bytes) -> bytes:
     return zlib.decompress(stream, -15)
