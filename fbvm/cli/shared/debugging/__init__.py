@@ -1,0 +1,1 @@
+"""What verbs share that debug: what is opened, tests that are debugged, the door for an editor."""
