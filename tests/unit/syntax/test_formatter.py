@@ -336,6 +336,7 @@ def test_labels_stay_as_they_are_written() -> None:
 
 def test_a_pragma_without_end_in_what_reads_as_an_instruction_list_is_left_as_it_is() -> None:
     """The parser tells of the list alone, and its tokens end where the pragma begins."""
-    text = "FUNCTION_BLOCK A\nVAR_INPUT\n    R   BOOL;\nEND_VAR\nVAR\n    b { efore : BOOL;\nEND_VAR\n    b := R;\nEND_FUNCTION_BLOCK\n"
+    text = ("FUNCTION_BLOCK A\nVAR_INPUT\n    R   BOOL;\nEND_VAR\nVAR\n    b { efore : BOOL;\nEND_VAR\n    b := R;\n"
+            "END_FUNCTION_BLOCK\n")  # fmt: skip
     same, wrong = formatted(Source("a.st", text))
     assert same == text and wrong
