@@ -170,11 +170,7 @@ class _Names:
         kind = self.facts.types.get(node)
         key: Key | None = None
         if variable is not None and not (node in self.callees and variable.kind == "RESULT"):
-            key = key_of(variable)
-            if variable.kind == "PROGRAM" and name == fold(variable.type.name):  # the instance by the name of its program
-                key = "pou", variable.source.library, name
-            elif key[0] == "global" and variable.kind not in _SHARED and self.pou is not None:  # a constant that was named early
-                key = "variable", self.source.library, fold(self.pou.owner.name), name
+            key = self._key_of_use(variable, name)
         elif self.pou is not None and not self.pou.resolved and declared_name(self.pou.tree, name) is not None:
             key = "variable", self.source.library, fold(self.pou.name), name
         elif isinstance(kind, EnumType) and name in kind.members:
@@ -191,6 +187,15 @@ class _Names:
             key = "standard", "", name
         if key is not None:
             yield Use(node.start, node.end, key, role)
+
+    def _key_of_use(self, variable: Variable, name: str) -> Key:
+        """The key of a variable that is named."""
+        key = key_of(variable)
+        if variable.kind == "PROGRAM" and name == fold(variable.type.name):  # the instance by the name of its program
+            return "pou", variable.source.library, name
+        if key[0] == "global" and variable.kind not in _SHARED and self.pou is not None:  # a constant that was named early
+            return "variable", self.source.library, fold(self.pou.owner.name), name
+        return key
 
     def member(self, node: tree.Member) -> Iterator[Use]:
         variable = self.facts.variables.get(node)

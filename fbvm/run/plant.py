@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from ipaddress import IPv4Address
@@ -18,7 +19,7 @@ from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
-from fbvm.run.project import PlcRow, Project, SetRow
+from fbvm.run.project import PlcRow, Project, SetRow, near
 from fbvm.run.running import Running, TimedWrite
 from fbvm.run.toml_keys import Path, span
 from fbvm.watch.paths import Place, Span
@@ -100,15 +101,20 @@ class Plant:
         """End all connections."""
         self.network.close()
 
-    def _report(self, path: Path, message: str) -> None:
+    def _report(self, path: Path, message: str, hint: str = "") -> None:
         source = self.project.source
-        self.diagnostics.append(Diagnostic("P0103", source, *span(source, path), message))
+        self.diagnostics.append(Diagnostic("P0103", source, *span(source, path), message, hint))
 
     def _image(self, row: PlcRow) -> Image | None:
         for folder in row.libraries:
             if not folder.is_dir():
                 self._report(("plc", row.name, "libraries"), f"there is no folder {folder}")
                 return None
+        missing = [source for source in row.sources if not os.path.lexists(source)]
+        for source in missing:
+            self._report(("plc", row.name, "sources"), f"plc.{row.name}.sources: there is no file {source}", near(source))
+        if missing:
+            return None
         compilation = compile_files(row.sources, program=row.program, libraries=row.libraries, runnable=True,
                                     resource=row.resource, dialect=row.dialect, no_warn=self._wanted.no_warn,
                                     warnings_as_errors=self._wanted.as_errors)

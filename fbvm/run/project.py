@@ -20,7 +20,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -301,20 +300,16 @@ def _check_units(reading: Reading, plcs: Mapping[str, Any]) -> None:
 
 
 def _check_paths(reading: Reading, plcs: Mapping[str, Any], folder: Path) -> None:
-    """Complain about sources that are not there, and paths that only another system takes, such as those with backslashes."""
+    """Complain about paths that only another system takes, such as those with backslashes."""
     for name, row in plcs.items():
         for key in ("sources", "libraries"):
             for written in row[key]:
-                where, place = folder / written, ("plc", name, key)
-                if os.path.lexists(where):
-                    continue
-                if hint := foreign_path(written):
-                    reading.report("P0103", place, f"plc.{name}.{key}: {written} is no path on this system", hint)
-                elif key == "sources":
-                    reading.report("P0103", place, f"plc.{name}.sources: there is no file {written}", _near(where))
+                hint = foreign_path(written)
+                if hint and not (folder / written).is_dir() and not (folder / written).is_file():
+                    reading.report("P0103", ("plc", name, key), f"plc.{name}.{key}: {written} is no path on this system", hint)
 
 
-def _near(path: Path) -> str:
+def near(path: Path) -> str:
     """A hint for a file that is not there: one of a similar name, or the sources that its folder has."""
     there = sorted(found.name for found in path.parent.glob("*.st")) if path.parent.is_dir() else []
     if near := get_close_matches(path.name, there, 1):

@@ -61,8 +61,8 @@ def test_explain(name: str, part: str) -> None:
 
 
 def test_explain_offers_what_may_be_meant() -> None:
-    said = CliRunner().invoke(main, ["explain", "move"]).output
-    assert "there is no diagnostic move" in said and "Or the instruction MOV?" in said
+    said = CliRunner().invoke(main, ["explain", "movw"]).output
+    assert "there is no diagnostic movw" in said and "Or the instruction MOV" in said
     assert "instruction" not in CliRunner().invoke(main, ["explain", "zzzz"]).output
 
 

@@ -8,6 +8,7 @@ import pytest
 from images import D200, counter_image, task
 
 from fbvm.base.areas import DUE
+from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Mode, Plc, Stopped
 from fbvm.units.contract import AreaMemory
 from fbvm.watch.conditions import ConditionError
@@ -450,3 +451,25 @@ def test_tasks_that_want_to_be_quicker_than_the_cycle_are_told() -> None:
     assert [warning.partition(":")[0] for warning in Plc(counter_image(*tasks), 10 * MS).warnings] == [
         "task Fast wants 5ms, the PLC scans every 10ms"]
     assert Plc(counter_image(*tasks), 5 * MS).warnings == ()
+
+
+def test_a_snapshot_keeps_when_tasks_are_next() -> None:
+    """Of a PLC in the middle of an interval: later scans are the same after `restore`."""
+    made = compile_text("""PROGRAM Count VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+        CONFIGURATION c RESOURCE r ON cpu
+            TASK slow (INTERVAL := T#50ms, PRIORITY := 1); TASK quick (INTERVAL := T#30ms, PRIORITY := 2);
+            PROGRAM a WITH slow : Count; PROGRAM b WITH quick : Count;
+        END_RESOURCE END_CONFIGURATION""").image
+    assert made is not None
+    plc = Plc(made, 10_000_000)
+    plc.run(scans=7)
+    state = plc.snapshot()
+    counted = []
+    for _ in range(2):
+        counted.append([])
+        for _ in range(12):
+            plc.scan()
+            counted[-1].append((plc.read("a.n"), plc.read("b.n")))
+        plc.restore(state)
+    assert counted[0] == counted[1]
+    assert counted[0][-1] == (4, 7)

@@ -24,6 +24,14 @@ def test_a_hundred_scans() -> None:
     assert times.within_ns(1) == 12_000_000
 
 
+def test_a_scan_of_just_the_cycle_is_no_overrun() -> None:
+    times = ScanTimes(10_000_000)
+    for scan, time_ns in enumerate((9_999_999, 10_000_000, 10_000_001)):
+        times.note(scan, time_ns)
+    times.note_burst(3, [0, 10_000_000], 20_000_001)
+    assert (times.count, times.overruns) == (5, 2)
+
+
 def test_a_share_is_true_to_three_percent() -> None:
     times = ScanTimes(10_000_000)
     for duration_ns in range(1, 20_001):

@@ -142,7 +142,6 @@ def test_the_least_that_must_be_said(folder: Path) -> None:
         ("P0103", 6, "fault 1.from: '-1s' is before power-on")]),
 ])  # fmt: skip
 def test_what_is_wrong_is_said_where_it_stands(folder: Path, text: str, messages: list[tuple[str, int, str]]) -> None:
-    (folder / "c.st").touch()
     found = read(folder, text)
     assert isinstance(found, list)
     assert said(found) == messages
@@ -339,12 +338,11 @@ def test_errors_of_programs_are_told_as_always(folder: Path) -> None:
 
 def test_a_source_that_is_not_there_is_told_at_its_place(folder: Path) -> None:
     for written, hint in (("countre.st", "did you mean counter.st?"), ("x/y.st", "")):
-        found = read(folder, f"[plc.a]\ncycle = '10ms'\nsources = ['{written}']\n")
-        assert isinstance(found, list)
-        assert said(found) == [("P0103", 3, f"plc.a.sources: there is no file {written}")]
+        found = Plant(project(folder, f"[plc.a]\ncycle = '10ms'\nsources = ['{written}']\n")).diagnostics
+        assert said(found) == [("P0103", 3, f"plc.a.sources: there is no file {folder / written}")]
         assert found[0].hint == hint
-    found = read(folder, "[plc.a]\nsources = ['valve.st']\n")
-    assert isinstance(found, list) and found[0].hint.startswith("there is ") and "counter.st" in found[0].hint
+    found = Plant(project(folder, "[plc.a]\nsources = ['valve.st']\n")).diagnostics
+    assert found[0].hint.startswith("there is ") and "counter.st" in found[0].hint
 
 
 @pytest.mark.parametrize(("program", "unit", "said"), [
