@@ -91,7 +91,7 @@ def test_the_script_checking(load: Load) -> None:
 def test_the_script_editing(load: Load, capsys: pytest.CaptureFixture[str]) -> None:
     load("editing").report(600, places=2, keys=22)
     said = capsys.readouterr().out
-    assert "(22 checked one POU alone)" in said
+    assert "(24 checked one POU alone)" in said
     assert "memory:" in said
 
 

@@ -165,37 +165,39 @@ class _Names:
     # --- rules ----------------------------------------------------------------------------------------------------------
 
     def named(self, node: tree.NameRef) -> Iterator[Use]:
-        name, role = fold(node.text), self.role(node)
         variable = self.variable(node)
-        kind = self.facts.types.get(node)
-        key: Key | None = None
         if variable is not None and not (node in self.callees and variable.kind == "RESULT"):
-            key = self._key_of_use(variable, name)
-        elif self.pou is not None and not self.pou.resolved and declared_name(self.pou.tree, name) is not None:
-            key = "variable", self.source.library, fold(self.pou.name), name
-        elif isinstance(kind, EnumType) and name in kind.members:
-            key = self.in_type(kind.name, name)
-        elif self.pou is not None and name in self.pou.owner.actions:
-            key = key_of_pou(self.pou.owner.actions[name])
-        elif (pou := self.project.pou(node.text, self.source)) is not None:
-            key = key_of_pou(pou)
-        elif (entry := self.project.type_entry(node.text, self.source)) is not None:
-            key = "type", entry.source.library, name
-        elif members := self.project.enum_members.get(name):
-            key = self.in_type(members[0][0].name, name)
-        elif is_known(node.text):
-            key = "standard", "", name
+            key: Key | None = self._key_of(variable, fold(node.text))
+        else:
+            key = self._without_variable(node, fold(node.text))
         if key is not None:
-            yield Use(node.start, node.end, key, role)
+            yield Use(node.start, node.end, key, self.role(node))
 
-    def _key_of_use(self, variable: Variable, name: str) -> Key:
-        """The key of a variable that is named."""
-        key = key_of(variable)
+    def _key_of(self, variable: Variable, name: str) -> Key:
+        """The key of a variable that is named here."""
         if variable.kind == "PROGRAM" and name == fold(variable.type.name):  # the instance by the name of its program
             return "pou", variable.source.library, name
+        key = key_of(variable)
         if key[0] == "global" and variable.kind not in _SHARED and self.pou is not None:  # a constant that was named early
             return "variable", self.source.library, fold(self.pou.owner.name), name
         return key
+
+    def _without_variable(self, node: tree.NameRef, name: str) -> Key | None:
+        """What a name means that is no variable's, or that of a generic function, whose variables are not resolved."""
+        project, kind = self.project, self.facts.types.get(node)
+        if self.pou is not None and not self.pou.resolved and declared_name(self.pou.tree, name) is not None:
+            return "variable", self.source.library, fold(self.pou.name), name
+        if isinstance(kind, EnumType) and name in kind.members:
+            return self.in_type(kind.name, name)
+        if self.pou is not None and name in self.pou.owner.actions:
+            return key_of_pou(self.pou.owner.actions[name])
+        if (pou := project.pou(node.text, self.source)) is not None:
+            return key_of_pou(pou)
+        if (entry := project.type_entry(node.text, self.source)) is not None:
+            return "type", entry.source.library, name
+        if members := project.enum_members.get(name):
+            return self.in_type(members[0][0].name, name)
+        return ("standard", "", name) if is_known(node.text) else None
 
     def member(self, node: tree.Member) -> Iterator[Use]:
         variable = self.facts.variables.get(node)

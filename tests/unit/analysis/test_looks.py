@@ -78,8 +78,8 @@ def test_programs_have_words_above_them_and_tests_have_others() -> None:
 
 def test_names_have_colours_by_what_they_are() -> None:
     program = plant()
-    every = tokens(program, program.files["pump.st"])
-    found = {(PLANT[each.start:each.end], each.type, *sorted(each.modifiers)) for each in every}
+    found = {(PLANT[each.start:each.end], each.type, *sorted(each.modifiers))
+             for each in tokens(program, program.files["pump.st"])}
     assert {("Pump", "class", "declaration"), ("Level", "parameter", "modification"), ("ABS", "function", "defaultLibrary"),
             ("Filling", "enumMember"), ("Mode", "type"), ("D100", "macro"), ("Lamp", "variable", "modification"),
             ("Runs", "parameter"), ("m", "variable")} <= found
