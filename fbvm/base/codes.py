@@ -1,10 +1,10 @@
-"""Every diagnostic code: S = source, P = project file, X = PLCopen XML, R = running (trap).
+"""Every diagnostic code: S = source, P = project file, X = project files of other tools, R = running (trap).
 
 Each has a page in `pages/` and a test.
 
 Ranges: S01 text and syntax, S02 names and declarations, S03 types, S04 calls, S05 statements, S06 addresses and memory,
 S07 constants and initial values, S08 configuration and tasks, S09 understood but refused, P01 the project file,
-X01 XML and its frame, X02 diagrams, X03 export, R01 traps.
+X01 XML and its frame, X02 diagrams, X03 export, X04 CX-Programmer, R01 traps.
 """
 
 from __future__ import annotations
@@ -96,6 +96,7 @@ CODES: dict[str, Code] = {
         "X0202": "diagram that cannot be executed",
         "X0203": "part of a program that is not taken over",
         "X0301": "cannot be said in PLCopen XML",
+        "X0401": "no project of CX-Programmer",
     }),
     **_table("warning", {
         "S0190": "pragma is not known and has no effect",

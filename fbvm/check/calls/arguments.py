@@ -143,7 +143,7 @@ def output(scope: Scope, argument: tree.Argument, kind: Type, name: str) -> bool
     """True if the target of `name => target` takes an output of `kind`; else a diagnostic."""
     value = argument.value
     assert value is not None
-    target = scope.infer(value)
+    target = scope.infer(value, kind)
     if target is None:
         return False
     if not scope.is_variable(value):

@@ -40,7 +40,7 @@ from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Valu
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 
-_BEHIND_REFERENCE = tree.Deref | tree.Index | ladder.Memory | ladder.Words
+_BEHIND_REFERENCE = tree.Deref | tree.Index | ladder.Memory | ladder.Words | ladder.Contents
 """Expressions that name a place in memory without a variable."""
 _PLACES = _BEHIND_REFERENCE | tree.NameRef | tree.Direct | tree.Member | tree.Part
 """Expressions that may name a place in memory."""

@@ -13,6 +13,7 @@ import click
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.lint.suppression import Wanted
 from fbvm.cli.shared import status
+from fbvm.cli.shared.given_sources import inputs
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import allow_outside_option, check_project_options, project_argument, read_given_project
 from fbvm.cli.shared.sources import compile_options, report_diagnostics, source_options
@@ -47,9 +48,10 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
             check_project_options(click.get_current_context(), PROJECT_OPTIONS)
             diagnostics = _of_project(project, wanted)
         else:
-            made = compile_files(files, program=program, libraries=libraries, no_warn=codes,
+            given, found = inputs(files)
+            made = compile_files(given, program=program, libraries=libraries, no_warn=codes,
                                  warnings_as_errors=warnings_as_errors, progress=progress, **compile_options())
-            diagnostics = made.diagnostics
+            diagnostics = found + made.diagnostics
     if diagnostics or as_json:
         report_diagnostics(diagnostics, as_json)
     if errors(diagnostics):

@@ -1,34 +1,44 @@
-"""`fbvm import`: programs from PLCopen XML, as CODESYS, Beremiz and OpenPLC Editor write it."""
+"""`fbvm import`: programs from PLCopen XML, as CODESYS, Beremiz and OpenPLC Editor write it, and from CX-Programmer."""
 
 from __future__ import annotations
 
+import codecs
 import os
 import sys
 from pathlib import Path
 
 import click
 
-from fbvm.base.files import write_file
+from fbvm.base.files import SOURCE_BYTES, read_file, write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.given_sources import imported
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
-from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.cx.read.importing import ImportedProject, import_project
+from fbvm.interchange.plcopen.read.importing import Imported, import_xml
 
 
 @click.command("import")
-@click.argument("file", metavar="FILE.xml", type=ExistingPath(dir_okay=False))
+@click.argument("file", metavar="FILE", type=ExistingPath(dir_okay=False))
 @click.option("-o", "--output", "folder", metavar="DIR", required=True, type=click.Path(file_okay=False, path_type=Path),
               help="Where the sources go, a POU a file; made if it is not there.")
 @click.option("--force", is_flag=True, help="Write over files that are there.")
+@click.option("--resource", "plc", metavar="NAME", help="The PLC, where a project of CX-Programmer has several.")
+@click.option("--encoding", metavar="NAME", default="", help="The code page of the PC that wrote a .cxp or .cxt, such as cp932; "
+              "found out if not given.")
+@click.option("--memory", is_flag=True, help="Of a .cxp or .cxt, take the contents of D, H, W and E as initial values.")
 @click.option("--json", "as_json", is_flag=True, help="Print messages as one JSON object.")
-def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
-    """Make sources of a project in PLCopen XML, and say what could not be taken over.
+def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: str, memory: bool, as_json: bool) -> None:
+    """Make sources of a project in PLCopen XML, or of CX-Programmer (.cxp, .cxt), and say what could not be taken over.
 
     Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
     blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
-    made = import_xml(file)
+    if imported(file) is None:
+        made: Imported | ImportedProject = import_xml(file)
+    else:
+        made = import_project(read_file(file, SOURCE_BYTES), str(file), plc, _encoding(encoding), memory)
     there = [name for name in made.files if os.path.lexists(folder / name)]
     if there and not force:
         raise click.UsageError(f"{folder / there[0]} is there already; --force writes over it")
@@ -44,3 +54,11 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
         say(str(folder / name))
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)
+
+
+def _encoding(name: str) -> str:
+    """The name of an encoding.  Raises BadParameter for one that there is not."""
+    try:
+        return codecs.lookup(name).name if name else ""
+    except LookupError:
+        raise click.BadParameter(f"{name} is no encoding; write cp1252, cp932, cp949 or utf-8", param_hint="--encoding") from None

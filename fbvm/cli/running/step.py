@@ -10,6 +10,7 @@ import click
 from fbvm.cli.running.debug_targets import DebugTarget, ProjectTarget
 from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import e_banks_in
+from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
@@ -58,7 +59,7 @@ def command(
         image = compile_or_exit(files, program, libraries, runnable=True, drawn=True)
         image = image.with_e_banks(e_banks_in([*watched, *(given.name for given in settings)]))
         debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
-        texts = source_texts(image, {str(path): path for path in files}, libraries)
+        texts = source_texts(image, given_sources(files), libraries)
     session = Session.of(debugged.make)
     commands = Commands(session, StopReport(session, texts), lambda: debugged.packets)
     try:

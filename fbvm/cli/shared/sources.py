@@ -13,6 +13,7 @@ from fbvm.base import cache
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.cli.shared import status
+from fbvm.cli.shared.given_sources import inputs
 from fbvm.cli.shared.paths import ExistingPath, SourcePath
 from fbvm.cli.shared.terminal import say, say_json
 from fbvm.code.compiler import compile_files
@@ -68,7 +69,13 @@ def compile_or_exit(
 
     With `runnable` it is an error if the files do not say which program to run; with `drawn` statements of Structured Text
     have rungs."""
-    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False, drawn=drawn,
+    given, found = inputs(files)
+    if errors(found):
+        report_diagnostics(found, as_json)
+        sys.exit(status.PROGRAM_ERRORS)
+    for diagnostic in found:
+        show_diagnostic(diagnostic)
+    compilation = compile_files(given, program=program, libraries=libraries, runnable=runnable, lint=False, drawn=drawn,
                                 **compile_options())
     if compilation.image is None:
         report_diagnostics(compilation.diagnostics, as_json)

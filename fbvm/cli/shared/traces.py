@@ -12,6 +12,7 @@ import click
 import fbvm
 from fbvm.base.digits import whole_number
 from fbvm.base.files import open_file, reason
+from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named, say
 from fbvm.code.image import Image
@@ -156,4 +157,4 @@ def waveforms_of(trace: ScanSource, names: Sequence[str], scans: range | None) -
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
     """The source lines with statements, by file and line number."""
-    return source_lines(image, source_texts(image, {str(path): path for path in files}, libraries))
+    return source_lines(image, source_texts(image, given_sources(files), libraries))

@@ -68,13 +68,13 @@ class Compilation:
         return errors(self.diagnostics)
 
 
-def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
+def compile_files(paths: Sequence[Path | str | Source], program: str | None = None, libraries: Sequence[Path | str] = (),
                   runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
                   lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False, cache: bool = True,
                   progress: Progress = _no_progress, drawn: bool = False) -> Compilation:
     """Compile source files.
 
-    paths: the files, of Structured Text, ladder mnemonics or charts.
+    paths: the files, of Structured Text, ladder mnemonics or charts; a `Source` is taken as it is.
     program: the name of the PROGRAM to run, where no CONFIGURATION says.
     libraries: folders of libraries that are looked into before the shipped ones.
     runnable: it is an error (S0209) if there is not exactly one thing to run.
@@ -92,7 +92,7 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
     for path in paths:
-        source = read(Path(path), str(path))
+        source = path if isinstance(path, Source) else read(Path(path), str(path))
         if isinstance(source, Source):
             sources.append(source)
         else:

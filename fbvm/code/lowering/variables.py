@@ -75,7 +75,8 @@ def _index(body: BodyContext, expr: tree.Index, kind: Type) -> Place:
 
 
 def _words(body: BodyContext, expr: ladder.Words | ladder.Contents, kind: Type) -> Place:
-    return Place(body.place(expr.of).address, kind)
+    place = body.place(expr.of)
+    return place if place.type == kind else Place(place.address, kind)
 
 
 def _contents(body: BodyContext, expr: ladder.Contents) -> Node:

@@ -41,7 +41,7 @@ class LadderLowering:
         for symbol in (symbol for text in texts for symbol in text.symbols):
             if timer := number(symbol):
                 self.builder.numbered[symbol.name.upper()] = timer
-            else:
+            elif symbol.name:
                 context.instances.append(declaration(symbol))
         self.spans.find_jumps(texts)
         self.blocks.find_timers(texts)

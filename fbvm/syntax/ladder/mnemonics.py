@@ -187,6 +187,18 @@ def _stuck(automaton: Automaton) -> ErrorRecovery:
     raise Refusal(automaton.before.start, automaton.before.end, "this is no instruction", "")
 
 
+def _step_number(text: str, at: int, end: int) -> Token | None:
+    """The number of the step, or of rung and step, in front of an instruction."""
+    patterns = _patterns()
+    number = patterns["STEP_NUMBER"].match(text, at, end)
+    if not number:
+        return None
+    prefix = patterns["PREFIX"].match(text, number.end(), end)
+    is_step = instruction_set().pattern.match(text, prefix.end() if prefix else number.end(), end)
+    is_listed = len(number[0].strip()) > 4  # of a printed listing: what follows is meant as an instruction, known or not
+    return Token("STEP_NUMBER", number[0], number.start(), number.end()) if is_step or is_listed else None
+
+
 _COLUMN = re.compile(r" *\t[ \t]*([^ \t\r\n][^\r\n]*?)[ \t\r]*$", re.M)
 """What stands in further columns behind the operands, in rows that were copied from a window: a value, a comment."""
 
@@ -195,6 +207,28 @@ def _wanted(mnemonic: str) -> int | None:
     """The number of operands of an instruction; None if it has any number."""
     row = instruction_set().rows[spelling(mnemonic)]
     return None if row.does == ".call" else len(row.operands)
+
+
+def _operand_tokens(text: str, at: int, end: int, wanted: int | None, *, columns: bool) -> Iterator[Token]:
+    """The operands in a line; with `columns`, what stands in a column behind as many as are `wanted` is a remark."""
+    patterns = _patterns()
+    while True:
+        while at < end and text[at] in " \t":
+            at += 1
+        kind = next((kind for kind in ("PIN", "OPERAND") if patterns[kind].match(text, at, end)), "")
+        if not kind:
+            return
+        found = patterns[kind].match(text, at, end)
+        assert found is not None
+        yield Token(kind, found[0], at, found.end())
+        at = found.end()
+        if kind == "PIN" and (value := patterns["OPERAND"].match(text, at, end)):
+            yield Token("OPERAND", value[0], at, value.end())
+            at = value.end()
+        wanted = wanted and wanted - 1
+        if columns and wanted == 0 and (column := _COLUMN.match(text, at, end)):
+            yield Token("REMARK", f"// {column[1]}", column.start(1), column.end())
+            return
 
 
 def _tokens(text: str, at: int, end: int, more: int) -> Iterator[Token]:
@@ -217,23 +251,15 @@ def _tokens(text: str, at: int, end: int, more: int) -> Iterator[Token]:
         at = found.end()
         return token
 
-    def take_number() -> Token | None:
-        nonlocal at
-        number = patterns["STEP_NUMBER"].match(text, at, end)
-        behind = patterns["PREFIX"].match(text, number.end(), end) if number else None
-        place = behind.end() if behind else number.end() if number else at
-        if number and (len(number[0].strip()) > 4 or instruction_set().pattern.match(text, place, end)):
-            at = number.end()
-            return Token("STEP_NUMBER", number[0], number.start(), at)
-        return None
-
     if token := take("NOTE") or take("SYMBOL") or take("SECTION"):
         yield token
     elif token := take("RUNG"):
         yield token
         yield from filter(None, (take("RUNG_NUMBER"), take("RUNG_COMMENT")))
     else:
-        begin, head = at, [token for token in (take_number(), take("PREFIX")) if token]
+        begin, number = at, _step_number(text, at, end)
+        at = number.end if number else at
+        head = [token for token in (number, take("PREFIX")) if token]
         known = instruction_set().pattern.match(text, at, end)
         if known:
             yield from (*head, Token("MNEMONIC", known[0], at, known.end()))
@@ -242,15 +268,8 @@ def _tokens(text: str, at: int, end: int, more: int) -> Iterator[Token]:
             at = begin
         else:
             yield from filter(None, (*head, take("MNEMONIC")))
-        if token := take("CODE"):
-            yield token
-        wanted = _wanted(known[0]) if known else more or None
-        while token := take("PIN") or take("OPERAND"):
-            yield token
-            wanted = wanted and wanted - 1
-            if wanted == 0 and (column := _COLUMN.match(text, at, end)):
-                yield Token("REMARK", f"// {column[1]}", column.start(1), column.end())
-                break
+        yield from filter(None, (take("CODE"),))
+        yield from _operand_tokens(text, at, end, _wanted(known[0]) if known else more or None, columns=remark is None)
     if remark:
         yield Token("REMARK", remark[0], remark.start(), remark.end())
     yield Token("$END", "", end, end)

@@ -111,8 +111,10 @@ class Operands:
         text = self.numbered.get(text.upper(), text)
         wanted = "b" if "." in text and not _SYMBOL.fullmatch(text) or text.upper() in SYMBOLS else "w"
         if text[:1] not in "@*" and _SYMBOL.fullmatch(text) and not _is_address(text) and text.upper() not in SYMBOLS:
-            return self._symbol(text, "b", start, end)
-        return self.expression(text, wanted, start, end)
+            place = self._symbol(text, "b", start, end)
+        else:
+            place = self.expression(text, wanted, start, end)
+        return Contents(start, end, place, "", None)
 
     # --- constants ---
 

@@ -49,11 +49,12 @@ class Words(Expr):
 @_node
 class Contents(Expr):
     """What an instruction reads at a variable as a number of its own width, of the type `kind`: instructions of ladder know
-    addresses, not types.  `converted` is the value where the variable itself has that width, or less without an address."""
+    addresses, not types.  `converted` is the value where the variable itself has that width, or less without an address.
+    With `kind` "" it is what stands at a pin of a function block, of the pin's type; `converted` is None then."""
 
     of: Expr
     kind: str
-    converted: Expr
+    converted: Expr | None
 
 
 @_node

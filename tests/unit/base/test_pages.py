@@ -16,6 +16,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.pages import UnknownCode, near, page
 from fbvm.code.compiler import Compilation, compile_sources
 from fbvm.engine.allowance import Allowance
+from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.write.exporting import export_xml
 from fbvm.machine.plc import Plc
@@ -30,7 +31,7 @@ ROWS = 12
 
 PAGE = re.compile(
     r"# (?P<title>[^\n]+)\n\n(?P<reason>.+?)\n\n"
-    r"## Wrong\n\n```(?P<language>st|sh|toml|xml)\n(?P<wrong>.+?)```\n\n"
+    r"## Wrong\n\n```(?P<language>st|sh|toml|xml|text)\n(?P<wrong>.+?)```\n\n"
     r"## Right\n\n```(?P=language)\n(?P<right>.+?)```"
     r"(?:\n\n## See also\n(?P<neighbours>(?:\n- [^\n]+)+))?",
     re.DOTALL,
@@ -175,7 +176,8 @@ def test_the_wrong_library_gives_this_diagnostic_and_the_right_one_none(code: st
 def test_the_wrong_document_gives_this_diagnostic_and_the_right_one_none(code: str) -> None:
     for half, expected in (("wrong", [code]), ("right", [])):
         text = parts(code)[half]
-        made = import_xml(text.encode()) if text.startswith("<") else export_xml([Source("page.st", text)])
+        made = import_xml(text.encode()) if text.startswith("<") else \
+            import_project(text.encode(), "page.cxt") if text.startswith("CX") else export_xml([Source("page.st", text)])
         assert [diagnostic.code for diagnostic in made.diagnostics] == expected
 
 

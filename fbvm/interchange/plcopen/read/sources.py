@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
-from fbvm.base.diagnostics import Source
-from fbvm.base.host import is_device
 from fbvm.interchange.plcopen.read.bodies import Bodies
 from fbvm.interchange.plcopen.read.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
 from fbvm.interchange.plcopen.read.types import remark
-from fbvm.syntax.formatter.formatter import formatted
+from fbvm.interchange.source_files import SourceFiles
 
 GLOBALS = "globals"
 """Name of the file for lists of globals without a name."""
 TYPES = "types"
-LONGEST_NAME = 60
-"""Most characters of the name of a file; file systems take 255 bytes."""
 
 
 def sources(reading: Reading, document: Document) -> dict[str, str]:
     """Texts by the names of their files."""
-    files = _Files()
+    files = SourceFiles()
     if document.types:
         files.add(TYPES, [line for data_type in document.types for line in _data_type(data_type)])
     lists: dict[str, list[str]] = {}
@@ -37,34 +32,7 @@ def sources(reading: Reading, document: Document) -> dict[str, str]:
         lines = _configuration(configuration)
         if lines:
             files.add(configuration.name, lines)
-    return {f"{name}.st": _canonical(lines) for name, lines in files.lines.items()}
-
-
-class _Files:
-    """Lines by the names of their files, which all systems can have: no two differ by case only, none is long or a device."""
-
-    def __init__(self) -> None:
-        self.lines: dict[str, list[str]] = {}
-        self._taken: set[str] = set()
-        self._numbers: dict[str, int] = {}
-
-    def add(self, name: str, lines: list[str]) -> None:
-        """Puts lines into a file of their own, which is called `name` or like it."""
-        name = re.sub(r"[^\w-]", "_", name)[:LONGEST_NAME]
-        if is_device(name):
-            name += "_"
-        free, folded = name, name.casefold()
-        while free.casefold() in self._taken:
-            self._numbers[folded] = number = self._numbers.get(folded, 1) + 1
-            free = f"{name}_{number}"
-        self._taken.add(free.casefold())
-        self.lines[free] = lines
-
-
-def _canonical(lines: Iterable[str]) -> str:
-    """The lines in the form in which `fmt` writes them; as they are if they cannot be read."""
-    text = "\n".join(lines) + "\n"
-    return formatted(Source("", text))[0]
+    return files.texts()
 
 
 def _data_type(data_type: DataType) -> list[str]:

@@ -129,7 +129,7 @@ class _Reader:
         if self.lost:
             raise Undrawable
         if join is not None and (operands or join[1]):
-            self._join(join[0], _contact(number, prefix, join[1], operands))
+            self._join(join[0], drawn_contact(number, prefix, join[1], operands))
         elif mnemonic in _SINGLE:
             _SINGLE[mnemonic](self, number)
         else:
@@ -232,7 +232,8 @@ def joined(mnemonic: str) -> tuple[str, str] | None:
     return None
 
 
-def _contact(number: int, prefix: str, rest: str, operands: tuple[str, ...]) -> Contact:
+def drawn_contact(number: int, prefix: str, rest: str, operands: tuple[str, ...]) -> Contact:
+    """The contact of an instruction: `rest` is what its mnemonic has behind LD, AND or OR."""
     if rest not in ("", "NOT"):
         return Contact(number, prefix + rest, operands)
     at_once, edge = "!" * ("!" in prefix), EDGES[prefix.replace("!", "")]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Pin, Point, Series
@@ -34,23 +36,28 @@ class _Leaf:
     others: list[Net] = field(default_factory=list)
 
 
-class Network:
-    """Makes the diagram of a drawing.  `sources` maps each element of the diagram to what was drawn for it."""
+class Nets(ABC):
+    """Makes a diagram of elements that stand between nets: `add_edge` and `add_output` take them, `diagram` is the result.
 
-    def __init__(self, grid: Grid) -> None:
-        self.grid = grid
-        self.wires = Wires(grid)
-        for problem in grid.problems:
-            raise problem
-        self.sources: dict[int, Source] = {}
+    A subclass says in `bad` what is wrong with an element."""
+
+    def __init__(self) -> None:
         self.edges: list[_Edge] = []
         self.leaves: dict[Hashable, list[_Leaf]] = {}
         self._rows: dict[int, list[tuple[Order, Series]]] = {}
         """By parallel connection, its branches with their positions."""
-        for element in grid.elements:
-            self._element(element)
-        for box in grid.boxes:
-            self._box(box)
+
+    def add_edge(self, start: Net, end: Hashable, part: Part) -> None:
+        """An element through which power goes from one net to another."""
+        self.edges.append(_Edge(start.name, end, start.order, [part]))
+
+    def add_output(self, start: Net, out: Coil | Box, others: Sequence[Net] = ()) -> None:
+        """An output on a net, and the nets of its lower inputs."""
+        self.leaves.setdefault(start.name, []).append(_Leaf(start.order, out, list(others)))
+
+    @abstractmethod
+    def bad(self, part: Part | Coil, message: str, hint: str) -> NoReturn:
+        """Raises the error about an element."""
 
     def diagram(self) -> Point:
         """The bus bar with all elements that follow it.  Raises DrawingError."""
@@ -60,48 +67,6 @@ class Network:
         bar = Point(Series())
         self._hang(bar, BUS)
         return bar
-
-    # --- elements ---------------------------------------------------------------------------------------------------
-
-    def _element(self, drawn: DrawnElement) -> None:
-        start = self.wires.net(border(drawn.x, drawn.y, LEFT))
-        if drawn.is_coil:
-            coil = Coil(-1, drawn.mark, drawn.operands)
-            self.sources[id(coil)] = drawn
-            self.leaves.setdefault(start.name, []).append(_Leaf(start.order, coil))
-            return
-        contact = Contact(-1, drawn.mark, drawn.operands)
-        self.sources[id(contact)] = drawn
-        self._edge(start, self.wires.net(border(drawn.until, drawn.y, RIGHT)), contact, drawn)
-
-    def _edge(self, start: Net, end: Net, part: Part, drawn: Source) -> None:
-        if start.name == end.name:
-            raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, "a wire leads around this, so it has no effect",
-                               "take the wire away, or let it begin in front of another contact")
-        self.edges.append(_Edge(start.name, end.name, start.order, [part]))
-
-    def _box(self, drawn: DrawnBox) -> None:
-        rows = range(drawn.y + 1, drawn.bottom)
-        entries = [y for y in rows if (LEFT, y) not in drawn.stubs and self.wires.is_used(border(drawn.x, y, LEFT))]
-        exits = [y for y in rows if (RIGHT, y) not in drawn.stubs and self.wires.is_used(border(drawn.until, y, RIGHT))]
-        if not entries:
-            raise DrawingError(drawn.x, drawn.y, 1, "no wire leads to this box",
-                               "draw ─ to its left side, in the row of its first line")
-        if drawn.title:
-            for side, used in ((LEFT, entries), (RIGHT, exits)):
-                if len(used) > 1:
-                    raise DrawingError(drawn.x if side == LEFT else drawn.until, used[1], 1,
-                                       f"a second wire {_WAYS[side]} this block",
-                                       "one wire leads through a block; at its other pins stand operands, such as a variable")
-        box = _block(drawn, entries[0], exits[0] if exits else -1) if drawn.title else _instruction(drawn)
-        self.sources[id(box)] = drawn
-        start, *others = (self.wires.net(border(drawn.x, y, LEFT)) for y in entries)
-        if drawn.title or box.name in INLINE:
-            box.through = True
-            end = self.wires.net(border(drawn.until, exits[0], RIGHT)) if exits else Net(SINK, ())
-            self._edge(start, end, box, drawn)
-        else:
-            self.leaves.setdefault(start.name, []).append(_Leaf(start.order, box, others))
 
     # --- reduction --------------------------------------------------------------------------------------------------
 
@@ -148,30 +113,23 @@ class Network:
             reached |= new
         for edge in self.edges:
             if edge.start not in reached:
-                self._bad(edge.parts[0], "this hangs on no bus bar", "a wire leads here from the left rail, through contacts")
+                self.bad(edge.parts[0], "this hangs on no bus bar", "a wire leads here from the left rail, through contacts")
             if sum(other.end == edge.end != SINK for other in self.edges) > 1:
-                self._bad(edge.parts[-1], "wires meet behind this that do not begin at one place",
+                self.bad(edge.parts[-1], "wires meet behind this that do not begin at one place",
                           "branches begin and end together; what else leads here has a rung of its own")
             if edge.end == SINK and isinstance(edge.parts[-1], Contact):
-                self._bad(edge.parts[-1], "there is no coil and no box behind this contact",
+                self.bad(edge.parts[-1], "there is no coil and no box behind this contact",
                           "draw ( ) in front of the right rail")
             used = edge.end in self.leaves or any(other.start == edge.end for other in self.edges) or edge.end in self._others()
             if edge.end != SINK and not used:
-                self._bad(edge.parts[-1], "the wire behind this leads nowhere", "let it lead to a coil or to a box")
+                self.bad(edge.parts[-1], "the wire behind this leads nowhere", "let it lead to a coil or to a box")
         for net, leaves in self.leaves.items():
             for leaf in leaves:
                 if net not in reached:
-                    self._bad(leaf.out, "this hangs on no bus bar", "a wire leads here from the left rail, through contacts")
+                    self.bad(leaf.out, "this hangs on no bus bar", "a wire leads here from the left rail, through contacts")
 
     def _others(self) -> dict[Hashable, Net]:
         return {net.name: net for leaves in self.leaves.values() for leaf in leaves for net in leaf.others}
-
-    def _bad(self, part: Part | Coil, message: str, hint: str) -> None:
-        """The error at an element; for branches, at the first one."""
-        while isinstance(part, Parallel):
-            part = part.branches[0].parts[0]
-        drawn = self.sources[id(part)]
-        raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
 
     def _hang(self, point: Point, net: Hashable) -> None:
         """Add to a point what follows its net, from above."""
@@ -196,9 +154,72 @@ class Network:
         if net.name == BUS:
             return Series()
         if net.name in self.leaves or any(edge.start == net.name for edge in self.edges) or into[0].start != BUS:
-            self._bad(box, "a lower input of this box hangs on a wire that leads elsewhere, too",
+            self.bad(box, "a lower input of this box hangs on a wire that leads elsewhere, too",
                       "each of its inputs has a line of its own from the left rail")
         return Series(into[0].parts)
+
+
+class Network(Nets):
+    """Makes the diagram of a drawing.  `sources` maps each element of the diagram to what was drawn for it."""
+
+    def __init__(self, grid: Grid) -> None:
+        super().__init__()
+        self.grid = grid
+        self.wires = Wires(grid)
+        for problem in grid.problems:
+            raise problem
+        self.sources: dict[int, Source] = {}
+        for element in grid.elements:
+            self._element(element)
+        for box in grid.boxes:
+            self._box(box)
+
+    def _element(self, drawn: DrawnElement) -> None:
+        start = self.wires.net(border(drawn.x, drawn.y, LEFT))
+        if drawn.is_coil:
+            coil = Coil(-1, drawn.mark, drawn.operands)
+            self.sources[id(coil)] = drawn
+            self.add_output(start, coil)
+            return
+        contact = Contact(-1, drawn.mark, drawn.operands)
+        self.sources[id(contact)] = drawn
+        self._edge(start, self.wires.net(border(drawn.until, drawn.y, RIGHT)), contact, drawn)
+
+    def _edge(self, start: Net, end: Net, part: Part, drawn: Source) -> None:
+        if start.name == end.name:
+            raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, "a wire leads around this, so it has no effect",
+                               "take the wire away, or let it begin in front of another contact")
+        self.add_edge(start, end.name, part)
+
+    def _box(self, drawn: DrawnBox) -> None:
+        rows = range(drawn.y + 1, drawn.bottom)
+        entries = [y for y in rows if (LEFT, y) not in drawn.stubs and self.wires.is_used(border(drawn.x, y, LEFT))]
+        exits = [y for y in rows if (RIGHT, y) not in drawn.stubs and self.wires.is_used(border(drawn.until, y, RIGHT))]
+        if not entries:
+            raise DrawingError(drawn.x, drawn.y, 1, "no wire leads to this box",
+                               "draw ─ to its left side, in the row of its first line")
+        if drawn.title:
+            for side, used in ((LEFT, entries), (RIGHT, exits)):
+                if len(used) > 1:
+                    raise DrawingError(drawn.x if side == LEFT else drawn.until, used[1], 1,
+                                       f"a second wire {_WAYS[side]} this block",
+                                       "one wire leads through a block; at its other pins stand operands, such as a variable")
+        box = _block(drawn, entries[0], exits[0] if exits else -1) if drawn.title else _instruction(drawn)
+        self.sources[id(box)] = drawn
+        start, *others = (self.wires.net(border(drawn.x, y, LEFT)) for y in entries)
+        if drawn.title or box.name in INLINE:
+            box.through = True
+            end = self.wires.net(border(drawn.until, exits[0], RIGHT)) if exits else Net(SINK, ())
+            self._edge(start, end, box, drawn)
+        else:
+            self.add_output(start, box, others)
+
+    def bad(self, part: Part | Coil, message: str, hint: str) -> NoReturn:
+        """Raises the error at an element; for branches, at the first one."""
+        while isinstance(part, Parallel):
+            part = part.branches[0].parts[0]
+        drawn = self.sources[id(part)]
+        raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
 
 
 def _instruction(drawn: DrawnBox) -> Box:

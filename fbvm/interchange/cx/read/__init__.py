@@ -1,0 +1,1 @@
+"""Projects of CX-Programmer to source files."""

@@ -1,0 +1,51 @@
+"""The compression of `.cxp` files, against vectors written down by hand and its own other half."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from fbvm.interchange.cx.compression import CompressionError, compress, decompress
+
+VECTORS = (("00 06 82 02 FE 01", b"A"), ("01 04 E2 80 7F", b"A"), ("00 06 82 08 D5 83 80 7F", b"ABABABAB"),
+           ("01 04 62 D4 7A 04 FC 03", b"ABABABAB"))  # fmt: skip
+
+
+def test_plain_and_coded_literals_and_copies_that_overlap() -> None:
+    for stream, plain in VECTORS:
+        assert decompress(bytes.fromhex(stream)) == plain, stream
+
+
+def test_what_was_compressed_comes_back() -> None:
+    seeded = random.Random(7)
+    texts = [b"", b"A", b"ab", b"abc" * 700, bytes(10_000), seeded.randbytes(3_000),
+             "".join(f"LD {n % 7}.{n % 16:02}\nOUT W{n}.00\n" for n in range(400)).encode()]  # fmt: skip
+    for text in texts:
+        assert decompress(compress(text)) == text
+    assert len(compress(texts[-1])) < len(texts[-1]) // 2
+
+
+def test_a_stream_that_is_cut_says_so_at_every_byte() -> None:
+    stream = compress(b"LD 0.00\nOUT 100.00\n" * 20)
+    for length in range(2, len(stream) - 1):
+        with pytest.raises(CompressionError, match=r"it is cut|damaged"):
+            decompress(stream[:length])
+
+
+def test_damage_is_told_and_a_flood_is_stopped() -> None:
+    for stream, words in ((b"\x02\x06", "first two bytes"), (b"\x00\x07", "first two bytes"), (b"", "first two bytes"),
+                          (bytes.fromhex("0006") + b"\xff" * 8, "before the beginning")):  # fmt: skip
+        with pytest.raises(CompressionError, match=words):
+            decompress(stream)
+    with pytest.raises(CompressionError, match="longer than 1000 bytes"):
+        decompress(compress(bytes(100_000)), 1000)
+
+
+def test_any_bytes_are_decompressed_or_refused() -> None:
+    seeded = random.Random(11)
+    for _ in range(300):
+        try:
+            decompress(bytes((seeded.randrange(2), seeded.randrange(4, 7))) + seeded.randbytes(60), 5_000)
+        except CompressionError:
+            continue
