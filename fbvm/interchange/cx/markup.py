@@ -148,6 +148,8 @@ def _decoded(data: bytes, encoding: str) -> tuple[str, str]:
     """An encoding and the text: the one that is wanted; else the first one in which all is text and symbols have names."""
     if encoding:
         return encoding, data.decode(encoding, "surrogateescape")
+    if data.isascii():
+        return "cp1252", data.decode("ascii")
     for tried in _ENCODINGS:
         try:
             text = data.decode(tried)

@@ -17,6 +17,7 @@ from fbvm.base.pages import UnknownCode, near, page
 from fbvm.code.compiler import Compilation, compile_sources
 from fbvm.engine.allowance import Allowance
 from fbvm.interchange.cx.read.importing import import_project
+from fbvm.interchange.cx.write.exporting import export_into
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.write.exporting import export_xml
 from fbvm.machine.plc import Plc
@@ -172,13 +173,22 @@ def test_the_wrong_library_gives_this_diagnostic_and_the_right_one_none(code: st
         assert [diagnostic.code for diagnostic in found] == expected
 
 
+def found_in(text: str) -> list[Diagnostic]:
+    """The diagnostics of a document: XML, a project of CX-Programmer, sources, or sources that are written into a project."""
+    if text.startswith("<"):
+        return import_xml(text.encode()).diagnostics
+    if not text.startswith("CX"):
+        return export_xml([Source("page.st", text)]).diagnostics
+    saved, into, source = text.partition("(* into *)\n")
+    if into:
+        return export_into(saved.encode(), "page.cxt", [Source("page.st", source)], False).diagnostics
+    return import_project(saved.encode(), "page.cxt").diagnostics
+
+
 @each_of("code", xml_codes)
 def test_the_wrong_document_gives_this_diagnostic_and_the_right_one_none(code: str) -> None:
     for half, expected in (("wrong", [code]), ("right", [])):
-        text = parts(code)[half]
-        made = import_xml(text.encode()) if text.startswith("<") else \
-            import_project(text.encode(), "page.cxt") if text.startswith("CX") else export_xml([Source("page.st", text)])
-        assert [diagnostic.code for diagnostic in made.diagnostics] == expected
+        assert [diagnostic.code for diagnostic in found_in(parts(code)[half])] == expected
 
 
 def test_a_file_that_is_no_text_has_a_page_for_the_shell() -> None:

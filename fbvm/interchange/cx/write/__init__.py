@@ -1,0 +1,1 @@
+"""Sources of ours into a project that CX-Programmer saved."""

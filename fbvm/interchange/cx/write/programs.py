@@ -1,0 +1,135 @@
+"""What sources hold, as an export compares it: rungs of programs by section, declared symbols, and everything else as text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.syntax import tree
+from fbvm.syntax.ladder.mnemonics import Line, RungText, read_rungs
+from fbvm.syntax.parser import parse
+from fbvm.syntax.tree.ladder import Ladder
+
+_COMMENT = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\r\n]*?)[ \t]*(?=\r?\n|$)")
+
+
+@dataclass(frozen=True)
+class WrittenStep:
+    """An instruction as statement lists have it, and the comment behind it."""
+
+    text: str
+    operands: tuple[str, ...]
+    remark: str
+
+    @property
+    def is_call(self) -> bool:
+        """Whether it calls a function block, which statement lists cannot say."""
+        return self.text == "FBCALL"
+
+
+@dataclass(frozen=True)
+class WrittenRung:
+    """A rung: comment lines and steps.  Rungs are equal if they say the same; `at` is their place in the source."""
+
+    comment: tuple[str, ...]
+    steps: tuple[WrittenStep, ...]
+    at: int = field(compare=False)
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A variable: its name, address and type as they are written, and the comment behind it."""
+
+    name: str
+    address: str
+    type: str
+    comment: str
+    at: int = field(compare=False)
+
+
+@dataclass
+class Program:
+    """A PROGRAM with a LADDER: its sections by name in the order of writing, and what it declares."""
+
+    source: Source
+    name: str
+    at: int
+    sections: dict[str, list[WrittenRung]] = field(default_factory=dict)
+    declared: dict[str, Declared] = field(default_factory=dict)
+
+
+@dataclass
+class Contents:
+    """All that sources hold: programs, global symbols, and other POUs by name with their text."""
+
+    programs: dict[str, Program] = field(default_factory=dict)
+    symbols: dict[str, tuple[Source, Declared]] = field(default_factory=dict)
+    others: dict[str, tuple[Source, int, str]] = field(default_factory=dict)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+
+
+def contents(sources: Iterable[Source]) -> Contents:
+    """What sources hold; with errors in `diagnostics` if one cannot be read."""
+    made = Contents()
+    for source in sources:
+        text, diagnostics = parse(source)
+        made.diagnostics += errors(diagnostics)
+        for part in text.declarations:
+            if isinstance(part, tree.GlobalVars) and not _is_constant(part.section):
+                made.symbols.update((name.casefold(), (source, one)) for name, one in _declared(source, part.section).items())
+            elif isinstance(part, tree.Pou) and part.kind == "PROGRAM" and any(isinstance(one, Ladder) for one in part.body):
+                made.programs[part.name.text.casefold()] = _program(source, part)
+            elif isinstance(part, tree.Pou):
+                words = re.sub(r"\s+", " ", source.text[part.start:part.end])
+                made.others[part.name.text.casefold()] = source, part.start, words
+    return made
+
+
+def _is_constant(section: tree.VarSection) -> bool:
+    """Whether a section declares numbers, which an export leaves alone."""
+    return any(word.text.upper() == "CONSTANT" for word in section.qualifiers)
+
+
+def _declared(source: Source, section: tree.VarSection) -> dict[str, Declared]:
+    found: dict[str, Declared] = {}
+    for variable in section.variables:
+        comment = _COMMENT.match(source.text, variable.end)
+        address = variable.location.text if variable.location is not None else ""
+        kind = " ".join(source.text[variable.spec.start:variable.spec.end].split()) if variable.spec is not None else ""
+        for name in variable.names:
+            found[name.text] = Declared(name.text, address, kind, comment[1] if comment else "", name.start)
+    return found
+
+
+def _program(source: Source, pou: tree.Pou) -> Program:
+    made = Program(source, pou.name.text, pou.name.start)
+    for section in pou.sections:
+        if section.kind == "VAR" and not section.hidden and not _is_constant(section):
+            made.declared.update((name.casefold(), one) for name, one in _declared(source, section).items())
+    name = ""
+    for ladder in (one for one in pou.body if isinstance(one, Ladder)):
+        first = source.text.index("\n", ladder.start) + 1
+        last = source.text.rfind("\n", 0, ladder.end) + 1
+        rungs = read_rungs(source.text, first, max(first, last), lambda *message: None)
+        numbered = any(rung.declared for rung in rungs)
+        for rung in rungs:
+            name = " ".join(rung.section.split()[1:]) if rung.section else name
+            listed = made.sections.setdefault(name, [])
+            written = _rung(rung)
+            if numbered and not rung.declared and listed:
+                listed[-1] = WrittenRung(listed[-1].comment, listed[-1].steps + written.steps, listed[-1].at)
+            elif rung.declared or rung.lines:
+                listed.append(written)
+    return made
+
+
+def _rung(rung: RungText) -> WrittenRung:
+    notes = (note.lstrip("'").strip() for _, note in rung.notes)
+    return WrittenRung(tuple(filter(None, (rung.comment, *notes))), tuple(map(_step, rung.lines)), rung.start)
+
+
+def _step(line: Line) -> WrittenStep:
+    code = f"({line.row.code})" if line.row.code and line.row.code.isdecimal() else ""
+    return WrittenStep(line.step.prefix + line.step.mnemonic + code, line.step.operands, line.remark.removeprefix("//").strip())

@@ -1,0 +1,140 @@
+"""Sources into a project that was saved: what differs is replaced, every other byte stays, and counters fit."""
+
+from __future__ import annotations
+
+import difflib
+import re
+
+import pytest
+from click.testing import CliRunner
+from cx_text import SAMPLE, Cxt
+
+from fbvm.base.diagnostics import Source
+from fbvm.cli.main import main
+from fbvm.interchange.cx.compression import compress, decompress
+from fbvm.interchange.cx.read.importing import import_project
+from fbvm.interchange.cx.write.exporting import ExportedProject, export_into
+
+LATER = Cxt(
+    ("Start,0.00,BOOL,,,start button", "Pump,100.00,BOOL,,,", "Level,D100,CHANNEL,,,raw, ", "No,520,NUMBER,,,"),
+    local=("Helper,,BOOL,,A,",),
+    sections=(
+        ("One", ("LD Start\nOUT Pump", "# alone", "LD Pump\n//  0\nMOV(021) #0001 Level\n~ a note", "")),
+        ("END", ("END(001)", "")),
+    ),
+)
+"""Two sections of plain rungs."""
+
+
+def exported(cxt: Cxt, *changes: tuple[str, str], compressed: bool = False) -> ExportedProject:
+    """The project with its own sources, in which texts are replaced."""
+    sources = []
+    used = set()
+    for name, text in import_project(cxt.bytes(), "line.cxt").files.items():
+        for old, new in changes:
+            if old in text:
+                used.add(old)
+                text = text.replace(old, new)
+        sources.append(Source(name, text))
+    assert used == {old for old, _ in changes}
+    return export_into(cxt.bytes(), "line.cxt", sources, compressed)
+
+
+def difference(cxt: Cxt, made: ExportedProject) -> list[str]:
+    """The lines that were taken away and added."""
+    assert made.data is not None, [d.render() for d in made.diagnostics]
+    before, after = cxt.bytes().decode("cp1252").split("\n"), made.data.decode("cp1252").split("\n")
+    return [line.rstrip("\r") for line in difflib.ndiff(before, after) if line[0] in "+-"]
+
+
+def again(made: ExportedProject) -> dict[str, str]:
+    assert made.data is not None, [d.render() for d in made.diagnostics]
+    found = import_project(made.data, "again.cxt")
+    assert not found.diagnostics
+    return found.files
+
+
+def test_sources_that_say_the_same_change_no_byte() -> None:
+    for cxt in (SAMPLE, LATER):
+        made = exported(cxt)
+        assert made.data == cxt.bytes()
+        assert made.changed == []
+
+
+def test_one_rung_that_changes_changes_that_rung_only() -> None:
+    made = exported(LATER, ("LD      Start\n", "LD      Start\n        ANDNOT  Pump\n"))
+    assert difference(LATER, made) == ["+ ANDNOT Pump"]
+    assert made.changed == ["NewProgram1, section One: 1 rung changed"]
+
+
+def test_a_new_rung_moves_numbers_of_rungs_and_markers() -> None:
+    made = exported(
+        LATER,
+        (
+            "RUNG 1 alone",
+            'RUNG 9 the "new" one\n        LD      Start // first, start\n        TIM     0001 #0010\n    RUNG 1 alone',
+        ),
+    )
+    text = made.data.decode("cp1252") if made.data else ""
+    assert "RC:=5;" in text
+    assert "TIM 0001 #0010\n" in text
+    assert '0:="first, start";' in text
+    numbers = [
+        int(number)
+        for number in re.findall(r"(?:^|\n)\$\?St\$Bk\?_#\[(\d+)\]|BEGIN_LIST_\$#\[(\d+)\]", text)
+        for number in number
+        if number
+    ]
+    assert sorted(set(numbers)) == list(range(1, max(numbers) + 1))
+    assert [line.strip() for line in again(made)["NewProgram1.st"].splitlines() if "RUNG" in line] == [
+        "RUNG 0", 'RUNG 1 the "new" one', "RUNG 2 alone", "RUNG 3", "RUNG 4"]  # fmt: skip
+
+
+def test_a_rung_that_goes_takes_its_marker_along() -> None:
+    made = exported(LATER, ("RUNG 1 alone\n", ""))
+    assert made.data is not None
+    assert b"RC:=3;" in made.data
+    assert made.changed == ["NewProgram1, section One: 1 rung removed"]
+    assert "alone" not in again(made)["NewProgram1.st"]
+
+
+def test_symbols_get_comments_addresses_and_rows() -> None:
+    made = exported(LATER, ("// start button", "// the green one"), ("Pump  AT CIO 100.00", "Pump  AT CIO 100.01"),
+                    ("VAR_GLOBAL\n", "VAR_GLOBAL\n    Extra AT D7 : INT; // more, of it\n"))  # fmt: skip
+    assert [line for line in difference(LATER, made) if line[0] == "+"] == [
+        "+    Start,0.00,BOOL,,,the green one;", "+    Pump,100.01,BOOL,,,;", '+    Extra,D7,INT,,,"more, of it";',
+        "+   VariableCount:=5;"]  # fmt: skip
+    assert made.changed == ["global symbol Start", "global symbol Pump", "global symbol Extra"]
+    assert "VariableCount:=5;" in (made.data or b"").decode("cp1252")
+
+
+def test_what_has_no_place_is_refused_and_nothing_is_written() -> None:
+    for old, new, words in (
+            ("PROGRAM NewProgram1", "PROGRAM Other", "no program Other"), ("SECTION END", "SECTION Last", "no section Last"),
+            ("FBCALL  DOUBLE Dbl1 X:=D100 Y=>D101", "FBCALL  DOUBLE Dbl1 X:=D200 Y=>D101", "stored as cells"),
+            ("++(590) Runs", "++(590) X", "function blocks are not written"), ("// start button", "// кнопка", "cp1252"),
+            ("Helper : BOOL", "Helper : TON", "no type TON")):  # fmt: skip
+        made = exported(SAMPLE, (old, new))
+        assert made.data is None, words
+        assert all(d.code == "X0402" for d in made.diagnostics)
+        assert any(words in d.message for d in made.diagnostics), [d.message for d in made.diagnostics]
+
+
+@pytest.mark.slow
+def test_a_folder_goes_back_into_the_compressed_project(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    saved, out, folder = tmp_path / "saved.cxp", tmp_path / "line.cxp", tmp_path / "sources"
+    saved.write_bytes(compress(SAMPLE.bytes()))
+    run = CliRunner().invoke
+    assert run(main, ["import", str(saved), "-o", str(folder)]).exit_code == 0
+    program = folder / "NewProgram1.st"
+    program.write_text(program.read_text().replace("OR      Pump", "OR      Pump\n        AND     0.05"))
+    done = run(main, ["export", str(folder), "--into", str(saved), "-o", str(out)])
+    assert done.exit_code == 0, done.output
+    assert "section Pumping: 1 rung changed" in done.output
+    assert "has not been tried" in done.output
+    assert b"OR Pump\nAND 0.05\n" in decompress(out.read_bytes())
+    assert run(main, ["check", str(out)]).exit_code == 0
+    assert (
+        run(main, ["run", str(out), "--set", "Start_PB=TRUE", "--set", "0.05=TRUE", "--for", "50ms", "--show", "Pump"]).output
+        == "Pump = TRUE\n"
+    )
