@@ -45,8 +45,9 @@ VERB_GROUPS = {
         "explain": "Print the page of a diagnostic.",
         "ladder": "Draw the rungs of a program.",
         "sfc": "Draw the sequential function charts of a program.",
-        "import": "Make sources of a project in PLCopen XML.",
-        "export": "Write programs as a project in PLCopen XML.",
+        "import": "Make sources of a project in PLCopen XML or of CX-Programmer.",
+        "export": "Write programs as PLCopen XML, or into a project of CX-Programmer.",
+        "diff": "Show what differs between two versions of a program.",
     }),
     "recordings": ("Look at recordings", {
         "chart": "Draw variables of a trace, a column a scan.",

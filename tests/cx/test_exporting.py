@@ -104,7 +104,7 @@ def test_symbols_get_comments_addresses_and_rows() -> None:
     assert [line for line in difference(LATER, made) if line[0] == "+"] == [
         "+    Start,0.00,BOOL,,,the green one;", "+    Pump,100.01,BOOL,,,;", '+    Extra,D7,INT,,,"more, of it";',
         "+   VariableCount:=5;"]  # fmt: skip
-    assert made.changed == ["global symbol Start", "global symbol Pump", "global symbol Extra"]
+    assert sorted(made.changed) == ["global symbol Extra", "global symbol Pump", "global symbol Start"]
     assert "VariableCount:=5;" in (made.data or b"").decode("cp1252")
 
 

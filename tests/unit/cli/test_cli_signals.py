@@ -59,6 +59,7 @@ VERBS: dict[str, list[list[str]]] = {
     "check": [["big.st"]], "fmt": [["big.st", "--check"]], "list": [["big.st"]], "export": [["big.st", "-o", "out.xml"]],
     "import": [["big.xml", "-o", "sources", "--force"]], "ladder": [[str(data_folder("examples") / "ladder.st")]],
     "sfc": [[str(data_folder("examples") / "sfc.st")]], "explain": [[]],
+    "diff": [["big.st", str(data_folder("examples") / "ladder.st")]],
     "run": [[DEMO, *PEER, *FOREVER, "--trace", "r.fbtrace", "--journal", "r.journal", "--pcap", "r.pcapng"],
             [DEMO, *FOREVER, "--engine", "python", "--html", "r.html"], [DEMO, *FOREVER, "--net", "tcp"],
             ["big.st", *FOREVER, "--engine", "native", "--no-cache"]],

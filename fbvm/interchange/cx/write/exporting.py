@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.interchange.contents import Contents, Declared, Program, WrittenRung, contents
 from fbvm.interchange.cx.compression import compress
 from fbvm.interchange.cx.markup import CxText, Value, read_markup
 from fbvm.interchange.cx.read.importing import import_project
@@ -18,7 +19,6 @@ from fbvm.interchange.cx.read.project import Plc, Section, read_plcs
 from fbvm.interchange.cx.read.project import Program as SavedProgram
 from fbvm.interchange.cx.read.symbols import spelling
 from fbvm.interchange.cx.write.markers import renumbered
-from fbvm.interchange.cx.write.programs import Contents, Declared, Program, WrittenRung, contents
 from fbvm.interchange.cx.write.rows import RowError, changed_rows
 from fbvm.interchange.cx.write.rungs import rung_text
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from fbvm.interchange.contents import Declared
 from fbvm.interchange.cx.markup import CxText, Row, Value
 from fbvm.interchange.cx.read.symbols import TYPES, symbols
-from fbvm.interchange.cx.write.programs import Declared
 from fbvm.interchange.cx.write.rungs import MARK, NEW
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from fbvm.interchange.contents import WrittenRung
 from fbvm.interchange.cx.markup import CxText
-from fbvm.interchange.cx.write.programs import WrittenRung
 
 MARK = "$?St$Bk?_#[{}]"
 NEW = 10_000_000

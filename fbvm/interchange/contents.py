@@ -1,4 +1,4 @@
-"""What sources hold, as an export compares it: rungs of programs by section, declared symbols, and everything else as text."""
+"""What sources hold, as those compare it who look for differences: rungs by section, declared symbols, all else as text."""
 
 from __future__ import annotations
 
@@ -19,14 +19,21 @@ _COMMENT = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\r\n]*?)[ \t]*(?=\r?\n|$)")
 class WrittenStep:
     """An instruction as statement lists have it, and the comment behind it."""
 
-    text: str
+    prefix: str
+    mnemonic: str
+    code: str
     operands: tuple[str, ...]
     remark: str
 
     @property
+    def text(self) -> str:
+        """The instruction without its operands."""
+        return self.prefix + self.mnemonic + (f"({self.code})" if self.code else "")
+
+    @property
     def is_call(self) -> bool:
         """Whether it calls a function block, which statement lists cannot say."""
-        return self.text == "FBCALL"
+        return self.mnemonic == "FBCALL"
 
 
 @dataclass(frozen=True)
@@ -51,20 +58,23 @@ class Declared:
 
 @dataclass
 class Program:
-    """A PROGRAM with a LADDER: its sections by name in the order of writing, and what it declares."""
+    """A PROGRAM or FUNCTION_BLOCK with a LADDER: its sections by name in the order of writing, and what it declares."""
 
     source: Source
     name: str
     at: int
+    kind: str = "PROGRAM"
     sections: dict[str, list[WrittenRung]] = field(default_factory=dict)
     declared: dict[str, Declared] = field(default_factory=dict)
 
 
 @dataclass
 class Contents:
-    """All that sources hold: programs, global symbols, and other POUs by name with their text."""
+    """All that sources hold: programs with rungs, other POUs with rungs, global symbols, and all POUs but these programs with
+    their text."""
 
     programs: dict[str, Program] = field(default_factory=dict)
+    blocks: dict[str, Program] = field(default_factory=dict)
     symbols: dict[str, tuple[Source, Declared]] = field(default_factory=dict)
     others: dict[str, tuple[Source, int, str]] = field(default_factory=dict)
     diagnostics: list[Diagnostic] = field(default_factory=list)
@@ -82,6 +92,8 @@ def contents(sources: Iterable[Source]) -> Contents:
             elif isinstance(part, tree.Pou) and part.kind == "PROGRAM" and any(isinstance(one, Ladder) for one in part.body):
                 made.programs[part.name.text.casefold()] = _program(source, part)
             elif isinstance(part, tree.Pou):
+                if any(isinstance(one, Ladder) for one in part.body):
+                    made.blocks[part.name.text.casefold()] = _program(source, part)
                 words = re.sub(r"\s+", " ", source.text[part.start:part.end])
                 made.others[part.name.text.casefold()] = source, part.start, words
     return made
@@ -104,7 +116,7 @@ def _declared(source: Source, section: tree.VarSection) -> dict[str, Declared]:
 
 
 def _program(source: Source, pou: tree.Pou) -> Program:
-    made = Program(source, pou.name.text, pou.name.start)
+    made = Program(source, pou.name.text, pou.name.start, pou.kind)
     for section in pou.sections:
         if section.kind == "VAR" and not section.hidden and not _is_constant(section):
             made.declared.update((name.casefold(), one) for name, one in _declared(source, section).items())
@@ -131,5 +143,5 @@ def _rung(rung: RungText) -> WrittenRung:
 
 
 def _step(line: Line) -> WrittenStep:
-    code = f"({line.row.code})" if line.row.code and line.row.code.isdecimal() else ""
-    return WrittenStep(line.step.prefix + line.step.mnemonic + code, line.step.operands, line.remark.removeprefix("//").strip())
+    return WrittenStep(line.step.prefix, line.step.mnemonic, line.row.code if line.row.code.isdecimal() else "",
+                       line.step.operands, line.remark.removeprefix("//").strip())

@@ -1,0 +1,88 @@
+"""`fbvm diff`: symbols and rungs of two versions of a program, side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from click.testing import CliRunner
+from cx_text import SAMPLE
+
+from fbvm.base.diagnostics import Source
+from fbvm.cli.main import main
+from fbvm.interchange.contents import contents
+from fbvm.interchange.cx.compression import compress
+from fbvm.record.draw.difference import differences
+
+OLD = """PROGRAM Main
+VAR a AT 0.00 : BOOL; // start
+b : BOOL; END_VAR
+LADDER
+RUNG 0 first
+LD a
+OUT b
+RUNG 1
+LD b
+OUT 1.00
+END_LADDER
+END_PROGRAM
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+Twice := 2 * x;
+END_FUNCTION
+"""
+
+
+def shown(old: str, new: str, width: int = 120) -> list[str]:
+    found = differences(contents([Source("a.st", old)]), contents([Source("b.st", new)]), width)
+    return [line for one in found for line in (f"{one.where}: {one.what}", *one.lines)]
+
+
+def test_nothing_differs_between_a_text_and_its_copy_in_other_clothes() -> None:
+    assert shown(OLD, OLD) == []
+    assert shown(OLD, OLD.replace("LD a", "  LD     a").replace("\n", "\r\n")) == []
+
+
+def test_a_changed_rung_is_drawn_beside_the_one_before() -> None:
+    assert [line.rstrip() for line in shown(OLD, OLD.replace("LD b\n", "LD b\nANDNOT a\n"), 90)] == [
+        "Main: 1 rung changed",
+        "- RUNG 1                                      + RUNG 1",
+        "- │   b            1.00  │                    + │   b      a         1.00  │",
+        "- ├──┤ ├────────────( )──┤                    + ├──┤ ├────┤/├─────────( )──┤",
+    ]
+
+
+def test_added_and_removed_rungs_stand_on_their_side() -> None:
+    more = OLD.replace("END_LADDER", "RUNG 2\nLD P_On\nOUT 1.01\nEND_LADDER")
+    assert shown(OLD, more)[0] == "Main: 1 rung added"
+    assert all(line.startswith("+") or not line[:40].strip() for line in shown(OLD, more)[1:])
+    assert shown(more, OLD)[0] == "Main: 1 rung removed"
+    assert all(line.startswith("-") for line in shown(more, OLD)[1:])
+
+
+def test_narrow_terminals_have_one_below_the_other() -> None:
+    lines = shown(OLD, OLD.replace("LD b\n", "LD b\nANDNOT a\n"), 60)
+    assert [line[0] for line in lines[1:]] == ["-"] * 3 + ["+"] * 3
+
+
+def test_symbols_comments_and_texts_differ_too() -> None:
+    new = OLD.replace("// start", "// go").replace("2 * x", "3 * x")
+    assert shown(OLD, new) == ["Main: 1 symbol changed", "- a AT 0.00 : BOOL  // start", "+ a AT 0.00 : BOOL  // go", "Twice: changed",
+                               "@@ -2,3 +2,3 @@", " VAR_INPUT x : INT; END_VAR", "-Twice := 2 * x;", "+Twice := 3 * x;", " END_FUNCTION"]  # fmt: skip
+
+
+def test_projects_differ_by_their_status_and_quietly(tmp_path: Path) -> None:
+    one, other = tmp_path / "a.cxp", tmp_path / "b.cxt"
+    one.write_bytes(compress(SAMPLE.bytes()))
+    other.write_bytes(SAMPLE.bytes())
+    run = CliRunner().invoke
+    assert (run(main, ["diff", str(one), str(other)]).exit_code, run(main, ["diff", str(one), str(other)]).output) == (0, "")
+    other.write_bytes(SAMPLE.bytes().replace(b"OR Pump\n", b"OR Pump\nOR W0.00\n"))
+    done = run(main, ["diff", str(one), str(other)])
+    assert done.exit_code == 1
+    assert "NewProgram1, section Pumping: 1 rung changed" in done.output
+    assert (
+        run(main, ["diff", "-q", str(one), str(other)]).exit_code,
+        run(main, ["diff", "-q", str(one), str(other)]).output,
+    ) == (1, "")
+    other.write_bytes(b"CXProgVer:=cut")
+    assert run(main, ["diff", str(one), str(other)]).exit_code == 3
