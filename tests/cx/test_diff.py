@@ -66,8 +66,9 @@ def test_narrow_terminals_have_one_below_the_other() -> None:
 
 def test_symbols_comments_and_texts_differ_too() -> None:
     new = OLD.replace("// start", "// go").replace("2 * x", "3 * x")
-    assert shown(OLD, new) == ["Main: 1 symbol changed", "- a AT 0.00 : BOOL  // start", "+ a AT 0.00 : BOOL  // go", "Twice: changed",
-                               "@@ -2,3 +2,3 @@", " VAR_INPUT x : INT; END_VAR", "-Twice := 2 * x;", "+Twice := 3 * x;", " END_FUNCTION"]  # fmt: skip
+    assert shown(OLD, new) == [
+        "Main: 1 symbol changed", "- a AT 0.00 : BOOL  // start", "+ a AT 0.00 : BOOL  // go", "Twice: changed",
+        "@@ -2,3 +2,3 @@", " VAR_INPUT x : INT; END_VAR", "-Twice := 2 * x;", "+Twice := 3 * x;", " END_FUNCTION"]  # fmt: skip
 
 
 def test_projects_differ_by_their_status_and_quietly(tmp_path: Path) -> None:
