@@ -12,6 +12,8 @@ from fbvm.syntax.ladder.mnemonics import Line, RungText, read_rungs
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree.ladder import Ladder
 
+_OWN = ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT")
+"""Sections of what a POU declares itself."""
 _COMMENT = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\r\n]*?)[ \t]*(?=\r?\n|$)")
 
 
@@ -77,6 +79,8 @@ class Contents:
     blocks: dict[str, Program] = field(default_factory=dict)
     symbols: dict[str, tuple[Source, Declared]] = field(default_factory=dict)
     others: dict[str, tuple[Source, int, str]] = field(default_factory=dict)
+    addresses: dict[str, str] = field(default_factory=dict)
+    """Comments of addresses that have no name, from rows of tables of symbols."""
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
 
@@ -90,10 +94,10 @@ def contents(sources: Iterable[Source]) -> Contents:
             if isinstance(part, tree.GlobalVars) and not _is_constant(part.section):
                 made.symbols.update((name.casefold(), (source, one)) for name, one in _declared(source, part.section).items())
             elif isinstance(part, tree.Pou) and part.kind == "PROGRAM" and any(isinstance(one, Ladder) for one in part.body):
-                made.programs[part.name.text.casefold()] = _program(source, part)
+                made.programs[part.name.text.casefold()] = _program(source, part, made.addresses)
             elif isinstance(part, tree.Pou):
                 if any(isinstance(one, Ladder) for one in part.body):
-                    made.blocks[part.name.text.casefold()] = _program(source, part)
+                    made.blocks[part.name.text.casefold()] = _program(source, part, made.addresses)
                 words = re.sub(r"\s+", " ", source.text[part.start:part.end])
                 made.others[part.name.text.casefold()] = source, part.start, words
     return made
@@ -115,26 +119,33 @@ def _declared(source: Source, section: tree.VarSection) -> dict[str, Declared]:
     return found
 
 
-def _program(source: Source, pou: tree.Pou) -> Program:
+def _program(source: Source, pou: tree.Pou, addresses: dict[str, str]) -> Program:
     made = Program(source, pou.name.text, pou.name.start, pou.kind)
     for section in pou.sections:
-        if section.kind == "VAR" and not section.hidden and not _is_constant(section):
+        if section.kind in _OWN and not section.hidden and not _is_constant(section):
             made.declared.update((name.casefold(), one) for name, one in _declared(source, section).items())
-    name = ""
-    for ladder in (one for one in pou.body if isinstance(one, Ladder)):
-        first = source.text.index("\n", ladder.start) + 1
-        last = source.text.rfind("\n", 0, ladder.end) + 1
-        rungs = read_rungs(source.text, first, max(first, last), lambda *message: None)
-        numbered = any(rung.declared for rung in rungs)
-        for rung in rungs:
-            name = " ".join(rung.section.split()[1:]) if rung.section else name
-            listed = made.sections.setdefault(name, [])
-            written = _rung(rung)
-            if numbered and not rung.declared and listed:
-                listed[-1] = WrittenRung(listed[-1].comment, listed[-1].steps + written.steps, listed[-1].at)
-            elif rung.declared or rung.lines:
-                listed.append(written)
+    for ladder in pou.body:
+        if isinstance(ladder, Ladder):
+            _add_rungs(made, ladder, addresses)
     return made
+
+
+def _add_rungs(made: Program, ladder: Ladder, addresses: dict[str, str]) -> None:
+    """Adds the rungs of a LADDER to the sections of a POU.  One without a line RUNG belongs to the one before if others have one."""
+    text, name = made.source.text, next(reversed(made.sections), "")
+    first = text.index("\n", ladder.start) + 1
+    last = text.rfind("\n", 0, ladder.end) + 1
+    rungs = read_rungs(text, first, max(first, last), lambda *message: None)
+    addresses.update((row.address, row.comment) for rung in rungs for row in rung.symbols if not row.name and row.comment)
+    numbered = any(rung.declared for rung in rungs)
+    for rung in rungs:
+        name = " ".join(rung.section.split()[1:]) if rung.section else name
+        listed = made.sections.setdefault(name, [])
+        written = _rung(rung)
+        if numbered and not rung.declared and listed:
+            listed[-1] = WrittenRung(listed[-1].comment, listed[-1].steps + written.steps, listed[-1].at)
+        elif rung.declared or rung.lines:
+            listed.append(written)
 
 
 def _rung(rung: RungText) -> WrittenRung:

@@ -7,11 +7,13 @@ from pathlib import Path
 import click
 
 from fbvm.base.files import write_file
-from fbvm.cli.shared.drawings import SVG_WIDTH, print_lines, rung_lines, symbol_addresses
+from fbvm.cli.shared.drawings import SVG_WIDTH, comment_lines, print_lines, rung_lines, symbol_addresses
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.given_sources import sources_of
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.sources import compile_or_exit, source_arguments
 from fbvm.cli.shared.terminal import say
+from fbvm.interchange.contents import contents
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.ladder_text import ladder_surface
 from fbvm.syntax.ladder.drawing.widths import Annotations
@@ -20,9 +22,10 @@ from fbvm.syntax.ladder.drawing.widths import Annotations
 @click.command("ladder")
 @source_arguments
 @click.option("--width", type=click.IntRange(min=24), help="Columns of text; the terminal's if not given.")
+@click.option("--comments", "commented", is_flag=True, help="Print names, addresses and comments of operands below each rung.")
 @click.option("--svg", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Write an SVG file instead.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], width: int | None,
-            svg: Path | None) -> None:
+            commented: bool, svg: Path | None) -> None:
     """Draw the rungs of the files, POU by POU."""
     image = compile_or_exit(files, program, libraries, runnable=False, drawn=True)
     if not image.rungs:
@@ -33,9 +36,13 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         with writing(svg):
             write_file(svg, ladder_svg(drawn))
         return
+    known = contents(sources_of(files)) if commented else None
     body = -1
     for rung in image.rungs:
         if rung.body != body:
             body = rung.body
             say(f"{image.bodies[body].kind} {image.bodies[body].name}")
-        print_lines(rung_lines(image, rung, width or chart_width()))
+        lines = rung_lines(image, rung, width or chart_width())
+        if known:
+            lines += comment_lines(rung, image.bodies[body].name, symbol_addresses(image, body), known)
+        print_lines(lines)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import cache
 
 import click
 
@@ -12,6 +13,7 @@ from fbvm.base.types import StructType, fold
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.terminal import say
 from fbvm.code.image import Image, RungPicture
+from fbvm.interchange.contents import Contents
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_text import ladder_text
 from fbvm.record.draw.power import PowerFlow
@@ -38,15 +40,24 @@ def print_lines(lines: Iterable[str]) -> None:
 def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
     """A function from the name of a variable to its address, "" without one.
 
-    Knows the variables that the POU of body number `body` declares with AT, and global variables."""
+    Knows the variables that the POU of body number `body` declares with AT, and global variables.  The other way round, an
+    address gives the name of the global variable that lies there."""
     own = image.types.get(fold(image.bodies[body].name))
     names = Names.of(image, image.layout.areas)
+
+    @cache
+    def by_address() -> dict[str, str]:
+        found = ((names.address(Place(field.name, field.type, field.offset, field.bit)), field.name)
+                 for field in image.symbols.values() if field.absolute)
+        return {place.removeprefix("CIO "): name for place, name in reversed(list(found)) if place}
 
     def address(symbol: str) -> str:
         name = fold(symbol)
         field = own.fields.get(name) if isinstance(own, StructType) else None
         field = field or image.symbols.get(name)
-        if field is None or not field.absolute:
+        if field is None:
+            return by_address().get(symbol, "")
+        if not field.absolute:
             return ""
         return names.address(Place(field.name, field.type, field.offset, field.bit)).removeprefix("CIO ")
 
@@ -56,6 +67,29 @@ def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
 def rung_lines(image: Image, rung: RungPicture, width: int) -> list[str]:
     """The lines of a rung that is not executed, at most `width` columns wide, with addresses of its variables."""
     return ladder_text(rung, width, Annotations(None, symbol_addresses(image, rung.body)))
+
+
+def comment_lines(rung: RungPicture, pou: str, address: Callable[[str], str], known: Contents) -> list[str]:
+    """What the declarations say of the operands of a rung: name, address and comment, a line each.
+
+    pou: the name of the POU of the rung.  address: finds addresses of names and names of addresses.  known: the declarations."""
+    own = {**known.blocks, **known.programs}.get(fold(pou).casefold())
+    rows: dict[str, tuple[str, str, str]] = {}
+    for operand in (part for _, _, _, operands in rung.steps for text in operands for part in _WORDS.findall(text)):
+        other = address(operand)
+        is_name = operand.casefold() in known.symbols or own is not None and operand.casefold() in own.declared
+        name = operand if is_name or not other else other
+        declared = own.declared.get(name.casefold()) if own else None
+        declared = declared or known.symbols.get(name.casefold(), (None, None))[1]
+        comment = declared.comment if declared else known.addresses.get(operand, "")
+        if comment:
+            rows.setdefault(name, (name, operand if name == other else other, comment))
+    widths = [max((len(row[column]) for row in rows.values()), default=0) for column in (0, 1)]
+    return [f"  {name:{widths[0]}}  {place:{widths[1]}}  {comment}" for name, place, comment in rows.values()]
+
+
+_WORDS = re.compile(r"(?:(?<=:=)|(?<==>)|^)[@*]?([^\W]\w*(?:\.\w+)?)$")
+"""The name or address in an operand, or behind the sign of a pin."""
 
 
 def scan_filter(text: str) -> Callable[[int], bool]:

@@ -12,6 +12,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file, reason
 from fbvm.interchange.cx.markup import is_project
 from fbvm.interchange.cx.read.importing import ImportedProject, import_project
+from fbvm.syntax.text import read
 
 SUFFIXES = (".cxp", ".cxt")
 
@@ -54,3 +55,9 @@ def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]
     """What the compiler takes for these files, and what is said about projects among them."""
     diagnostics = [diagnostic for path in paths if (made := imported(path)) is not None for diagnostic in made.diagnostics]
     return [Source(name, one) if isinstance(one, str) else one for name, one in given_sources(paths).items()], diagnostics
+
+
+def sources_of(paths: Sequence[Path]) -> list[Source]:
+    """The sources of these files that can be read."""
+    texts = [one if isinstance(one, Source) else read(one, str(one)) for one in inputs(paths)[0]]
+    return [text for text in texts if isinstance(text, Source)]

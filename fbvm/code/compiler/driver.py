@@ -110,7 +110,8 @@ def compile_files(paths: Sequence[Path | str | Source], program: str | None = No
             image_cache.write(entry, sources, made.image, made.diagnostics)
     if made.image and not unreadable:
         return made
-    return Compilation(None, unreadable + with_neighbours(made.diagnostics, paths))
+    files = [path for path in paths if not isinstance(path, Source)]
+    return Compilation(None, unreadable + with_neighbours(made.diagnostics, files))
 
 
 def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,
