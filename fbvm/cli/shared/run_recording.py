@@ -12,10 +12,10 @@ from typing import Any, BinaryIO
 import click
 
 import fbvm
-from fbvm.base.diagnostics import Source
 from fbvm.base.files import write_file
 from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
+from fbvm.cli.shared.given_sources import sources_of
 from fbvm.cli.shared.terminal import named, say
 from fbvm.cli.shared.traces import statement_lines
 from fbvm.machine.plc import Plc
@@ -28,7 +28,6 @@ from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.selection import select
 from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
-from fbvm.syntax.text import read
 from fbvm.watch.paths import UnknownPlace
 
 INTERRUPTED_SCANS = 400
@@ -137,8 +136,7 @@ def described(plc: Plc, program: ProgramText, options: Mapping[str, Any], files:
 
 def program_text(files: Sequence[Path], libraries: Sequence[Path], **choices: Any) -> ProgramText:
     """The text of a program in these files."""
-    sources = [read(path, str(path)) for path in files]
-    texts = tuple((source.name, source.text) for source in sources if isinstance(source, Source))
+    texts = tuple((source.name, source.text) for source in sources_of(files))
     return ProgramText(texts, tuple(str(folder) for folder in libraries), **choices)
 
 
