@@ -131,7 +131,8 @@ def _program(source: Source, pou: tree.Pou, addresses: dict[str, str]) -> Progra
 
 
 def _add_rungs(made: Program, ladder: Ladder, addresses: dict[str, str]) -> None:
-    """Adds the rungs of a LADDER to the sections of a POU.  One without a line RUNG belongs to that before if others have it."""
+    """Adds the rungs of a LADDER to the sections of a POU.  One without a line RUNG belongs to the one before it if others have
+    one."""
     text, name = made.source.text, next(reversed(made.sections), "")
     first = text.index("\n", ladder.start) + 1
     last = text.rfind("\n", 0, ladder.end) + 1
