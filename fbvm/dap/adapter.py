@@ -46,6 +46,8 @@ class Adapter:
         self.moves = Moves(self.debug, self.breakpoints, self._run_ended)
         self.ended = False
         """True when the client has disconnected."""
+        self.ends_target = False
+        """True if the client wants what it was attached to to end, too."""
         self._is_configured = False
         self._waiting: Message | None = None
         """The request `launch` or `attach` that is answered when the configuration is done."""
@@ -209,7 +211,8 @@ class Adapter:
     def _begin(self, no_debug: bool) -> None:
         debug, target = self.debug, self.debug.target
         assert target is not None
-        self._event("process", {"name": ", ".join(debug.running.plcs), "startMethod": "launch", "isLocalProcess": True})
+        how = "attach" if self._is_attached else "launch"
+        self._event("process", {"name": ", ".join(debug.running.plcs), "startMethod": how, "isLocalProcess": True})
         if no_debug:
             self.breakpoints.clear()
         session = debug.plc()
@@ -218,6 +221,8 @@ class Adapter:
             self.moves.stopped(reason, str(session.trap) if session.trap else f"the end of the recording: {scan_text(session)}")
             return
         wants_entry = target.stop_on_entry
+        if wants_entry is None and self._is_attached:
+            wants_entry = False
         if wants_entry is None:
             wants_entry = self.breakpoints.is_empty and target.until_scan is None and not no_debug
         warnings = [text for plc in debug.running.plcs.values() if isinstance(plc.session, Session)
@@ -229,10 +234,17 @@ class Adapter:
         else:
             self.moves.resume({})
 
+    @property
+    def _is_attached(self) -> bool:
+        """True if something is debugged that runs elsewhere."""
+        return self._arguments is not None and self._arguments[0] == "attach"
+
     def _restart(self, arguments: Arguments) -> None:
         """restart: opens the same again, with the same breakpoints."""
         if self._arguments is None:
             raise Refusal("nothing is debugged")
+        if self._is_attached:
+            raise Refusal("what runs elsewhere cannot be begun again from here")
         self.moves.interrupted()
         how, given = self._arguments
         changed = arguments.get("arguments")
@@ -250,7 +262,7 @@ class Adapter:
     def _disconnect(self, arguments: Arguments) -> None:
         self.moves.interrupted()
         self._close()
-        self.ended = True
+        self.ended, self.ends_target = True, bool(arguments.get("terminateDebuggee"))
 
     def _terminate(self, arguments: Arguments) -> None:
         self.moves.interrupted()

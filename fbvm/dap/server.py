@@ -12,12 +12,20 @@ from fbvm.dap.framing import Framer, FramingError, Message, encode
 from fbvm.dap.target import Opener
 from fbvm.run.slices import Slices
 
+Connection = tuple[Callable[[], bytes], Callable[[bytes], None], Callable[[], None]]
+"""How bytes are read and written, and the connection closed."""
+
 
 def serve(open_target: Opener, read: Callable[[], bytes], write: Callable[[bytes], None]) -> str:
     """Serves a client until it disconnects or is gone.
 
     `read` waits for bytes and returns b"" at the end; `write` writes all bytes.  Returns what was wrong with the bytes that came,
     "" if nothing was."""
+    return serve_until_ended(open_target, read, write)[0]
+
+
+def serve_until_ended(open_target: Opener, read: Callable[[], bytes], write: Callable[[bytes], None]) -> tuple[str, bool]:
+    """Does what `serve` does; the second result is True if the client wants what is debugged to end."""
     waiting: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def reading() -> None:
@@ -42,19 +50,49 @@ def serve(open_target: Opener, read: Callable[[], bytes], write: Callable[[bytes
                 continue
             data = waiting.get()
             if not data:
-                return "the client is gone in the middle of a message" if framer.is_inside else ""
+                return "the client is gone in the middle of a message" if framer.is_inside else "", False
             was_running = adapter.is_running
             for message in framer.feed(data):
                 adapter.receive(message)
             if adapter.is_running and not was_running:
                 slices.begin()
     except FramingError as error:
-        return str(error)
+        return str(error), False
     except BrokenPipeError:
-        return ""
+        return "", False
     finally:
-        adapter.close()
-    return ""
+        if not adapter.ended:
+            adapter.close()
+    return "", adapter.ends_target
+
+
+class DebugDoor:
+    """Where a debugger attaches to a program that runs.  `accept` waits for the next connection."""
+
+    def __init__(self, accept: Callable[[], Connection]) -> None:
+        self._waiting: queue.SimpleQueue[Connection] = queue.SimpleQueue()
+
+        def accepting() -> None:
+            with suppress(OSError):
+                while True:
+                    self._waiting.put(accept())
+
+        threading.Thread(target=accepting, daemon=True).start()
+
+    @property
+    def is_called(self) -> bool:
+        """True if a client waits."""
+        return not self._waiting.empty()
+
+    def serve(self, open_target: Opener) -> bool:
+        """Serves the client that waits, if one does, until it disconnects; returns True if it wants the program to end."""
+        if self._waiting.empty():
+            return False
+        read, write, close = self._waiting.get()
+        try:
+            return serve_until_ended(open_target, read, write)[1]
+        finally:
+            close()
 
 
 def pass_on(read: Callable[[], bytes], write: Callable[[bytes], None], receive: Callable[[], bytes],

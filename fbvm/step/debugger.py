@@ -243,6 +243,7 @@ class Debugger:
         """Says for each PLC which scan comes next, and makes its runner."""
         here = self.session.here
         if self.here.world:
+            self.here.world.begin()
             self.here.world.advance(self.focus, here.scan + 1)
         self._runners, self._next = {}, {}
         for name, plc in self.plcs.items():

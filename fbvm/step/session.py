@@ -24,7 +24,7 @@ class Session(Stepping):
     def __init__(self, world: World, name: str = "") -> None:
         self.world, self.name = world, name or world.names[0]
         super().__init__(ScanReplay(world[self.name]))
-        self.go_to(Position())
+        self.go_to(Position(self.world[self.name].scans))
         self.mark()
 
     @classmethod

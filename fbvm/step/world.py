@@ -12,6 +12,7 @@ from functools import partial
 from fbvm.machine.plc import Plc, State
 from fbvm.record.recording.recording import PlcRecording, Recording
 from fbvm.record.trace.observing import observing
+from fbvm.run.real_pace import RealPace
 from fbvm.run.running import TimedWrite
 from fbvm.step.position import Position
 from fbvm.step.scan_replay import Action, ActionInjector
@@ -59,10 +60,10 @@ class World:
     """Executes scans of PLCs in the order of their times, PLCs of one time in the order in which `make` returns them.
 
     `make` returns new PLCs at power-on, in virtual time; what it returns is equal each time.  With `is_fixed` it is called once
-    only, and the past cannot be changed."""
+    only, and the past cannot be changed; `pace` is then that of the only PLC, if it has real connections."""
 
-    def __init__(self, make: Callable[[], Iterable[Debugged]], is_fixed: bool = False) -> None:
-        self._make, self.is_fixed = make, is_fixed
+    def __init__(self, make: Callable[[], Iterable[Debugged]], is_fixed: bool = False, pace: RealPace | None = None) -> None:
+        self._make, self.is_fixed, self._pace = make, is_fixed, pace
         self._live: dict[str, _Live] = {}
         self._build({})
 
@@ -103,6 +104,8 @@ class World:
     def quiet_until(self, name: str, scan: int) -> int:
         """The first scan from now on, up to `scan`, before or in which something is done from outside."""
         live = self._live[name]
+        if self._pace:
+            return live.plc.scans
         first = min([scan, *(position.scan for position in live.actions if position.scan >= live.plc.scans)])
         if live.plc.scans in live.timed:
             return live.plc.scans
@@ -134,18 +137,19 @@ class World:
                 break
             live.timed.setdefault(plc.scans, []).append(partial(_write, row))
         actions = self.actions_in(name, plc.scans)
+        now_ns = self._pace.wait() if self._pace and not plc.halted else None
         if not actions:
-            plc.scan()
+            plc.scan(now_ns)
             return
         live.changed.setdefault(plc.scans, plc.snapshot())
         for action in actions.get(0, ()):
             action(plc)
         if any(actions):
             with observing(plc, ActionInjector(actions), stands_still=True):
-                plc.scan()
+                plc.scan(now_ns)
             live.recorded.changed()
         else:
-            plc.scan()
+            plc.scan(now_ns)
 
     def undo(self, name: str) -> None:
         """Takes back the scan of a PLC that stands at a breakpoint: the PLC is before it again."""
@@ -175,7 +179,23 @@ class World:
 
     def first(self, name: str) -> int:
         """The oldest scan that can be looked at."""
-        return self._live[name].recorded.scans.start if self.is_fixed else 0
+        if not self.is_fixed:
+            return 0
+        held = self._live[name].recorded.scans
+        return held.start if held else self[name].scans
+
+    def begin(self) -> None:
+        """Called when scans are executed again after a stop: real time goes on where it stood."""
+        if self._pace:
+            self._pace.begin()
+
+    def leave(self) -> None:
+        """Ends the session: what was done and is not executed yet takes effect, and nothing is recorded any more."""
+        for name, live in self._live.items():
+            if self.has_actions(name, live.plc.scans):
+                self.begin()
+                self.scan(name)
+            live.recorded.close()
 
     def time_of(self, name: str, scan: int) -> int:
         """The time at which a scan began, or will begin."""

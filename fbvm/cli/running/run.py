@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from fbvm.cli.running.project import run_project
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
+from fbvm.cli.shared.debug_door import NEVER_WITH, run_with_door
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in
@@ -91,6 +92,8 @@ HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 @click.option("--engine", type=click.Choice(CHOICES), default="auto", show_default=True,
               help="auto: Python first, machine code when that pays.")
 @click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
+@click.option("--debug", "debug_port", type=click.IntRange(0, 65535), metavar="PORT",
+              help="Let an editor's debugger attach at this port; 0 is one that the system picks.")
 @click.option("--scan-time", is_flag=True,
               help="Say how long scans took and how late they began; a run over tcp on a terminal does so by itself.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -136,7 +139,7 @@ def command(
             if recorded.recording:
                 text = program_text(files, libraries, program=program, drawn=drawn, e_banks=tuple(banks), **compile_options())
                 recorded.add(files[0].stem if files else "PLC", plc, described(plc, text, options, files, libraries))
-            result = _run(plc, as_json, capture, recorded, **options)
+            result = _run(plc, as_json, capture, recorded, files=files, libraries=libraries, **options)
             recorded.only_last = result.reason == "interrupted"
         if html:
             write_page(recorded, html, statement_lines(image, files, libraries))
@@ -159,7 +162,8 @@ def _run(
     plc: Plc, as_json: bool, capture: Capture | None, recorded: RunRecording, *,
     settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
     pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
-    scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], **_: Any,
+    scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], debug_port: int | None,
+    files: tuple[Path, ...], libraries: tuple[Path, ...], **_: Any,
 ) -> RunResult:  # fmt: skip
     """Runs to the end.  Raises UsageError for names, values and conditions that do not fit the program."""
     for warning in plc.warnings:
@@ -179,10 +183,14 @@ def _run(
                 if capture:  # of a quiet network a buffer would take minutes to fill
                     capture.flush()
 
-            reason = loop.run(
-                plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes, pace=pace,
-                progress=progress,
-            )  # fmt: skip
+            if debug_port is not None:
+                reason = run_with_door(plc, debug_port, files, libraries, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns,
+                                       writes=writes, pace=pace, progress=progress)  # fmt: skip
+            else:
+                reason = loop.run(
+                    plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes,
+                    pace=pace, progress=progress,
+                )  # fmt: skip
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
     for write, given in zip(writes, settings, strict=True):
@@ -235,10 +243,12 @@ def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, pl
 
 def _check_usage(
     *, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
-    max_ns: int | None, **_: Any,
+    max_ns: int | None, debug_port: int | None, **others: Any,
 ) -> None:  # fmt: skip
+    if debug_port is not None and (both := [said for name, said in NEVER_WITH.items() if others.get(name)]):
+        raise click.UsageError(f"--debug looks into scans itself: leave out {', '.join(both)}")
     ends = sum(bound is not None for bound in (scans, for_ns, until))
-    if ends > 1 or not (ends or doors):
+    if ends > 1 or not (ends or doors or debug_port is not None):
         raise click.UsageError(f"say when to end by one of --scans, --for and --until; {ends or 'none'} given")
     if max_ns is not None and until is None:
         raise click.UsageError("--max bounds --until, which is not given")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import FILE, Project, project_file, read_project
+from fbvm.run.real_pace import RealPace
 from fbvm.run.running import TimedWrite
 from fbvm.step.position import Position
 from fbvm.step.session import Session
@@ -54,6 +55,34 @@ def open_launch(arguments: Mapping[str, Any]) -> Target:
     except (click.ClickException, LookupError, TypeError, ValueError, OSError) as error:
         said = error.format_message() if isinstance(error, click.ClickException) else str(error)
         raise LaunchError(said) from None
+
+
+ATTACH: dict[str, tuple[type, ...]] = {"stopOnEntry": (bool,), "force": (dict,), "keepForces": (bool,), "cwd": (str,),
+                                       "connect": (str, int)}  # fmt: skip
+"""The keys of an attach configuration; `connect` is for the extension that starts `fbvm dap --connect`."""
+
+
+def open_attached(plc: Plc, paths: Mapping[str, Path], libraries: Sequence[Path], arguments: Mapping[str, Any]) -> Target:
+    """A PLC that runs, from now on.  `paths` are its sources by name.  Raises LaunchError."""
+    given = checked(arguments, ATTACH, "attach")
+    pace = RealPace(plc)
+    try:
+        world = World(lambda: [Debugged("plc", plc)], is_fixed=True, pace=pace if pace.is_real else None)
+        forced = set(plc.forces)
+        for name, value in given.get("force", {}).items():
+            place = plc.find(name)
+            plc.force(name, parse_for(place, _text(value)))
+    except (LookupError, TypeError, ValueError) as error:
+        raise LaunchError(str(error)) from None
+
+    def close() -> None:
+        world.leave()
+        for name in () if given.get("keepForces") else set(plc.forces) - forced:
+            plc.unforce(name)
+
+    notes = ["going back shows what was recorded since now, read-only: real connections do not travel in time"]
+    return Target({"plc": Session(world, "plc")}, source_texts(plc.image, paths, libraries), paths, stop_on_entry=given.get(
+        "stopOnEntry"), notes=notes, close=close)  # fmt: skip
 
 
 def _is_project(path: Path) -> bool:

@@ -143,3 +143,46 @@ def test_bytes_that_are_no_messages_are_refused(data: bytes) -> None:
     with pytest.raises(FramingError):
         list(Framer().feed(data))
     assert served(data)[0]
+
+
+def attached(wire: Wire, file: Path) -> None:
+    """A session with a PLC that runs."""
+    wire.send("initialize", adapterID="fbvm")
+    wire.until("initialized")
+    wire.send("attach")
+    wire.send("setBreakpoints", source={"path": str(file)}, breakpoints=[{"line": 4, "condition": "n MOD 20 = 0"}])
+    wire.send("configurationDone")
+    assert wire.until("process")["body"]["startMethod"] == "attach"
+    assert wire.until("stopped")["body"]["reason"] == "breakpoint"
+    wire.send("setExpression", expression="Main.n", value="7")
+    assert wire.until("setExpression")["body"]["value"] == "7"
+    for _ in range(3):
+        wire.send("next", threadId=1)
+        wire.until("stopped")
+    for _ in range(2):
+        wire.send("fbvm/stepBackScan", threadId=1)
+        wire.until("stopped")
+    wire.send("setExpression", expression="Main.n", value="1")
+    while (answer := wire.next()).get("command") != "setExpression":
+        pass
+    assert not answer["success"] and "real connections do not travel in time" in answer["message"]
+    wire.send("disconnect", terminateDebuggee=True)
+    wire.until("disconnect")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("net", ["loop", "tcp"])
+def test_attached_to_a_plc_that_runs(file: Path, net: str) -> None:
+    command = [*FBVM, "run", str(file), "--net", net, "--debug", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr
+        said = ""
+        while "--connect" not in said:
+            said = process.stderr.readline()
+        try:
+            with connect("127.0.0.1", int(said.split()[-1])) as stream:
+                attached(Wire(stream.receive, stream.send), file)
+            assert process.wait(timeout=30) in (0, 130)
+        finally:
+            process.kill()
+        assert "Traceback" not in process.stderr.read()
