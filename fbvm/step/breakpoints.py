@@ -1,28 +1,33 @@
-"""Breakpoints and watches of a session: a line of a source, the beginning of a POU, a condition; what each stop prints."""
+"""Breakpoints and watches of the language of stepping: lines, POUs, conditions, changes; what each stop prints."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fbvm.base.types import fold
+from fbvm.base.types import StructType, fold
 from fbvm.code.image import Site
+from fbvm.machine import breakpoints as machine
+from fbvm.machine.breakpoints import BreakpointRows
 from fbvm.machine.source_lines import find_line
 from fbvm.record.trace.events import Statement
 from fbvm.step.stepping import Stepping
 from fbvm.watch.conditions import Condition, ConditionError, parse_condition, split_condition
+from fbvm.watch.paths import Place, UnknownPlace
 
+_LINE = re.compile(r".*:\s*\d+|[\w.]+#\d+")
+"""FILE:LINE, or a rung."""
 Reached = Callable[[Statement | None], bool]
 """Called before each statement, and with None at the end of the program."""
 
 
 @dataclass(frozen=True)
 class Breakpoint:
-    """`reached` returns True where execution stops; `is_condition` if that does not depend on the statement."""
+    """Where one move ends: `reached` returns True there."""
 
     text: str
     reached: Reached
-    is_condition: bool = False
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ def parse_breakpoint(text: str, session: Stepping, here: Site | None) -> Breakpo
                 raise
         else:
             holds = parse_condition(f"({where}) AND ({when})", session.find) if when else stops
-            return Breakpoint(text, lambda statement: holds.holds(session.read), True)
+            return Breakpoint(text, lambda statement: holds.holds(session.read))
     found, sites = find_line(image, where)
     if condition is None:
         return Breakpoint(found, lambda statement: statement is not None and statement.site in sites)
@@ -65,16 +70,36 @@ def any_reached(breakpoints: Sequence[Breakpoint], statement: Statement | None) 
     return any(each.reached(statement) for each in breakpoints)
 
 
-def first_reached(breakpoints: Sequence[Breakpoint], here: Statement | None) -> Reached:
-    """A function for `Session.run` that stops at lines, and where conditions that did not hold before begin to hold.
+def parse_row(text: str, session: Stepping, here: Site | None) -> machine.Breakpoint:
+    """A breakpoint: what `parse_breakpoint` takes, a rung (`Main#3`), an instance (`Main.P1`), or what is watched for changes
+    (`D200`, `Main.Count`, `D200..D209`); behind IF a condition, behind HITS a hit count.
 
-    `here` is the statement at which the session stands."""
-    held = [each.is_condition and each.reached(here) for each in breakpoints]
+    Raises ValueError, UnknownPlace or ConditionError."""
+    at = text.upper().find(" HITS ")
+    front, hits = (text, "") if at < 0 else (text[:at], text[at + len(" HITS ") :])
+    where, when = split_condition(front)
+    facts = session.facts
+    if where.isdecimal():
+        where = f"{here.file if here else facts.sites[0].file}:{where}"
+    kind = "line"
+    if fold(where) not in {fold(body.name) for body in facts.image.bodies}:
+        kind = _kind_of(where, session)
+    if kind == "condition" and when:
+        where, when = f"({where}) AND ({when})", ""
+    return BreakpointRows(session.player, facts.image).put(machine.Breakpoint(kind, where, when, hits.strip()))
 
-    def reached(statement: Statement | None) -> bool:
-        now = [each.reached(statement) for each in breakpoints]
-        stops = any(new and not old for new, old in zip(now, held, strict=True))
-        held[:] = [new and each.is_condition for new, each in zip(now, breakpoints, strict=True)]
-        return stops
 
-    return reached
+def _kind_of(where: str, session: Stepping) -> str:
+    """"condition" for a condition, "change" for a variable or address that is none, "line" for a line, a rung or an instance."""
+    try:
+        parse_condition(where, session.find)
+    except ConditionError as error:
+        if _LINE.fullmatch(where):
+            return "line"
+        try:
+            found = session.find(where)
+        except UnknownPlace:
+            raise error from None
+        is_instance = isinstance(found, Place) and isinstance(found.type, StructType) and found.type.block
+        return "line" if is_instance else "change"
+    return "condition"

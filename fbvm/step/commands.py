@@ -12,13 +12,18 @@ from functools import partial
 
 from fbvm.base.digits import whole_number
 from fbvm.base.types import fold
+from fbvm.machine.breakpoints import Breakpoint as Row
 from fbvm.machine.plc import Mode, Plc
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.draw.why import cause_text, why
 from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.recorder import signals_at
-from fbvm.step.breakpoints import Breakpoint, Reached, Watched, any_reached, first_reached, parse_breakpoint
+from fbvm.step.breakpoints import Breakpoint, Reached, Watched, any_reached, parse_breakpoint, parse_row
+from fbvm.step.debugger import Debugger, Move
+from fbvm.step.past_session import PastSession
+from fbvm.step.position import Reached as Where
 from fbvm.step.scan_replay import Action
+from fbvm.step.session import Session
 from fbvm.step.session_events import SessionEvents
 from fbvm.step.stepping import Stepping
 from fbvm.step.stop_report import StopReport
@@ -62,10 +67,11 @@ COMMANDS = (
     Command("scan", "c", "scan [N]", "to the beginning of the next scan, or the Nth from here", True),
     Command("run", "r", "run [LINE | CONDITION | TIME]", "to a breakpoint, for a time at most; or to a line or condition",
             True, "place"),
-    Command("back", "b", "back [N | scan | FILE:LINE | CONDITION]",
-            "one statement back, to the beginning of the scan, or to where it last was so", True, "place"),
+    Command("back", "b", "back [N | scan | run | FILE:LINE | CONDITION]",
+            "one statement back, to the scan's beginning, to the last breakpoint, or to where it last was so", True, "place"),
     Command("goto", "g", "goto SCAN", "to the beginning of any scan", True),
-    Command("break", "k", "break [LINE | CONDITION]", "a breakpoint for `run`; without, lists them", takes="line"),
+    Command("break", "k", "break [LINE | CONDITION | NAME]", "a breakpoint for `run`, NAME: where it changes; or lists them",
+            takes="line"),
     Command("unbreak", "", "unbreak [NUMBER]", "takes a breakpoint away, or all"),
     Command("print", "p", "print NAME...", "values of variables, blocks, addresses, ranges", takes="place"),
     Command("watch", "w", "watch NAME... [IF CONDITION]", "prints these at each stop, or where that holds", takes="place"),
@@ -94,10 +100,11 @@ class Commands:
 
     `report` makes the texts, `packets` returns the packets of the network so far.  `ended` is True after `quit`."""
 
-    def __init__(self, session: Stepping, report: StopReport, packets: Callable[[], list[Packet]] = list) -> None:
+    def __init__(self, session: Session | PastSession, report: StopReport, packets: Callable[[], list[Packet]] = list) -> None:
         self.session, self.report = session, report
+        self.debugger = Debugger({session.name: session})
         self.watches: list[Watched] = []
-        self.breakpoints: list[Breakpoint] = []
+        self.breakpoints: list[Row] = []
         self.ended = False
         self._packets = packets
         self._last = "step"
@@ -155,19 +162,23 @@ class Commands:
         self.session.goto(_count(rest, least=0))
 
     def _run(self, rest: str) -> Iterator[str]:
-        cycle_ns, here = self.session.facts.cycle_ns, self.session.statement
-        if re.fullmatch(r"(?:T#)?[\d.]+\s*[a-zA-Z]\w*", rest, re.I):
-            scans = max(1, -(-parse_time_ns(rest) // cycle_ns))
-            if self.breakpoints:
-                self.session.run(first_reached(self.breakpoints, here), scans)
-            else:
-                self.session.scan(scans)
-            return
-        targets = self._targets(rest)
-        stop: Reached = partial(any_reached, targets) if rest else first_reached(targets, here)
+        cycle_ns = self.session.facts.cycle_ns
         scans = max(1, LOOK_AHEAD_NS // cycle_ns)
+        is_time = re.fullmatch(r"(?:T#)?[\d.]+\s*[a-zA-Z]\w*", rest, re.I)
+        if is_time or not rest:
+            if is_time:
+                scans = max(1, -(-parse_time_ns(rest) // cycle_ns))
+            elif not self.breakpoints:
+                raise CommandError("say where to: a line, a condition or a time; or set breakpoints")
+            reached = self._moved(self.debugger.resume(self.session.here.scan + scans))
+            if reached and reached.breakpoints:
+                yield from reached.reasons
+            elif not is_time and not self.session.trap:
+                yield f"no breakpoint was reached in {scans} scans"
+            return
+        stop: Reached = partial(any_reached, [self._target(rest)])
         if not self.session.run(stop, scans) and not self.session.trap:
-            yield f"{rest or 'no breakpoint'} was not reached in {scans} scans"
+            yield f"{rest} was not reached in {scans} scans"
 
     def _back(self, rest: str) -> Iterator[str]:
         if rest == "scan":
@@ -176,16 +187,23 @@ class Commands:
             for _ in range(_count(rest)):
                 self.session.back()
         else:
-            targets = self._targets(rest)
-            if not self.session.run_back(partial(any_reached, targets)):
+            if rest == "run":
+                if not self.breakpoints:
+                    raise CommandError("set breakpoints first, or say where to: a line or a condition")
+                reached = self._moved(self.debugger.reverse())
+                yield from reached.reasons if reached else ("no breakpoint was reached before",)
+            elif not self.session.run_back(partial(any_reached, [self._target(rest)])):
                 yield f"{rest} was never reached before"
 
-    def _targets(self, rest: str) -> list[Breakpoint]:
-        if rest:
-            return [self._target(rest)]
-        if not self.breakpoints:
-            raise CommandError("say where to: a line, a condition or a time; or set breakpoints")
-        return self.breakpoints
+    def _moved(self, move: Move) -> Where | None:
+        """Carries out a whole move of the debugger; returns what stopped it."""
+        self.debugger.here.put(self.breakpoints)
+        while True:
+            try:
+                next(move)
+            except StopIteration as end:
+                reached: Where | None = end.value
+                return reached
 
     def _target(self, text: str) -> Breakpoint:
         return parse_breakpoint(text, self.session, self.report.site())
@@ -194,9 +212,11 @@ class Commands:
 
     def _break(self, rest: str) -> Iterator[str]:
         if rest:
-            self.breakpoints.append(self._target(rest))
+            self.breakpoints.append(parse_row(rest, self.session, self.report.site()))
         for number, each in enumerate(self.breakpoints, 1):
-            yield f"  {number}  {each.text}"
+            changes = "change of " if each.kind == "change" else ""
+            yield (f"  {number}  {changes}{each.where}" + (f" IF {each.when}" if each.when else "")
+                   + (f" HITS {each.hits}" if each.hits else ""))
 
     def _unbreak(self, rest: str) -> None:
         if not rest:
@@ -317,8 +337,9 @@ class Commands:
                 short = f"{command.short:<2}" if command.short else "  "
                 yield f"  {short} {command.usage:<32} {command.help}"
         if not rest:
-            yield "  LINE is 15, pump.st:15 or the name of a POU, alone or before IF CONDITION.  NAME is a variable, an address"
-            yield "  or a range, D200..D209.  NAME := VALUE writes, too.  An empty line moves again."
+            yield "  LINE is 15, pump.st:15, a POU, a rung (Main#3) or an instance, alone or before IF CONDITION.  Behind HITS"
+            yield "  5 or HITS % 5 a breakpoint says at which passes it stops.  NAME is a variable, an address or a range,"
+            yield "  D200..D209.  NAME := VALUE writes, too.  An empty line moves again."
 
     def _quit(self, rest: str) -> None:
         self.ended = True

@@ -511,3 +511,13 @@ def test_nobody_stands_in_what_no_statement_calls() -> None:
     session.goto(1)
     session.back()
     assert session.statement is None and session.here.scan == 0
+
+
+def test_breakpoints_at_changes_with_conditions_and_hit_counts() -> None:
+    commands = made()
+    assert said(commands, "break Main.N IF Main.N > 3", "break Twice HITS % 3") == (
+        "  1  change of Main.N IF Main.N > 3\n  1  change of Main.N IF Main.N > 3\n  2  text.st:4 HITS % 3")
+    assert "breakpoint text.st:4" in said(commands, "run") and commands.session.here == Position(2, 2)
+    assert "Main.N was 3, is 4" in said(commands, "run 1s") and commands.session.here == Position(3, 1)
+    assert "breakpoint text.st:4" in said(commands, "back run") and commands.session.here == Position(2, 2)
+    assert "no breakpoint was reached before" in said(commands, "back run") and commands.session.here == Position(0, 0)
