@@ -217,8 +217,10 @@ class Adapter:
             self.breakpoints.clear()
         session = debug.plc()
         if isinstance(session, PastSession):
-            reason = "exception" if session.trap else "entry"
-            self.moves.stopped(reason, str(session.trap) if session.trap else f"the end of the recording: {scan_text(session)}")
+            wrong = str(session.trap) if session.trap else target.failure
+            reason = "exception" if wrong else "entry"
+            text = session.trap.code if session.trap else "assert" if wrong else ""
+            self.moves.stopped(reason, wrong or f"the end of the recording: {scan_text(session)}", text=text)
             return
         wants_entry = target.stop_on_entry
         if wants_entry is None and self._is_attached:
@@ -401,6 +403,9 @@ class Adapter:
             return {"exceptionId": trap.code, "description": str(trap), "breakMode": "always",
                     "details": {"message": str(trap), "typeName": trap.code,
                                 "stackTrace": "\n".join(self.debug.report().calls()) or str(trap.site)}}  # fmt: skip
+        failure = self.debug.target.failure if self.debug.target else ""
+        if reached is None and failure:
+            return {"exceptionId": "assert", "description": failure, "breakMode": "always"}
         if reached is None:
             raise Refusal("it did not stop at an exception")
         return {"exceptionId": reached.kind, "description": reached.reasons[0], "breakMode": "always"}

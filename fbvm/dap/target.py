@@ -26,7 +26,7 @@ class LaunchError(Exception):
 class Target:
     """PLCs by name with their sessions; `texts` are their sources by name, `paths` where these lie on the host.
 
-    `until_scan` ends the run there; `notes` are told to the user at the beginning."""
+    `until_scan` ends the run there; `notes` are told to the user at the beginning; `failure` is why a test failed."""
 
     sessions: Mapping[str, Session | PastSession]
     texts: Mapping[str, str]
@@ -35,6 +35,7 @@ class Target:
     until_scan: int | None = None
     stop_on_entry: bool | None = None
     notes: Sequence[str] = ()
+    failure: str = ""
     close: Callable[[], None] = lambda: None
 
 

@@ -20,12 +20,14 @@ from fbvm.dap.target import LaunchError, Target, checked
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
+from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import FILE, Project, project_file, read_project
 from fbvm.run.real_pace import RealPace
 from fbvm.run.running import TimedWrite
+from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position
 from fbvm.step.session import Session
 from fbvm.step.world import Debugged, World
@@ -36,7 +38,7 @@ from fbvm.wire.tap import TapEvent
 LAUNCH: dict[str, tuple[type, ...]] = {
     "program": (str, list), "project": (str,), "plc": (str,), "main": (str,), "resource": (str,), "libraries": (list,),
     "dialect": (str,), "cycle": (str,), "timing": (str,), "seed": (int,), "engine": (str,), "map": (list,), "set": (list,),
-    "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,),
+    "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,), "test": (str,),
 }  # fmt: skip
 """The keys of a launch configuration, and what their values are; `docs/guides/debugger.md` describes each."""
 
@@ -44,11 +46,13 @@ LAUNCH: dict[str, tuple[type, ...]] = {
 def open_launch(arguments: Mapping[str, Any]) -> Target:
     """What `launch` asks for.  Raises LaunchError."""
     given = checked(arguments, LAUNCH, "launch")
-    chosen = [key for key in ("program", "project") if key in given]
+    chosen = [key for key in ("program", "project", "test") if key in given]
     if len(chosen) != 1:
-        raise LaunchError("launch has either program (a file, a list of files or a folder) or project (an fbvm.toml)")
+        raise LaunchError("launch has either program (a file, a list of files or a folder), project (an fbvm.toml) or test")
     folder = Path(given.get("cwd", "."))
     try:
+        if chosen[0] == "test":
+            return _test(given["test"], folder)
         if chosen[0] == "program" and not (isinstance(given["program"], str) and _is_project(folder / given["program"])):
             return _program(given, folder)
         return _project(given, folder / given[chosen[0]])
@@ -131,6 +135,18 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     texts = source_texts(image, {str(path): path for path in files}, libraries)
     return _target(given, World(make), texts, {str(path): path for path in files}, tapped, cycle_ns,
                    _said(compilation.diagnostics))  # fmt: skip
+
+
+def _test(node: str, folder: Path) -> Target:
+    """The recordings of a test that is run now."""
+    from fbvm.testing.recorded_item import record_item
+
+    item = record_item(node, folder)
+    if not item.recordings:
+        raise LaunchError(f"{node} has no rig that did a scan", item.output)
+    sessions = {name: PastSession(RecordedScans(recorded, {}), name) for name, recorded in item.recordings.items()}
+    paths = {name: folder / name for name in item.texts if (folder / name).is_file()}
+    return Target(sessions, item.texts, paths, notes=[item.output], failure=item.reason)
 
 
 def network_in_memory(mappings: Iterable[Mapped], seed: int) -> LoopNetwork:

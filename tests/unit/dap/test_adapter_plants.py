@@ -136,3 +136,37 @@ def test_a_recording_that_ended_in_a_trap_opens_there() -> None:
     assert stop["reason"] == "exception" and "divided by 0" in stop["description"]
     client.go("stepBack")
     assert client.line == 4 and client.value("Main.n") == "41"
+
+
+TEST = """\
+def test_it_counts_to_forty(fb):
+    rig = fb("count.st::Main")
+    rig.run("500ms")
+    assert rig.n == 40
+
+
+def test_it_counts(fb):
+    rig = fb("count.st::Main")
+    rig.run("30ms")
+    assert rig.n == 3
+"""
+
+
+@pytest.mark.slow
+def test_a_test_is_run_and_looked_at_backwards_from_its_failure(tmp_path: Path) -> None:
+    (tmp_path / "count.st").write_text(COUNTER.format(step=1), encoding="utf-8")
+    (tmp_path / "test_count.py").write_text(TEST, encoding="utf-8")
+    client = Client()
+    stop = client.begin(test="test_count.py::test_it_counts_to_forty", cwd=str(tmp_path))
+    assert stop["reason"] == "exception" and stop["text"] == "assert" and "40" in stop["description"]
+    assert client.ask("exceptionInfo", threadId=1)["exceptionId"] == "assert"
+    assert "1 failed" in client.events("output")[0]["output"]
+    assert client.value("Main.n") == "50"
+    client.go("fbvm/gotoScan", scan=39)
+    assert client.value("Main.n") == "39"
+    passed = Client()
+    assert passed.begin(test="test_count.py::test_it_counts", cwd=str(tmp_path))["reason"] == "entry"
+    again = Client()
+    again.ask("initialize", adapterID="fbvm")
+    with pytest.raises(RefusedError, match="no test"):
+        again.ask("launch", test="test_count.py::test_nothing", cwd=str(tmp_path))
