@@ -153,6 +153,13 @@ def test_the_script_native(load: Load, small: Path, monkeypatch: pytest.MonkeyPa
     script.start()
 
 
+def test_the_script_debugger(load: Load, capsys: pytest.CaptureFixture[str]) -> None:
+    script = load("debugger")
+    script.LINES = 3
+    script.main(60)
+    assert "one step back in the last scan" in capsys.readouterr().out
+
+
 def test_the_script_recorder(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
     script = load("recorder")
     for name, scans in (("NATIVE_SCANS", 20), ("PYTHON_SCANS", 5), ("OBSERVED_SCANS", 2), ("TIMES", 1), ("LEAST_SCANS", 10),

@@ -68,6 +68,10 @@ class Debugged:
         """True for a scan in which something was done from outside."""
         return self.world is not None and any(self.world.actions_in(self.name, scan))
 
+    def unchanged_until(self, scans: range) -> int:
+        """The first of some scans in which something was done from outside, or their end."""
+        return self.world.unchanged_until(self.name, scans) if self.world else scans.stop
+
     def stops_in(self, scan: int, state: State) -> tuple[bool, State]:
         """Plays a scan.  Returns True if a breakpoint is reached in it, and what breakpoints have seen at its end."""
         looked = self.stops.look(scan, state=state, last=True)
@@ -219,7 +223,7 @@ class Debugger:
             runner = self._runner(name)
             if runner is None:
                 return self._stand(Position(self.plcs[name].end - 1, END))
-            if isinstance(runner, LiveRunner) and len(self.plcs) == 1 and runner.many(until):
+            if len(self.plcs) == 1 and runner.many(until):
                 self._next[name] = runner.plc.scans
                 self._tell_runner(name, runner)
                 yield None

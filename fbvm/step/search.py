@@ -41,6 +41,9 @@ class Scene(Protocol):
     def changed_inside(self, scan: int) -> bool:
         """True for a scan in which something was done from outside: it is played, not executed."""
 
+    def unchanged_until(self, scans: range) -> int:
+        """The first of some scans in which something was done from outside, or their end."""
+
     def stops_in(self, scan: int, state: State) -> tuple[bool, State]:
         """Plays such a scan.  Returns True if a breakpoint is reached in it, and what breakpoints have seen at its end."""
 
@@ -89,6 +92,10 @@ class Runner:
         """Executes one scan or the rest of one."""
         raise TypeError("a runner says how it executes a scan")
 
+    def many(self, scan: int) -> bool:
+        """Executes scans in machine code at once, up to `scan` or to one that stops; False if that cannot be."""
+        return False
+
     def stops_behind(self) -> bool:
         """True if something stops the run behind the scan that was executed last."""
         return self.check is not None and self.check.checked(self.plc)
@@ -106,7 +113,6 @@ class LiveRunner(Runner):
         self._world.scan(self._name)
 
     def many(self, scan: int) -> bool:
-        """Executes scans in machine code at once, up to `scan` or to one that stops; False if that cannot be."""
         left = min(self._world.quiet_until(self._name, scan) - self.plc.scans, MOST_AT_ONCE)
         return self.check is None and left > 1 and self.plc.scan_many(left)
 
@@ -132,6 +138,10 @@ class PastRunner(Runner):
     def execute(self) -> None:
         self._again.scan()
 
+    def many(self, scan: int) -> bool:
+        end = self._scene.unchanged_until(range(self.plc.scans, min(scan, self.plc.scans + MOST_AT_ONCE)))
+        return self.check is None and end > self.plc.scans and self._again.many(end)
+
 
 def last_in(runner: Runner, end: int) -> Generator[None, None, tuple[int, State, bool] | None]:
     """Executes the scans before number `end`.
@@ -140,6 +150,10 @@ def last_in(runner: Runner, end: int) -> Generator[None, None, tuple[int, State,
     seen before it, and True if it was a check."""
     found: tuple[int, State, bool] | None = None
     while runner.plc.scans < end and not runner.plc.trap:
+        if runner.many(end):
+            runner.rows.take_told()
+            yield None
+            continue
         scan = runner.plc.scans
         while runner.scan():
             found = scan, runner.state, False

@@ -114,6 +114,10 @@ class World:
             first = min(first, live.plc.scans + max(0, until))
         return first
 
+    def unchanged_until(self, name: str, scans: range) -> int:
+        """The first of some scans inside which something was done from outside, or their end."""
+        return min((at.scan for at in self._live[name].actions if at.step and at.scan in scans), default=scans.stop)
+
     def has_actions(self, name: str, scan: int) -> bool:
         """True if something was done to a PLC before a scan or in it."""
         return bool(self.actions_in(name, scan))

@@ -136,9 +136,14 @@ class Replay:
         """Executes scans up to the one before `scan`, as fast as that can be done; the PLC is in the state that this one left."""
         plc = self.plc
         while plc.scans < scan:
-            if (most := self._regular(scan)) < 2 or not plc.scan_many(most):
+            if not self.many(scan):
                 self.scan()
         plc.cycle_ns = self._recorded.plc.cycle_ns
+
+    def many(self, scan: int) -> bool:
+        """Executes scans up to one before `scan` at once, as far as they have no inputs; returns False if there is none."""
+        most = self._regular(scan)
+        return most > 1 and self.plc.scan_many(most)
 
     def scan(self) -> None:
         """Executes one scan with its inputs, or goes on with one that stands at a breakpoint."""

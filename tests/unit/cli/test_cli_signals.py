@@ -62,14 +62,14 @@ VERBS: dict[str, list[list[str]]] = {
     "run": [[DEMO, *PEER, *FOREVER, "--trace", "r.fbtrace", "--journal", "r.journal", "--pcap", "r.pcapng"],
             [DEMO, *FOREVER, "--engine", "python", "--html", "r.html"], [DEMO, *FOREVER, "--net", "tcp"],
             ["big.st", *FOREVER, "--engine", "native", "--no-cache"]],
-    "replay": [["long.journal"]], "step": [[DEMO]], "map": [[]], "serve": [["--port", "0", "--image", "served"]],
+    "replay": [["long.journal"]], "step": [[DEMO]], "dap": [["--listen", "0"]], "map": [[]], "serve": [["--port", "0", "--image", "served"]],
     "peer": [["--port", "0"]], "demo": [[]], "new": [["project", ]], "test": [["tests"]], "learn": [["1"]],
     "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["long.fbtrace", "Main.Step"]],
     "lsp": [[]],
     "convert": [["long.fbtrace", "out.html"], ["long.fbtrace", "out.csv"]],
 }  # fmt: skip
 """Arguments with which each verb has something to do for a while."""
-GOOD_AT_THE_END = {"serve", "peer"}
+GOOD_AT_THE_END = {"serve", "peer", "dap"}
 """Verbs that are ended by a signal always, which is no failure."""
 MOMENTS_S = (0.0, 0.08, 0.25, 0.7)
 """How long after the process listens to signals one comes."""

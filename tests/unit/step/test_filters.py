@@ -1,0 +1,58 @@
+"""What stops a run between two scans: exception replies on the network, response codes of the unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from test_debugger import done
+
+from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.step.debugger import Debugger
+from fbvm.step.filters import BetweenScans
+from fbvm.step.session import Session
+from fbvm.units.etn21.unit import Etn21
+from fbvm.wire.link import Peer
+from fbvm.wire.modbus_server import ModbusServer
+
+HOUSE = Path(__file__).resolve().parents[3]
+
+
+def demo(has_peer: bool = True) -> Debugger:
+    image = compile_text((HOUSE / "examples" / "demo.st").read_text(encoding="utf-8")).image
+    assert image is not None
+
+    def make() -> Plc:
+        plc, network = Plc(image), LoopNetwork()
+        if has_peer:
+            network.place(Peer("192.168.250.1", 502), ModbusPeer(ModbusServer(refusals={3: 2})))
+        plc.attach(Etn21(0, "192.168.250.21"), network)
+        return plc
+
+    return Debugger({"plc": Session.of(make)})
+
+
+def test_an_exception_reply_stops_the_run_forth_and_back() -> None:
+    found = demo()
+    found.checks = {"plc": BetweenScans({"modbus": frozenset()})}
+    reached = done(found.resume(500))
+    assert reached and reached.kind == "modbus" and "exception 02" in reached.reasons[0] and reached.position.step == 0
+    found.session.goto(reached.position.scan + 20)
+    again = done(found.reverse())
+    assert again and (again.position, again.reasons) == (reached.position, reached.reasons)
+
+
+def test_only_the_codes_that_are_wanted_stop_it() -> None:
+    found = demo()
+    found.checks = {"plc": BetweenScans({"modbus": frozenset((4,))})}
+    assert done(found.resume(200)) is None and found.session.here.scan == 200
+
+
+def test_a_response_code_of_the_unit_stops_it() -> None:
+    found = demo(has_peer=False)
+    found.checks = {"plc": BetweenScans({"response": frozenset()})}
+    reached = done(found.resume(5000))
+    assert reached and reached.kind == "response" and "Response Code is 16#" in reached.reasons[0]
+    assert found.session.here == reached.position
