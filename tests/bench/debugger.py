@@ -52,7 +52,7 @@ def main(scans: int) -> None:
     assert image is not None
     found = Debugger({"plc": Session.of(lambda: Plc(image, engine="auto"))})
     session = found.session
-    last = Breakpoint("line", "text.st:50", f"n = {scans}")
+    last = Breakpoint("line", "text.st:5", f"n = {scans}")
     found.here.put([last])
     timed(f"a run of {scans} scans up to a breakpoint", lambda: done(found.resume()))
     assert session.here.scan == scans - 1
