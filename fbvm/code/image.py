@@ -186,6 +186,9 @@ class Image:
     """The rungs of ladder as they are drawn."""
     charts: tuple[SfcPicture, ...] = ()
     """The sequential function charts as they are drawn."""
+    frames: dict[str, dict[str, Field]] = field(default_factory=dict)
+    """Variables of functions and temporary variables, by the folded names of POU and variable; their offsets count from the
+    start of the buffer.  Their values are there while the POU is executed."""
     counters: int = 0
     """Counters beside the memory that its code counts in; see `fbvm.engine.counted`."""
     marks: int = 0

@@ -118,7 +118,8 @@ class DebugSession:
         else:
             inner = frame.frame
         path = session.names.instance(inner.base) if inner is not None and inner.base else ""
-        return Scope(session.player.find, place_of(session.player.find, path))
+        local = session.facts.local(inner.body) if inner is not None and inner.body >= 0 else None
+        return Scope(session.player.find, place_of(session.player.find, path), local)
 
     def frame_of(self, arguments: Arguments) -> StackFrame | None:
         """The frame that a request names, None if it names none."""

@@ -15,6 +15,7 @@ from fbvm.step.past_session import PastSession
 from fbvm.step.session import Session
 from fbvm.watch.paths import Place, Span, element
 from fbvm.watch.places import parse_for
+from fbvm.watch.scopes import Scope
 from fbvm.watch.values import Value, in_hexadecimal, show, show_time
 
 MOST_ROWS = 256
@@ -49,7 +50,9 @@ def scopes(debug: DebugSession, frame: StackFrame) -> list[Body]:
 
 def _add_sections(debug: DebugSession, rows: list[Body], frame: StackFrame) -> None:
     """The variables of the instance by their sections."""
-    session, instance = debug.plc(frame.plc), debug.scope(frame).instance
+    scope = debug.scope(frame)
+    session, instance = debug.plc(frame.plc), scope.instance
+    _add_frame(debug, rows, session, scope)
     if instance is None or not isinstance(instance.type, StructType):
         return
     fields = [field for field in instance.type.fields.values() if "$" not in field.name]
@@ -57,6 +60,17 @@ def _add_sections(debug: DebugSession, rows: list[Body], frame: StackFrame) -> N
     for name, kinds, hint in (*SECTIONS, ("Locals", (), "locals")):
         chosen = [field for field in fields if (field.kind in kinds if kinds else field.kind not in special)]
         _add(debug, rows, name, _fields(debug, session, instance, chosen), len(chosen), hint=hint)
+
+
+def _add_frame(debug: DebugSession, rows: list[Body], session: Session | PastSession, scope: Scope) -> None:
+    """The variables that live while the body is executed: those of a function by their sections, else as Temporary."""
+    named = {field.name: field.kind for field in scope.local.values()}
+    parts = [(name, kinds, hint) for name, kinds, hint in SECTIONS if scope.instance is None]
+    special = {kind for _, kinds, _ in parts for kind in kinds}
+    for name, kinds, hint in (*parts, ("Locals" if scope.instance is None else "Temporary", (), "locals")):
+        chosen = [own for own, kind in named.items() if (kind in kinds if kinds else kind not in special)]
+        places = [place for own in chosen if isinstance(place := scope.find(own), Place)]
+        _add(debug, rows, name, _places(debug, session, places, scope), len(places), hint=hint)
 
 
 def _add(debug: DebugSession, rows: list[Body], name: str, container: Container, count: int, *, hint: str = "",
@@ -113,13 +127,14 @@ def _member(session: Session | PastSession, instance: Place, field: Field) -> Pl
     return _found(session, f"{instance.name}.{field.name}")
 
 
-def _places(debug: DebugSession, session: Session | PastSession, places: Sequence[Place]) -> Container:
+def _places(debug: DebugSession, session: Session | PastSession, places: Sequence[Place],
+            scope: Scope | None = None) -> Container:  # fmt: skip
     """Variables and addresses by their names."""
 
     def children(start: int, count: int | None) -> list[Body]:
         return [variable(debug, session, place, place.name) for place in places[start : None if count is None else start + count]]
 
-    return Container(children, session.player.find)
+    return Container(children, scope.find if scope else session.player.find)
 
 
 def _areas(debug: DebugSession, session: Session | PastSession) -> Container:

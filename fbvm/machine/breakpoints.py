@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol, cast
 
 from fbvm.base.memory import Memory
+from fbvm.base.types import Field, fold
 from fbvm.code.image import Image, Site
 from fbvm.engine.choice.stoppable import StoppableEngine
 from fbvm.engine.choice.tiers import Engine, choice_of, substitutes_of
@@ -184,9 +185,15 @@ class BreakpointRows:
 
     # --- names inside a POU -------------------------------------------------------------------------------------------
 
-    def _scope(self, base: int | None) -> Scope:
+    def _scope(self, base: int | None, lines: Lines) -> Scope:
         """The names inside the instance that begins at a byte."""
-        return Scope(self._inspected.find, place_of(self._inspected.find, self._names.instance(base)) if base else None)
+        instance = place_of(self._inspected.find, self._names.instance(base)) if base else None
+        return Scope(self._inspected.find, instance, self._local(lines))
+
+    def _local(self, lines: Lines) -> Mapping[str, Field]:
+        """The variables that live while the POU of some lines is executed."""
+        pous = {fold(self._image.sites[site].pou) for site in lines.sites}
+        return self._image.frames.get(next(iter(pous)), {}) if len(pous) == 1 else {}
 
     def _known_base(self, lines: Lines) -> tuple[bool, int | None]:
         """Whether one instance is known to be meant, and where it begins: 0 for a POU that has none."""
@@ -202,7 +209,7 @@ class BreakpointRows:
             return None
         is_known, only = self._known_base(lines)
         some = instances(self._image.symbols, self._image.sites[min(lines.sites)].pou, 1)
-        tried = Scope(self._inspected.find, some[0] if some else None)
+        tried = Scope(self._inspected.find, some[0] if some else None, self._local(lines))
         parse_condition(when, tried.find)  # says at once what is wrong with it
         parsed: dict[int, Condition] = {}
 
@@ -211,7 +218,7 @@ class BreakpointRows:
             if at is None:
                 return None
             if at not in parsed:
-                parsed[at] = parse_condition(when, self._scope(at).find)
+                parsed[at] = parse_condition(when, self._scope(at, lines).find)
             return parsed[at].holds(self._inspected.read)
 
         return test
@@ -225,7 +232,7 @@ class BreakpointRows:
 
         def said(base: int | None) -> str | None:
             at = only if is_known or not message.names else base
-            return None if at is None else message.text(self._scope(at).find, self._inspected.read)
+            return None if at is None else message.text(self._scope(at, lines).find, self._inspected.read)
 
         return said
 

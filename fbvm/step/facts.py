@@ -52,6 +52,10 @@ class ProgramFacts:
         """The name of the POU that is body number `body`."""
         return self.image.bodies[body].name
 
+    def local(self, body: int) -> Mapping[str, Field]:
+        """The variables of a body that live while it is executed, by folded name: those of a function, and VAR_TEMP."""
+        return self.image.frames.get(fold(self.body_name(body)), {})
+
     def block(self, body: int) -> StructType | None:
         """The type of the instances of a body, None for a function."""
         found = self.image.types.get(fold(self.body_name(body)))

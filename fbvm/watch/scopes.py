@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from fbvm.base.types import ArrayType, Field, StructType, fold
 from fbvm.watch.paths import Place, Span, UnknownPlace, element
+from fbvm.watch.paths import find as find_in
 
 Find = Callable[[str], Place | Span]
 _FIRST = re.compile(r"\s*([^\W\d]\w*)(?!\w*\s*#)")
@@ -18,13 +19,17 @@ _PATH = re.compile(r"\s*(?:THIS\s*\^?\s*\.\s*)?(.*)", re.I | re.S)
 class Scope:
     """Finds names from inside an instance: `n` is `Main.P1.n` there.
 
-    `find` finds what is no variable of the instance; `instance` is its place, None outside of all (then only `find` counts)."""
+    `find` finds what is no variable of the instance; `instance` is its place, None outside of all (then only `find` counts);
+    `local` are variables that live while the body is executed, by folded name."""
 
-    def __init__(self, find: Find, instance: Place | None = None) -> None:
-        self._find, self.instance = find, instance
+    def __init__(self, find: Find, instance: Place | None = None, local: Mapping[str, Field] | None = None) -> None:
+        self._find, self.instance, self.local = find, instance, local or {}
 
     def find(self, text: str) -> Place | Span:
         """The place or span of places that `text` names here.  Raises UnknownPlace."""
+        first = _FIRST.match(text)
+        if first and fold(first[1]) in self.local:
+            return find_in(self.local, {}, text)
         if self.instance is not None and (rest := self.own(text)):
             return self._find(f"{self.instance.name}.{rest}")
         return self._find(text)

@@ -217,7 +217,7 @@ def _image(checker: Checker, library: ObjectLibrary, progress: Progress, drawn: 
             types.setdefault(name, entry.resolved[0])
     return Image(placement.layout, bodies, tuple(tasks), placement.symbols, (*placement.initial, *references.in_slots()),
                  tuple(placement.retained), tuple(program.sites), types, program.objects, tuple(program.rungs),
-                 tuple(program.charts))
+                 tuple(program.charts), frames=placement.frames)
 
 
 def _reported(pous: Sequence[Pou], progress: Callable[[int, int], None]) -> Iterator[Pou]:

@@ -28,6 +28,8 @@ class Placement:
     initial: list[tuple[int, bytes]] = field(default_factory=list)
     retained: list[Retained] = field(default_factory=list)
     objects: Objects = field(default_factory=Objects)
+    frames: dict[str, dict[str, Field]] = field(default_factory=dict)
+    """Variables of frames, by the folded names of POU and variable; their offsets count from the start of the buffer."""
     config_initials: list[tuple[int, Type, bytes]] = field(default_factory=list)
     """Initial values that VAR_CONFIG gives: the offset of each in the buffer, its type and its bytes."""
 
@@ -67,6 +69,7 @@ def lay_out(checker: Checker) -> Placement:
         placement.symbols.setdefault(fold(_path(variable)), _symbol(variable))
         if variable.place == "abs" and not variable.reference:
             placement.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
+    placement.frames = {fold(pou.name): found for pou in checker.bodies if (found := _in_frame(pou))}
     for access in checker.var_config.accesses:
         offset, bit = _offset_of(access.spot, placement)
         placement.symbols.setdefault(fold(access.name), Field(
@@ -188,6 +191,14 @@ def _path(variable: Variable) -> str:
 def _symbol(variable: Variable) -> Field:
     return Field(_path(variable), variable.type, variable.offset, variable.kind, variable_bit(variable), absolute=True,
                  reference=variable.reference, constant=variable.constant, hexadecimal=variable.hexadecimal, space=variable.space)
+
+
+def _in_frame(pou: Pou) -> dict[str, Field]:
+    """The variables of the frame of a POU: those of a function, and VAR_TEMP."""
+    return {fold(variable.name): Field(variable.name, variable.type, pou.frame_offset + variable.offset, variable.kind,
+                                       absolute=True, reference=variable.reference, constant=variable.constant,
+                                       hexadecimal=variable.hexadecimal)
+            for variable in pou.order if variable.place == "frame" and "$" not in variable.name}  # fmt: skip
 
 
 def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:

@@ -29,6 +29,7 @@ from fbvm.base.types import (
     StructType,
     SubrangeType,
     Type,
+    fold,
     string,
 )
 from fbvm.code.image import Body, Image, Layout, Objects, ProgramRun, Retained, RungPicture, SfcPicture, Site, TaskRow
@@ -51,6 +52,7 @@ def encode(image: Image) -> bytes:
         "objects": [*vars(image.objects).values()],
         "rungs": [[*vars(rung).values()] for rung in image.rungs],
         "charts": [[*vars(chart).values()] for chart in image.charts],
+        "frames": [[name, [types.field(row) for row in rows.values()]] for name, rows in image.frames.items()],
         "derived": [[name, types.number(kind)] for name, kind in image.types.items()],
     }
     return _dump({**document, "types": types.rows}).encode("utf-8", "surrogatepass")
@@ -74,6 +76,7 @@ def decode(content: bytes) -> Image:
         Objects(*_tuples(stored["objects"])),
         tuple(RungPicture(*row) for row in _tuples(stored["rungs"])),
         tuple(SfcPicture(*row) for row in _tuples(stored["charts"])),
+        {name: {fold(found.name): found for found in map(types.field, rows)} for name, rows in stored["frames"]},
     )
     vars(image)["fingerprint"] = stored["fingerprint"]
     return image

@@ -170,3 +170,36 @@ def test_a_test_is_run_and_looked_at_backwards_from_its_failure(tmp_path: Path) 
     again.ask("initialize", adapterID="fbvm")
     with pytest.raises(RefusedError, match="no test"):
         again.ask("launch", test="test_count.py::test_nothing", cwd=str(tmp_path))
+
+
+FUNCTIONS = """\
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+VAR t : ARRAY[0..2] OF INT; END_VAR
+t[1] := x * 2;
+Twice := t[1];
+END_FUNCTION
+PROGRAM Main
+VAR n : INT; END_VAR
+VAR_TEMP q : INT; END_VAR
+q := Twice(n) + 1;
+n := q;
+END_PROGRAM
+"""
+
+
+def test_variables_of_functions_and_temporary_ones_have_names_while_they_live(tmp_path: Path) -> None:
+    path = tmp_path / "twice.st"
+    path.write_text(FUNCTIONS, encoding="utf-8")
+    client = Client()
+    rows = [{"line": 5, "condition": "x > 5 AND t[1] > 5", "logMessage": ""}, {"line": 4, "logMessage": "x={x}"}]
+    client.begin({"setBreakpoints": {"source": {"path": str(path)}, "breakpoints": rows}}, program=str(path))
+    scopes = client.scopes()
+    assert client.rows(scopes["Inputs"]["variablesReference"])["x"]["value"] == "7"
+    locals_ = client.rows(scopes["Locals"]["variablesReference"])
+    assert client.rows(locals_["t"]["variablesReference"])["[1]"]["value"] == "14" and "Twice" in locals_
+    assert client.value("x + t[1]", frame=0) == "21"
+    assert [row["output"].partition(": ")[2] for row in client.events("output")] == ["x=0\n", "x=1\n", "x=3\n", "x=7\n"]
+    main = client.scopes(1)
+    assert client.rows(main["Temporary"]["variablesReference"])["q"]["type"] == "INT"
+    assert client.ask("setExpression", expression="x", value="100", frameId=client.frames[0]["id"])["value"] == "100"
