@@ -139,7 +139,7 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
 
 def _test(node: str, folder: Path) -> Target:
     """The recordings of a test that is run now."""
-    from fbvm.testing.recorded_item import record_item
+    from fbvm.cli.shared.recorded_item import record_item
 
     item = record_item(node, folder)
     if not item.recordings:
