@@ -61,10 +61,10 @@ ORDERS = {
     "units": ("", "etn21/fins", "etn21", "port"),
     "machine": ("scan", "servicing", "fast", ""),
     "record": ("trace", "recording", "draw", "export", "page"),
-    "cli": ("shared", "programs", "running", "recordings", "projects", "editors", ""),
+    "cli": ("shared", "shared/debug", "programs", "running", "recordings", "projects", "editors", ""),
 }
 """The folders of a room, the lowest first; "" is the room itself.  A folder imports from those before it."""
-_VERBS = ORDERS["cli"][1:-1]
+_VERBS = ORDERS["cli"][2:-1]
 UNRELATED = {("syntax/ladder/drawing", "syntax/st"), ("syntax/sfc", "syntax/ladder"), ("syntax/recovery", "syntax/ladder"),
              ("syntax/recovery", "syntax/sfc"), ("interchange/plcopen/write", "interchange/plcopen/read"),
              ("units/port", "units/etn21"), *((f"cli/{one}", f"cli/{other}") for one in _VERBS for other in _VERBS)}  # fmt: skip
