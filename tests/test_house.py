@@ -61,7 +61,7 @@ ORDERS = {
     "units": ("", "etn21/fins", "etn21", "port"),
     "machine": ("scan", "servicing", "fast", ""),
     "record": ("trace", "recording", "draw", "export", "page"),
-    "cli": ("shared", "shared/debugging", "programs", "running", "recordings", "projects", "editors", ""),
+    "cli": ("shared", "shared/debug", "programs", "running", "recordings", "projects", "editors", ""),
 }
 """The folders of a room, the lowest first; "" is the room itself.  A folder imports from those before it."""
 _VERBS = ORDERS["cli"][2:-1]

@@ -50,8 +50,11 @@ class RecordingPlayer(Player):
         self._see(event)
 
     def _trap_in(self, scan: int) -> Trap | None:
-        plc = self._source.recorded.plc
-        return plc.trap if scan == plc.scans - 1 else None
+        recorded = self._source.recorded
+        end = recorded.scans.stop
+        if scan != end - 1:
+            return None
+        return next(recorded.states(range(end, end + 1))).trap
 
     @property
     def now_ns(self) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from fbvm.cli.shared import status
-from fbvm.cli.shared.debugging.launch import open_launch
+from fbvm.cli.shared.debug.launch import open_launch
 from fbvm.cli.shared.terminal import say
 from fbvm.dap.server import pass_on, serve
 from fbvm.dap.target import LaunchError, Target

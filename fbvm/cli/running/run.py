@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from fbvm.cli.running.project import run_project
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
-from fbvm.cli.shared.debugging.door import NEVER_WITH, run_with_door
+from fbvm.cli.shared.debug.door import NEVER_WITH, run_with_door
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in

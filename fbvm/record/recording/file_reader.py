@@ -163,6 +163,11 @@ class FileRecordedPlc(RecordedPlc):
             return f"its program is another one here; fbvm {self.made_by} made the recording"
         return found
 
+    @property
+    def texts(self) -> dict[str, str]:
+        """The sources of the program as they were when it was recorded, by name."""
+        return dict(self._text.sources)
+
     @cached_property
     def is_same(self) -> bool:
         """True if the same version of fbvm executes the same program: then no scan comes out differently."""

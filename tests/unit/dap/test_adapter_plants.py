@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from dap_client import Client, RefusedError
 
+from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
 from fbvm.dap.target import Target
 from fbvm.machine.plc import Plc
@@ -203,3 +205,22 @@ def test_variables_of_functions_and_temporary_ones_have_names_while_they_live(tm
     main = client.scopes(1)
     assert client.rows(main["Temporary"]["variablesReference"])["q"]["type"] == "INT"
     assert client.ask("setExpression", expression="x", value="100", frameId=client.frames[0]["id"])["value"] == "100"
+
+
+@pytest.mark.slow
+def test_a_recording_in_a_file_is_debugged_from_its_trap_backwards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "trap.st").write_text(TRAP, encoding="utf-8")
+    assert CliRunner().invoke(main, ["run", "trap.st", "--for", "10s", "--trace", "night.fbtrace"]).exit_code == 4
+    client = Client()
+    stop = client.begin(recording=str(tmp_path / "night.fbtrace"))
+    assert stop["reason"] == "exception" and stop["text"] == "R0101" and client.line == 4
+    client.go("stepBack")
+    assert client.line == 4 and client.value("Main.n") == "41"
+    assert client.go("fbvm/lastWrite", name="d")["description"].startswith("Main.d was -50, is -100")
+    with pytest.raises(RefusedError, match="looked at, not changed"):
+        client.ask("setExpression", expression="Main.n", value="1")
+    wrong = Client()
+    wrong.ask("initialize", adapterID="fbvm")
+    with pytest.raises(RefusedError):
+        wrong.ask("launch", recording=str(tmp_path / "trap.st"))

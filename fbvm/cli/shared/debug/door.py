@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fbvm.cli.shared import status
-from fbvm.cli.shared.debugging.launch import open_attached
+from fbvm.cli.shared.debug.launch import open_attached
 from fbvm.cli.shared.terminal import say
 from fbvm.dap.server import Connection, DebugDoor
 from fbvm.dap.target import LaunchError, Target

@@ -20,9 +20,13 @@ from fbvm.dap.target import LaunchError, Target, checked
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
+from fbvm.record.recording.container import RecordingError
+from fbvm.record.recording.file_reader import RecordingFile
+from fbvm.record.recording.file_scans import FileScans
 from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.source_texts import source_texts
+from fbvm.record.trace.writer import Depth
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import FILE, Project, project_file, read_project
 from fbvm.run.real_pace import RealPace
@@ -39,6 +43,7 @@ LAUNCH: dict[str, tuple[type, ...]] = {
     "program": (str, list), "project": (str,), "plc": (str,), "main": (str,), "resource": (str,), "libraries": (list,),
     "dialect": (str,), "cycle": (str,), "timing": (str,), "seed": (int,), "engine": (str,), "map": (list,), "set": (list,),
     "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,), "test": (str,),
+    "recording": (str,),
 }  # fmt: skip
 """The keys of a launch configuration, and what their values are; `docs/guides/debugger.md` describes each."""
 
@@ -46,11 +51,13 @@ LAUNCH: dict[str, tuple[type, ...]] = {
 def open_launch(arguments: Mapping[str, Any]) -> Target:
     """What `launch` asks for.  Raises LaunchError."""
     given = checked(arguments, LAUNCH, "launch")
-    chosen = [key for key in ("program", "project", "test") if key in given]
+    chosen = [key for key in ("program", "project", "test", "recording") if key in given]
     if len(chosen) != 1:
-        raise LaunchError("launch has either program (a file, a list of files or a folder), project (an fbvm.toml) or test")
+        raise LaunchError("launch has either program (a file, files or a folder), project (an fbvm.toml), test or recording")
     folder = Path(given.get("cwd", "."))
     try:
+        if chosen[0] == "recording":
+            return _recording(folder / given["recording"], [folder / str(path) for path in given.get("libraries", ())])
         if chosen[0] == "test":
             return _test(given["test"], folder)
         if chosen[0] == "program" and not (isinstance(given["program"], str) and _is_project(folder / given["program"])):
@@ -137,9 +144,31 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
                    _said(compilation.diagnostics))  # fmt: skip
 
 
+def _recording(path: Path, libraries: Sequence[Path]) -> Target:
+    """The PLCs of a recording in a file, from its end backwards."""
+    try:
+        file = RecordingFile.open(path, libraries)
+    except RecordingError as error:
+        raise LaunchError(str(error)) from None
+    sessions: dict[str, Session | PastSession] = {}
+    texts: dict[str, str] = {}
+    notes = []
+    for name in file:
+        recorded = file[name]
+        if isinstance(recorded.program, str):
+            notes.append(f"{name}: {recorded.program}")
+            continue
+        sessions[name] = PastSession(FileScans(recorded, Depth.STATEMENTS), name)
+        texts |= source_texts(recorded.program, recorded.texts, libraries)
+    if not sessions:
+        raise LaunchError(f"{path.name} has no scan that can be executed again", "\n".join(notes))
+    paths = {name: path for name in texts if (path := Path(name)).is_file()}
+    return Target(sessions, texts, paths, notes=notes, close=file.close)
+
+
 def _test(node: str, folder: Path) -> Target:
     """The recordings of a test that is run now."""
-    from fbvm.cli.shared.debugging.recorded_item import record_item
+    from fbvm.cli.shared.debug.recorded_item import record_item
 
     item = record_item(node, folder)
     if not item.recordings:
