@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from fbvm.live.session import Session
+from collections.abc import Callable
+
+from fbvm.live.session import UPDATE_NS, Session
 from fbvm.live.sockets import LiveServer
 from fbvm.live.workbench import Workbench
 
 
 class LiveHost:
-    """Serves the pages of a workbench at `bind` and `port`.  Raises OSError if that cannot be used."""
+    """Serves the pages of a workbench at `bind` and `port`.  Raises OSError if that cannot be used.  `tick` is called every
+    100 ms, between scans."""
 
-    def __init__(self, workbench: Workbench, bind: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
-        self.workbench = workbench
+    def __init__(self, workbench: Workbench, bind: str = "127.0.0.1", port: int = 0, token: str | None = None,
+                 tick: Callable[[], None] = lambda: None) -> None:  # fmt: skip
+        self.workbench, self._tick, self._ticked_ns = workbench, tick, 0
         self._plcs = list(workbench.plcs.values())
         self.server = LiveServer(lambda: Session(workbench), bind, port, token)
 
@@ -31,6 +35,9 @@ class LiveHost:
 
     def update(self, now_ns: int) -> None:
         self.server.update(now_ns)
+        if now_ns - self._ticked_ns >= UPDATE_NS:
+            self._ticked_ns = now_ns
+            self._tick()
 
     def close(self) -> None:
         """Ends all connections."""

@@ -182,7 +182,7 @@ class Session:
         """The acts so far as a pytest, with the values that the page sees now."""
         live = self._bench.plc(plc)
         if self._bench.make_test is None:
-            raise MessageError("a test repeats runs of files in virtual time; any other is repeated by a journal: --journal FILE")
+            raise MessageError("a test repeats runs of files in virtual time; others are repeated by `fbvm replay`: --trace FILE")
         seen = [name for name, place in self._names.items() if isinstance(place, Place) and is_single(place)]
         return {"text": self._bench.make_test([act for act in self._bench.acts if act.plc == plc], live, seen)}
 

@@ -43,15 +43,14 @@ class Workbench:
     """All PLCs of a run, their `control`, and the faults of their networks.
 
     With `read_only` nothing can be changed; with `writable` only values of these names, and of what is inside them.
-    `remark` is told of acts that no journal knows by itself."""
+    What is written, forced and set is an input of the PLCs' recordings, as what faults let a network tell is."""
 
     def __init__(self, plcs: Sequence[LivePlc], control: Control, *, read_only: bool = False,
-                 writable: Collection[str] | None = None, remark: Callable[[str], None] = lambda text: None,
+                 writable: Collection[str] | None = None,
                  test: Callable[[Sequence[Act], LivePlc, Sequence[str]], str] | None = None) -> None:  # fmt: skip
         self.plcs = {plc.name: plc for plc in plcs}
         self.control, self.read_only = control, read_only
         self.writable = None if writable is None else [self._checked(name) for name in writable]
-        self._remark = remark
         self.make_test = test
         """Writes the acts as a pytest; None where a run cannot be repeated by one."""
         self.acts: list[Act] = []
@@ -185,7 +184,6 @@ class Workbench:
             found.unit.settings = {**settings, "link_up": plugged}
         text = f"cable of {unit} {'plugged' if plugged else 'pulled'}"
         self._note(live, "cable", text, unit, plugged)
-        self._remark(text)
 
     def is_plugged(self, attached: Any) -> bool:
         """False if somebody has pulled the cable of a unit."""
@@ -240,7 +238,6 @@ class Workbench:
     def _note_all(self, what: str, text: str) -> None:
         for live in self.plcs.values():
             self._note(live, what, text)
-        self._remark(text)
 
 
 def _text(found: Place | Span, value: object) -> str:

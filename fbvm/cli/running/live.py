@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
@@ -14,18 +14,20 @@ import click
 from fbvm.base.diagnostics import errors
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
-from fbvm.cli.shared.journals import start_journal
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import CYCLE_NS, Door, Mapping, address, door, mapping, time_ns
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument, read_given_project
-from fbvm.cli.shared.sources import compile_or_exit, report_diagnostics, source_options
+from fbvm.cli.shared.run_recording import program_text, record_run
+from fbvm.cli.shared.sources import compile_options, compile_or_exit, report_diagnostics, source_options
 from fbvm.cli.shared.terminal import say
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
-from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.file_writer import Described
+from fbvm.record.recording.program_text import ProgramText
 from fbvm.record.trace.source_texts import source_texts
+from fbvm.record.trace.writer import source_lines
 from fbvm.run.interactive import Control, run_interactive
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import Project
@@ -57,12 +59,12 @@ MISSING = "the live page needs websockets: pip install 'fbvm[live]'"
 @click.option("--paused", is_flag=True, help="Wait before the first scan.")
 @click.option("--speed", type=click.FloatRange(0, 1000), default=1.0, show_default=True, metavar="N",
               help="How fast virtual time passes: 1 as the clock, 0.1 ten times slower, 0 as fast as it goes.")
-@click.option("--journal", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              help="Write every input of every scan, and what is done on the page, for `fbvm replay`.")
+@click.option("--trace", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Record the run, with what is done on the page, for `fbvm chart`, `table`, `why`, `convert` and `replay`.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, net: str | None,
     mappings: tuple[Mapping, ...], doors: tuple[Door, ...], port: int, bind: str, read_only: bool, writable: tuple[str, ...],
-    paused: bool, speed: float, journal: Path | None,
+    paused: bool, speed: float, trace: Path | None,
 ) -> None:  # fmt: skip
     """Run a program or a PROJECT and print the address of a page on which it lives: values, rungs with power, the scan that
     stops, steps and goes back, units, frames and faults.
@@ -75,11 +77,11 @@ def command(
     with ExitStack() as stack:
         page = _Page(stack, control, bind=address(bind), port=port, read_only=read_only, writable=writable)
         if project := project_argument(files):
-            if journal or mappings or doors:
-                raise click.UsageError("--journal, --map and --door: what a project does stands in its file")
+            if trace or mappings or doors:
+                raise click.UsageError("--trace, --map and --door are for FILE: what a project does stands in its file")
             page.run_project(project, net)
             return
-        _run_files(page, stack, files, program, libraries, cycle_ns, _kind(net, mappings, doors), mappings, doors, journal)
+        _run_files(page, stack, files, program, libraries, cycle_ns, _kind(net, mappings, doors), mappings, doors, trace)
 
 
 def _kind(net: str | None, mappings: tuple[Mapping, ...], doors: tuple[Door, ...]) -> str:
@@ -92,15 +94,13 @@ def _kind(net: str | None, mappings: tuple[Mapping, ...], doors: tuple[Door, ...
 
 def _run_files(
     page: _Page, stack: ExitStack, files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int,
-    net: str, mappings: tuple[Mapping, ...], doors: tuple[Door, ...], journal: Path | None,
+    net: str, mappings: tuple[Mapping, ...], doors: tuple[Door, ...], trace: Path | None,
 ) -> None:  # fmt: skip
     """Runs a program, with its units and a network, under the page."""
     image = compile_or_exit(files, program, libraries, runnable=True)
     network = build_network(net, mappings, 0, "127.0.0.1", doors)
     stack.callback(network.close)
-    said = {"net": net, "pace": "cyclic", "timing": "exact", "seed": 0, "engine": "auto"}
-    written = start_journal(stack, journal, files, program, libraries, (), said) if journal else None
-    plc = Plc(image, cycle_ns, journal=written)
+    plc = Plc(image, cycle_ns)
     for unit in usual_units(mailbox_names(image)):
         plc.attach(unit, network)
     if isinstance(network, TcpNetwork):
@@ -112,8 +112,8 @@ def _run_files(
         network.notices.tell = notice_teller(HOW_TO_MAP, found)
     texts = source_texts(image, {str(file): file for file in files} | {file.name: file for file in files}, libraries)
     page.run({files[0].stem: (plc, texts)}, [Running(plc, scans=ENDLESS)], program=program,
-             repeated=files if network.virtual_time and not mappings else (),
-             remark=written.remark if written else None)  # fmt: skip
+             repeated=files if network.virtual_time and not mappings else (), trace=trace,
+             text=program_text(files, libraries, program=program, **compile_options()))  # fmt: skip
 
 
 class _Page:
@@ -148,23 +148,27 @@ class _Page:
         self.run(plcs, [Running(run.plc, scans=ENDLESS, writes=run.writes) for run in plant.runs])
 
     def run(self, plcs: dict[str, tuple[Plc, dict[str, str]]], runs: list[Running], repeated: Sequence[Path] = (),
-            program: str | None = None, remark: Callable[[str], None] | None = None) -> None:  # fmt: skip
+            program: str | None = None, trace: Path | None = None, text: ProgramText | None = None) -> None:  # fmt: skip
         """Serves the page and runs until Ctrl-C."""
         from fbvm.live.host import LiveHost
         from fbvm.live.plcs import LivePlc
         from fbvm.live.pytest_text import pytest_text
         from fbvm.live.workbench import Workbench
 
-        recording = Recording()
-        lives = [LivePlc(name, plc, recording.add(name, plc), texts) for name, (plc, texts) in plcs.items()]
+        options = {"journal": None, "trace": trace, "selected": (), "verify": False}
+        recorded = self._stack.enter_context(record_run(options, {"verb": "live"}, in_memory=True))
+        assert recorded.recording
+        lives = []
+        for name, (plc, texts) in plcs.items():
+            told = Described(text or ProgramText(), source_lines(plc.image, texts))
+            lives.append(LivePlc(name, plc, recorded.recording.add(name, plc, told), texts))
         test = partial(pytest_text, files=[file.resolve() for file in repeated], program=program) if repeated else None
         try:
-            bench = Workbench(lives, self._control, read_only=self._read_only, writable=self._writable or None, test=test,
-                              remark=remark or (lambda text: None))  # fmt: skip
+            bench = Workbench(lives, self._control, read_only=self._read_only, writable=self._writable or None, test=test)
         except UnknownPlace as error:
             raise click.UsageError(f"--allow-write: {error}") from None
         try:
-            host = LiveHost(bench, self._bind, self._port)
+            host = LiveHost(bench, self._bind, self._port, tick=recorded.tick)
         except OSError as error:
             unusable(OSError(f"the page cannot be served at {self._bind}:{self._port}: {error.strerror}"))
         self._stack.callback(host.close)

@@ -134,7 +134,7 @@ def command(
             plc.attach(unit, network)
         _try_doors(plc, network, options["mappings"], options["doors"])
         html = options["html"]
-        with record_run(options, said, html) as recorded, \
+        with record_run(options, said, html is not None) as recorded, \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
             if recorded.recording:
                 text = program_text(files, libraries, program=program, drawn=drawn, e_banks=tuple(banks), **compile_options())

@@ -98,12 +98,12 @@ class RunRecording:
 
 
 @contextmanager
-def record_run(options: Mapping[str, Any], about: Mapping[str, object], html: Path | None = None) -> Iterator[RunRecording]:
-    """Records what is added in the `with` block into the files that --journal and --trace name; for a page in memory, too."""
+def record_run(options: Mapping[str, Any], about: Mapping[str, object], in_memory: bool = False) -> Iterator[RunRecording]:
+    """Records what is added in the `with` block into the files that --journal and --trace name; for a page `in_memory`, too."""
     paths = list(dict.fromkeys(path for path in (options["journal"], options["trace"]) if path))
     if not paths and options["selected"]:
         raise click.UsageError("--select chooses what --trace keeps, which is not given")
-    if not paths and html is None:
+    if not paths and not in_memory:
         yield RunRecording()
         return
     with ExitStack() as stack:
@@ -115,7 +115,7 @@ def record_run(options: Mapping[str, Any], about: Mapping[str, object], html: Pa
             about = {"began_ns": loop.epoch_ns(), "options": dict(about)}
             file = files[0] if len(files) == 1 else _Files(files)
             writer = RecordingWriter(file, fbvm.__version__, options["verify"], about) if files else None
-        made = RunRecording(Recording(RING_BYTES if html else 1, writer))
+        made = RunRecording(Recording(RING_BYTES if in_memory else 1, writer))
         try:
             yield made
         finally:

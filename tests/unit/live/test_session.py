@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 from browsers import Page
 
-from fbvm import Plc
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
 from fbvm.live.session import UPDATE_NS
@@ -203,27 +202,17 @@ def test_what_was_done_by_hand_becomes_a_pytest_that_passes(tmp_path: Any) -> No
     space["test_what_was_done_by_hand"]()
 
 
-def test_every_act_is_in_the_journal(tmp_path: Any) -> None:
-    import io
-
-    from browsers import PUMP
-
-    from fbvm import Journal, Recording, compile_text
-    from fbvm.live.session import Session
-    from fbvm.live.workbench import Workbench
-    from fbvm.run.interactive import Control
-
-    file = io.StringIO()
-    image = compile_text(PUMP).image
-    assert image is not None
-    journal = Journal(file)
-    plc = Plc(image, journal=journal)
-    live = LivePlc("pump", plc, Recording().add("pump", plc), {})
-    session = Session(Workbench([live], Control(), remark=journal.remark))
-    session.answer('{"do":"write","plc":"pump","name":"Main.Level","value":"70"}')
-    plc.scan()
-    session.answer('{"do":"force","plc":"pump","name":"Main.Pump","value":"TRUE"}')
-    plc.scan()
-    journal.close()
-    lines = file.getvalue().splitlines()
-    assert "Main.Level := 70" in lines[1] and '"force":{"Main.Pump":true}' in lines[2]
+def test_every_act_is_in_the_recording_and_is_done_again_to_the_same_memory() -> None:
+    page = Page()
+    page.scan(5)
+    page.done("write", plc="pump", name="Main.Level", value="70")
+    page.scan(3)
+    page.done("force", plc="pump", name="Main.Pump", value="TRUE")
+    page.scan(3)
+    page.done("cable", plc="pump", unit="ETN21 0", plugged=False)
+    page.done("release", plc="pump")
+    page.scan(5)
+    recorded = page.recording["pump"]
+    assert [recorded.at(scan).read("Main.Level") for scan in (5, 6, 8, 9, 11)] == [25, 71, 73, 71, 67]
+    again = recorded.at(page.plc.scans)
+    assert bytes(again.memory.map[:]) == bytes(page.plc.memory.map[:])
