@@ -75,6 +75,9 @@ def test_what_a_program_says_wrong(fbvm: Fbvm) -> None:
     assert fbvm("check", f"w{NAME}").stderr.count("\n") == fbvm("check", "wrong.st").stderr.count("\n"), "one line stays one"
     fbvm("fmt", "--diff", NAME)
     fbvm("fmt", NAME)
+    for file in ("wrong.st", NAME, f"w{NAME}", f"no{NAME}"):
+        fbvm("diff", file, "wrong.st")
+        fbvm("diff", NAME, file)
 
 
 @pytest.mark.slow
