@@ -220,6 +220,7 @@ def test_a_recording_in_a_file_is_debugged_from_its_trap_backwards(tmp_path: Pat
     assert client.go("fbvm/lastWrite", name="d")["description"].startswith("Main.d was -50, is -100")
     with pytest.raises(RefusedError, match="looked at, not changed"):
         client.ask("setExpression", expression="Main.n", value="1")
+    client.ask("disconnect")
     wrong = Client()
     wrong.ask("initialize", adapterID="fbvm")
     with pytest.raises(RefusedError):

@@ -161,6 +161,7 @@ def _recording(path: Path, libraries: Sequence[Path]) -> Target:
         sessions[name] = PastSession(FileScans(recorded, Depth.STATEMENTS), name)
         texts |= source_texts(recorded.program, recorded.texts, libraries)
     if not sessions:
+        file.close()
         raise LaunchError(f"{path.name} has no scan that can be executed again", "\n".join(notes))
     paths = {name: path for name in texts if (path := Path(name)).is_file()}
     return Target(sessions, texts, paths, notes=notes, close=file.close)
