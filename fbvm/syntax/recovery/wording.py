@@ -14,7 +14,7 @@ GROUPS = (
     ("a statement", {"IF", "FOR", "SEMICOLON"}, {
         "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK",
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
-        "NOT", "DIRECT", "SELF", "LADDER"}),
+        "NOT", "DIRECT", "SELF", "LADDER", "INSTRUCTION_LIST"}),
     ("an expression", {"NAME", "NUMBER", "LPAR"}, {
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS",
         "MINUS", "NOT", "DIRECT", "SELF"}),

@@ -100,6 +100,7 @@ def test_options_and_arguments(fbvm: Fbvm) -> None:
         ("run", "counter.st", "--until", EVIL), ("run", "counter.st", "--scans", "1", "--show", f"Main.{EVIL}"),
         ("run", "counter.st", "--scans", "1", "--set", f"Main.n={EVIL}"), ("run", "counter.st", "--scans", "1", "--map", EVIL),
         ("run", "counter.st", "--door", EVIL), ("run", "counter.st", "--scans", EVIL), ("serve", "--bind", EVIL),
+        ("live", "counter.st", "--allow-write", EVIL), ("live", "counter.st", "--map", EVIL), ("live", f"no{EVIL}.st"),
         ("run", "counter.st", "--net", "tcp", "--scans", "1", "--map", f"1.2.3.4:1=h{EVIL}:1"), ("new", f"x/{EVIL}/y"),
         ("run", "counter.st", "--scans", "1", "--trace", f"no{EVIL}/t.trace"), ("serve", "--image", f"no{EVIL}/i"),
         ("run", "counter.st", "--scans", "1", "--program", EVIL), ("check", "counter.st", "--no-warn", EVIL),
