@@ -177,6 +177,17 @@ def test_the_script_recorder(load: Load, monkeypatch: pytest.MonkeyPatch) -> Non
     script.main()
 
 
+def test_the_script_recorded_day(load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", ["recorded_day.py", "0.001"])
+    load("recorded_day").main()
+    assert "360 scans, plain" in capsys.readouterr().out
+
+
+def test_the_script_pages(load: Load, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "200 scans" in load("pages").made(200)
+    assert "a page of 200 scans of 6 variables" in capsys.readouterr().out
+
+
 def test_the_script_run(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     script = load("run")
     monkeypatch.setattr(script, "SCANS", 200)
