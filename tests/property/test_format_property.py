@@ -163,7 +163,7 @@ def respaced(text: str, chance: random.Random) -> str:
 SPACES = ([" ", "   ", "\t", "\n", " \n    ", "\r\n\t "], ["", "", "", " ", "\n"])
 """What may stand in place of a gap, and of none."""
 CASES = (str.upper, str.lower, str.title, str)
-WHOLE = {"REFUSED_BLOCK", "REFUSED_SECTION", "TRY"}
+WHOLE = {"REFUSED_BLOCK", "REFUSED_SECTION", "TRY", "INSTRUCTION_LIST"}
 """Words that begin a text which is kept as it is."""
 
 

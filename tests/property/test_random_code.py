@@ -29,4 +29,4 @@ def test_every_operation_is_made() -> None:
     for seed in range(150):
         for block in Maker(Random(seed), 3).program():
             made |= operations_in(block)
-    assert made >= {*EXPRESSIONS, *STATEMENTS} - {"stop", "observe"}
+    assert made >= {*EXPRESSIONS, *STATEMENTS} - {"stop", "observe", "mark"}  # test_power.py compares engines on `mark`

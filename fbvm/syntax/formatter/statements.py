@@ -139,7 +139,7 @@ class StatementLayout(ExpressionLayout):
         """An instruction list, in columns."""
         written = list_lines(self.comments.text, token.start, token.end, lambda word: self.leaf(word).text)
         rows = [part for line in written for part in (HARD, Verbatim(line, 0))]
-        return Phrase(token.start, *rows[1:], level="refused")
+        return Phrase(token.start, Leaf("", token.start, -1), *rows[1:], Leaf("", -1, token.end), level="refused")
 
     def head(self, word: Token, condition: Phrase, then: Token) -> Doc:
         return (self.leaf(word), " ", self.hung(condition), " ", self.closer(then))
