@@ -44,9 +44,13 @@ class _NeedsMending(Exception):
 
 def _printed(source: Source, spelling: Spelling) -> str:
     """The canonical text of a text without errors."""
-    wrong: list[object] = []
-    tokens = list(Lexer(source.text, lambda *message: wrong.append(message)).tokens())
-    if wrong:  # within what the parser has passed over
+    said: list[Diagnostic] = []
+
+    def report(code: str, start: int, end: int, message: str, *more: object) -> None:
+        said.append(Diagnostic(code, source, start, end, message))
+
+    tokens = list(Lexer(source.text, report).tokens())
+    if errors(said):  # within what the parser has passed over
         raise _NeedsMending
     comments = Comments(source.text, tokens)
     layout = DeclarationLayout(comments, spelling)

@@ -355,6 +355,9 @@ class _LineReader:
             self._go_on()
         step = Step(mnemonic.start - len(written), operands[-1].end if operands else mnemonic.end, written, row.mnemonic,
                     tuple(operand.text for operand in operands))
+        rung = self.rungs[-1]
+        if not (rung.lines or rung.declared or rung.notes or rung.section or rung.symbols):
+            rung.start = step.start  # where its first instruction stands, as that of rungs behind it
         self.rungs[-1].lines.append(Line(row, step, [(o.start, o.end) for o in operands],
                                          code is not None, remark.text.strip() if remark else ""))
 

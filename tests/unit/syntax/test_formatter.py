@@ -334,6 +334,12 @@ def test_labels_stay_as_they_are_written() -> None:
     assert wrong == [] and "JMP Next;" in written and "$" not in written
 
 
+def test_a_text_with_a_warning_is_formatted() -> None:
+    text = "{attribute 'pack_mode' := '3'}\nTYPE S : STRUCT a : byte; END_STRUCT END_TYPE\n"
+    written, wrong = formatted(Source("a.st", text))
+    assert wrong == [] and "    a : BYTE;\n" in written
+
+
 def test_a_pragma_without_end_in_what_reads_as_an_instruction_list_is_left_as_it_is() -> None:
     """The parser tells of the list alone, and its tokens end where the pragma begins."""
     declared = "VAR_INPUT\n    R   BOOL;\nEND_VAR\nVAR\n    b { efore : BOOL;\nEND_VAR\n"
