@@ -59,12 +59,16 @@ def fbvm(*arguments: str) -> Result:
     return CliRunner().invoke(main, arguments, catch_exceptions=False)
 
 
+VARIES = 64
+"""Bytes by which the file of a run may be shorter than that of another one: it holds when it began, and is compressed."""
+
+
 @pytest.mark.parametrize("option", first_quick(["--trace", "--journal", "--pcap"]))
 def test_a_disk_that_is_full_during_a_run(disk: Callable[[int], None], option: str) -> None:
     run = ["run", DEMO, *PEER, "--scans", "900", option, "out.file"]
     assert fbvm(*run).exit_code == 0
     whole = Path("out.file").read_bytes()
-    for room_bytes in (0, 5, len(whole) // 2, len(whole) - 1):
+    for room_bytes in (0, 5, len(whole) // 2, len(whole) - VARIES):
         disk(room_bytes)
         result = fbvm(*run)
         assert result.exit_code == 4
@@ -73,7 +77,7 @@ def test_a_disk_that_is_full_during_a_run(disk: Callable[[int], None], option: s
     if option == "--trace":
         assert fbvm("chart", "out.file", "Main.Step", "--scans", "0..50").exit_code == 0
     if option == "--journal":
-        disk(len(whole) - 1)
+        disk(len(whole) - VARIES)
         assert fbvm(*run).exit_code == 4
         result = fbvm("replay", "out.file")
         assert result.exit_code == 0
