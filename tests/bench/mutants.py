@@ -43,13 +43,13 @@ TESTS = {
     "fblib": ("tests/fblib", "tests/unit/units"), "base": ("tests/unit/base", "tests/lang"),
     "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"),
     "wire": ("tests/unit/wire", "tests/unit/net"),
-    "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/plcopen",),
+    "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/plcopen", "tests/cx"),
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/machine", "tests/unit/units"),
     "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run"),
     "record": ("tests/unit/record", "tests/unit/cli"), "run": ("tests/unit/run", "tests/unit/net"),
-    "testing": ("tests/unit/testing",), "cli": ("tests/unit/cli",),
+    "testing": ("tests/unit/testing",), "cli": ("tests/unit/cli",), "analysis": ("tests/unit/analysis", "tests/unit/lsp"),
 }  # fmt: skip
 """The folders of tests that matter for a room; for others that of its own name."""
 RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is": "is not", "is not": "is",
