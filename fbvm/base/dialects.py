@@ -6,7 +6,7 @@ correct program of the standard mean something else but where its switches say s
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 
 @dataclass(frozen=True)
@@ -113,15 +113,20 @@ QUESTIONS = {
 """For each switch: what compilers disagree about, the answer without it, and with it."""
 
 STANDARD = Dialect("standard", "the third edition, and CODESYS's answer where it is silent")
+_CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made of it", ("codesys/blocks",), last_of_mux=True,
+                   lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
+                   integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
+                   bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
+                   initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True)
 _ROWS = (
     STANDARD,
-    Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
-            lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
-            integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
-            bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True,
-            reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True),
+    _CODESYS,
+    replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does"),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
             real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading", no_open_inputs=True),
+    Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors", ("codesys/blocks",),
+            last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
+            integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True),
     Dialect("rusty", "programs for RuSTy", reals_of_other_widths=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
@@ -143,8 +148,9 @@ def dialect(name: str) -> Dialect:
 
 
 def takers(switch: str) -> str:
-    """The option for a dialect with a switch set, for hints: `--dialect codesys or rusty`."""
-    return "--dialect " + " or ".join(row.name for row in DIALECTS.values() if getattr(row, switch))
+    """The option for a dialect with a switch set, for hints: `--dialect codesys, twincat or rusty`."""
+    *names, last = (row.name for row in DIALECTS.values() if getattr(row, switch))
+    return f"--dialect {', '.join(names)} or {last}" if names else f"--dialect {last}"
 
 
 def page() -> str:
@@ -155,7 +161,7 @@ def page() -> str:
     for switch in SWITCHES:
         what, without, with_it = QUESTIONS[switch]
         names = [row.name for row in DIALECTS.values() if getattr(row, switch)]
-        lines += ["", f"## {what}", "", f"- {without}", f"- {' and '.join(names)}: {with_it}"]
+        lines += ["", f"## {what}", "", f"- {without}", f"- {', '.join(names)}: {with_it}"]
     lines += ["", *(f"## {what}\n\n{answer}\n" for what, answer in ALIKE)]
     return "\n".join(lines).rstrip()
 
