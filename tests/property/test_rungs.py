@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from depth import times
 from hypothesis import HealthCheck, Phase, given, settings
@@ -12,6 +14,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder.notation import Form, Notation
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Pou
 from fbvm.syntax.tree.ladder import Ladder, Step
@@ -116,6 +119,11 @@ def _key(step: Step) -> tuple[str, str, tuple[str, ...]]:
 
 def run(text: str, engine: str, observed: bool = False) -> bytes:
     """The memory after three scans from the same beginning."""
+    return bytes(executed(text, engine, observed).memory.u8)
+
+
+def executed(text: str, engine: str, observed: bool = False) -> Plc:
+    """A PLC that has done three scans of a program from the same beginning."""
     made = compile_text(text, lint=False)
     assert made.image is not None, made.errors[0].render() + text
     plc = Plc(made.image, engine=engine, observed=observed)
@@ -128,7 +136,7 @@ def run(text: str, engine: str, observed: bool = False) -> bytes:
     for scan in range(3):
         plc.memory.words("CIO")[0] = scan * 0x2B
         assert plc.scan() is None, plc.trap
-    return bytes(plc.memory.u8)
+    return plc
 
 
 UNSHRUNK = {"deadline": None, "suppress_health_check": list(HealthCheck), "phases": (Phase.explicit, Phase.generate)}
@@ -156,3 +164,37 @@ def test_what_is_printed_does_the_same_on_every_engine(text: str) -> None:
     assert run(printed, "python") == left
     assert run(printed, "python", observed=True) == left
     assert run(printed, "native") == left
+
+
+def written(text: str, form: Form) -> str:
+    """A program with its rungs in one notation."""
+    made, problems = formatted(Source("rungs.st", text), notation=Notation(form))
+    assert problems == []
+    return made
+
+
+def comments(text: str) -> list[str]:
+    return re.findall(r"a remark|a note|what it is for", text)
+
+
+@pytest.mark.slow
+@settings(max_examples=times(25), **UNSHRUNK)  # type: ignore[arg-type]
+@given(program())
+def test_each_notation_is_written_in_the_other_and_back(text: str) -> None:
+    listed = written(text, Form.MNEMONICS)
+    assert steps(listed) == steps(text)
+    drawn = written(text, Form.DRAWING)
+    assert written(drawn, Form.DRAWING) == written(written(drawn, Form.MNEMONICS), Form.DRAWING) == drawn
+    assert steps(written(drawn, Form.MNEMONICS)) == steps(drawn)
+    assert sorted(comments(drawn)) == sorted(comments(text))
+
+
+@pytest.mark.slow
+@settings(max_examples=times(3), **UNSHRUNK)  # type: ignore[arg-type]
+@given(program())
+def test_a_drawing_does_what_its_instructions_did(text: str) -> None:
+    drawn, listed = executed(written(text, Form.DRAWING), "python"), executed(text, "python")
+    for area in ("CIO", "W", "H", "A", "D", "T", "C"):
+        assert list(drawn.memory.words(area)) == list(listed.memory.words(area)), area
+    for name in ("CX_IR", "P_CY", "P_EQ", "P_ER"):
+        assert drawn.read(name) == listed.read(name), name

@@ -18,6 +18,7 @@ from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.sources import show_diagnostic
 from fbvm.cli.shared.terminal import named, say, say_exactly
 from fbvm.syntax.formatter.formatter import formatted
+from fbvm.syntax.ladder.notation import Form, Notation
 from fbvm.syntax.text import MARKS, decode, refusal
 
 STREAM = Path("-")
@@ -30,12 +31,15 @@ ENCODINGS = (*MARKS, (b"", "utf-8"), (b"", "cp1252"), (b"", "latin-1"))
                 type=SourcePath(allow_dash=True))
 @click.option("--check", is_flag=True, help="Write nothing; status 1 if a file would change.")
 @click.option("--diff", is_flag=True, help="Write nothing; show what would change.")
-def command(files: tuple[Path, ...], check: bool, diff: bool) -> None:
+@click.option("--mnemonics", "form", flag_value=Form.MNEMONICS.name, help="Write drawn rungs as instructions.")
+@click.option("--drawing", "form", flag_value=Form.DRAWING.name, help="Draw the rungs that are written as instructions.")
+def command(files: tuple[Path, ...], check: bool, diff: bool, form: str | None) -> None:
     """Rewrite the files in canonical Structured Text, and print the names of those that change.
 
-    The program means the same.  A folder stands for all files in it that end in .st; FILE - reads the standard input and
-    writes the standard output.  A file with syntax errors is left alone, and the status is 3."""
-    results = [_one(path, check, diff) for path in _found(files)]
+    The program means the same.  A rung that has no drawing stays as its instructions, and is named.  A folder stands for all
+    files in it that end in .st; FILE - reads the standard input and writes the standard output.  A file with syntax errors is
+    left alone, and the status is 3."""
+    results = [_one(path, check, diff, Notation(Form[form]) if form else None) for path in _found(files)]
     if None in results:
         sys.exit(status.PROGRAM_ERRORS)
     if check and any(results):
@@ -53,18 +57,20 @@ def _found(paths: Iterable[Path]) -> list[Path]:
     return list(found)
 
 
-def _one(path: Path, check: bool, diff: bool) -> bool | None:
+def _one(path: Path, check: bool, diff: bool, notation: Notation | None) -> bool | None:
     """Formats one file; returns True if it changes, None if it has errors."""
     source, data = _read(path)
     if source is None:
         _left_alone(str(path), "it cannot be read")
         return None
-    text, wrong = formatted(source, OUTSIDE)
+    text, wrong = formatted(source, OUTSIDE, notation)
     for diagnostic in wrong:
         show_diagnostic(diagnostic)
     if wrong:
         _left_alone(source.name, "one syntax error" if len(wrong) == 1 else f"{len(wrong)} syntax errors")
         return None
+    if notation is not None:
+        _name_kept(source.name, notation)
     changes = text != source.text
     if diff:
         say_exactly("".join(_difference(source, text)))
@@ -79,6 +85,13 @@ def _one(path: Path, check: bool, diff: bool) -> bool | None:
         _replace(path, _encoded(source.text, text, data))
         say(named(path))
     return changes
+
+
+def _name_kept(name: str, notation: Notation) -> None:
+    """Names the rungs that have no other notation."""
+    for line in notation.kept:
+        say(f"{named(name)}:{line}: this rung cannot be written as {notation.form.value}", err=True)
+    notation.kept.clear()
 
 
 def _left_alone(name: str, why: str) -> None:

@@ -12,6 +12,7 @@ from fbvm.syntax.formatter.comments import Comments
 from fbvm.syntax.formatter.declarations import DeclarationLayout
 from fbvm.syntax.formatter.layout import Doc, Printer
 from fbvm.syntax.formatter.names import NOTHING, Outside, Spelling
+from fbvm.syntax.ladder.notation import Notation
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.lexer import Lexer
@@ -20,9 +21,10 @@ REFUSED = {"S0901", "S0902"}
 """Errors of texts that are parsed all the same, and can therefore be formatted."""
 
 
-def formatted(source: Source, outside: Outside = NOTHING) -> tuple[str, list[Diagnostic]]:
+def formatted(source: Source, outside: Outside = NOTHING, notation: Notation | None = None) -> tuple[str, list[Diagnostic]]:
     """The canonical text, with the line ends of the source; and the syntax errors.  With any of them it is the text of the
-    source, untouched.  `outside` knows the spelling of names that the text does not declare."""
+    source, untouched.  `outside` knows the spelling of names that the text does not declare; `notation` is how rungs are
+    written, None if each stays as it is."""
     tree, diagnostics = parse(source)
     wrong = [d for d in errors(diagnostics) if d.code not in REFUSED]
     if wrong:
@@ -32,7 +34,7 @@ def formatted(source: Source, outside: Outside = NOTHING) -> tuple[str, list[Dia
         source = Source(source.name, source.text.replace("\r\n", "\n"), source.library)
         tree, _ = parse(source)
     try:
-        text = _printed(source, Spelling(tree, outside))
+        text = _printed(source, Spelling(tree, outside), notation)
     except _NeedsMending:
         return source.text, errors(diagnostics)
     return text.replace("\n", "\r\n") if windows else text, []
@@ -42,7 +44,7 @@ class _NeedsMending(Exception):
     """The text is understood only with a repair."""
 
 
-def _printed(source: Source, spelling: Spelling) -> str:
+def _printed(source: Source, spelling: Spelling, notation: Notation | None) -> str:
     """The canonical text of a text without errors."""
     said: list[Diagnostic] = []
 
@@ -54,6 +56,7 @@ def _printed(source: Source, spelling: Spelling) -> str:
         raise _NeedsMending
     comments = Comments(source.text, tokens)
     layout = DeclarationLayout(comments, spelling)
+    layout.notation = notation
     doc: Doc = Automaton(layout, iter(tokens), source.text).run(_no_mender)
     return Printer(comments).print(doc)
 

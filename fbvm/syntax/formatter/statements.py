@@ -11,6 +11,7 @@ from fbvm.syntax.formatter.expressions import ExpressionLayout, Phrase
 from fbvm.syntax.formatter.layout import BLANK, HARD, Doc, Hang, Indent, Leaf, Verbatim
 from fbvm.syntax.il.text import list_lines
 from fbvm.syntax.ladder.mnemonics import read_rungs
+from fbvm.syntax.ladder.notation import Notation
 from fbvm.syntax.ladder.text import rung_lines
 from fbvm.syntax.st.lexer import Token
 
@@ -34,6 +35,9 @@ def lines(rows: Iterable[Row], blank_first: bool = False) -> Doc:
 
 class StatementLayout(ExpressionLayout):
     """The functions of the rules of statements."""
+
+    notation: Notation | None = None
+    """The notation that rungs are written in; None leaves each as it is."""
 
     # --- rows ---
 
@@ -131,6 +135,8 @@ class StatementLayout(ExpressionLayout):
         """LADDER .. END_LADDER, in the canonical form of its own."""
         first, last = token.text.index("\n") + 1, token.text.rindex("\n") + 1
         rungs = read_rungs(token.text, first, last, lambda *message: None)
+        if self.notation is not None:
+            rungs = self.notation.rewritten(rungs, self.comments.text, token.start)
         words = Token("", "LADDER", token.start, token.end)
         rows = [part for line in rung_lines(rungs) for part in (HARD, Verbatim(line, 0))]
         return Phrase(token.start, self.leaf(words), *rows, HARD, "END_LADDER", level="refused")

@@ -111,3 +111,79 @@ def test_names_of_standard_functions_are_capitals_whatever_they_ask() -> None:
     for name in ("add_int", "sizeof", "dint_to_int", "add_tod_time"):
         wanted = wanted.replace(name, name.upper())
     assert fmt("-", given=given).stdout == wanted, "ini is none of these"
+
+
+RUNGS = """FUNCTION_BLOCK Lamp
+VAR_INPUT
+    On : BOOL;
+END_VAR
+VAR_OUTPUT
+    Light : BOOL;
+END_VAR
+    Light := On;  // as ever
+    LADDER
+    RUNG 7 it shines
+        ' a note
+        LD      On   // from outside
+        OR      Light
+        OUT     Light
+    RUNG
+        LD      On
+        OUT     100.00
+        OR      Light
+        OUT     100.01
+    END_LADDER
+END_FUNCTION_BLOCK
+
+PROGRAM Main
+VAR
+    Lamp1 : Lamp;
+END_VAR
+    LADDER
+        LD      0.00
+        FBCALL  Lamp Lamp1 On:=* Light=>*
+        OUT     100.02
+
+        LD      0.01
+        CNT     5 #3
+    END_LADDER
+END_PROGRAM
+"""
+DRAWN = """    RUNG 7 it shines
+        ' a note
+        // from outside
+        │   On           Light  │
+        ├┬──┤ ├──┬────────( )───┤
+        ││ Light │              │
+        │└──┤ ├──┘              │
+    RUNG
+        LD      On
+        OUT     100.00
+        OR      Light
+        OUT     100.01
+"""
+
+
+def test_rungs_are_drawn_and_written_as_instructions_again() -> None:
+    given = RUNGS.replace("    CNT     5 #3", "    OUT     100.03")
+    Path("rungs.st").write_text(given, encoding="utf-8")
+    result = fmt("rungs.st", "--drawing")
+    assert (result.exit_code, result.stdout) == (0, "rungs.st\n")
+    assert result.stderr == "rungs.st:15: this rung cannot be written as a drawing\n", "an OR stands behind an output"
+    drawn = text("rungs.st")
+    assert DRAWN in drawn and "├──┤ ├───┤On         Light├──────────( )───┤" in drawn
+    assert drawn.startswith(RUNGS[:RUNGS.index("    RUNG 7")]), "Structured Text stays"
+    assert fmt("rungs.st", "--drawing", "--check").exit_code == 0
+    assert fmt("rungs.st", "--check").exit_code == 0
+    assert fmt("rungs.st", "--mnemonics").stderr == ""
+    moved = given.replace("LD      On   // from outside", "LD      On").replace("' a note", "' a note\n        // from outside")
+    wanted = moved.replace("    LADDER\n        LD", "    LADDER\n    RUNG\n        LD")
+    wanted = wanted.replace("\n\n        LD", "\n    RUNG\n        LD")
+    assert text("rungs.st") == wanted
+
+
+def test_rungs_with_errors_are_left_in_their_notation() -> None:
+    Path("rungs.st").write_text(RUNGS, encoding="utf-8")
+    result = fmt("rungs.st", "--drawing")
+    assert result.exit_code == 3 and text("rungs.st") == RUNGS
+    assert "CNT takes 2 conditions, 1 are there" in result.stderr
