@@ -9,12 +9,11 @@ from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading
 from fbvm.interchange.plcopen.read.networks import Network, networks
 from fbvm.interchange.plcopen.read.rung_steps import rung_steps
 from fbvm.interchange.plcopen.read.scope import Scope
+from fbvm.interchange.plcopen.read.spans import divided
 from fbvm.interchange.plcopen.read.statements import Statements
 from fbvm.interchange.plcopen.read.values import Unexecutable
 
 NOTE = "//"
-SPANS = {"IL", "ILC", "JMP", "CJP", "CJPN", "JME", "JMP0", "JME0", "FOR", "NEXT", "BREAK", "SBN", "RET", "END"}
-"""Instructions that cover rungs: if a diagram has one, all its networks must be written as rungs."""
 
 
 class Bodies:
@@ -51,15 +50,20 @@ class Bodies:
         if len({(item.x, item.y) for item in diagram.objects}) > 1:
             self._lose_places(body)
         self._check_jumps(diagram)
-        mnemonics = {item.mnemonic.lstrip("!@%") for item in diagram.objects if item.mnemonic}
+        ours = any(item.mnemonic for item in diagram.objects)
+        found = networks(diagram)
+        rungs = [rung_steps(network, self.scope, ours) if body.language == "LD" and not network.broken else None
+                 for network in found]
+        among = divided(rungs)
         lines: list[str] = []
         in_ladder = False
         statements = Statements(self.reading, self.scope)
-        for network in networks(diagram):
-            rung = self._rung(network, bool(mnemonics)) if body.language == "LD" and not network.broken else None
-            if rung is None and mnemonics & SPANS and not network.broken:
+        for place, network in enumerate(found):
+            rung = self._rung(network, rungs[place])
+            if place in among and not network.broken:
                 item = network.objects[0]
-                self.reading.report("X0202", item.element, "the network cannot be written as a rung, and stands among jumps")
+                self.reading.report("X0202", item.element, "the network cannot be written as a rung, and stands among rungs "
+                                    "that belong together, such as those from IL to ILC")
                 item.broken = True
             if in_ladder != (rung is not None):
                 lines.append("END_LADDER" if in_ladder else "LADDER")
@@ -75,8 +79,8 @@ class Bodies:
                 self.reading.report("X0202", item.element, f"there is no label {item.text}")
                 item.broken = True
 
-    def _rung(self, network: Network, ours: bool) -> list[str] | None:
-        steps = rung_steps(network, self.scope, ours)
+    def _rung(self, network: Network, steps: list[str] | None) -> list[str] | None:
+        """A rung with its headline and notes."""
         if steps is None:
             return None
         self.rungs += 1
