@@ -67,6 +67,9 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
     if networks:
+        for unit in (attached.own for run in runs for attached in run.plc.units):
+            if unit is not None:  # what takes long once is done before time begins
+                unit.prepare()
         watchdogs = [Watchdog(run.plc) for run in runs]
         clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:

@@ -178,6 +178,9 @@ class ProcessorUnit(Unit, Protocol):
         """From now on the program of the unit runs on the engine of this name, that of its PLC; "python" never runs machine
         code."""
 
+    def prepare(self) -> None:
+        """Has the unit's program compiled and its code ready, so that no scan waits for that.  The unit's state stays."""
+
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
         """The first part of `refresh`: posts the events, copies the words in, runs the program, copies them out.  Returns False
         if none of this was needed; else `finish` comes when the other units have exchanged their words."""

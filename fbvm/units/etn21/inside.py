@@ -12,6 +12,11 @@ from fbvm.units.etn21.words import Words, numbers
 PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
 
 
+def prepare(engine: str) -> None:
+    """Compiles the program of all ETN21s for an engine, unless that has been done."""
+    processor(PROGRAM, engine)
+
+
 def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wait_ns: int, odd_filler: int | None,
              engine: str) -> Inside:  # fmt: skip
     """A processor with an ETN21's program that knows how its unit is made, before its first run.

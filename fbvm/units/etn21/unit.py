@@ -20,7 +20,7 @@ from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.fins.service import FinsService
 from fbvm.units.etn21.fins.state import ACCESS, FinsSettings, FinsState, nodes_of
-from fbvm.units.etn21.inside import Inside, power_on
+from fbvm.units.etn21.inside import Inside, power_on, prepare
 from fbvm.units.etn21.map import Layout
 from fbvm.units.etn21.names import descriptions, meanings
 from fbvm.units.etn21.words import Words
@@ -306,6 +306,10 @@ class Etn21:
         self._engine = engine
         if self._processor:
             self._processor.own.run_on(engine)
+
+    def prepare(self) -> None:
+        """The unit's program is compiled and its code ready, for all units that are switched on from now on."""
+        prepare(self._engine)
 
     def post(self, events: Iterable[Event]) -> None:
         """Events of the network for the next run of the program."""

@@ -101,6 +101,9 @@ class Toy:
         self._engine = engine
         self.own.run_on(engine)
 
+    def prepare(self) -> None:
+        """Its program is ready from the beginning."""
+
     def post(self, events: Sequence[Event]) -> None:
         for event in events:
             if self._posted[0] < 16:

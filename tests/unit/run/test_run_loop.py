@@ -16,6 +16,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.run import Running, TimedWrite, loop, run, run_all
 from fbvm.units.contract import AreaMemory
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Event, Link, Request
 
 MS = 1_000_000
@@ -232,6 +233,15 @@ def test_how_late_scans_begin_is_measured(clock: Clock) -> None:
     assert (plc.scan_times.count, plc.scan_times.overruns) == (5, 1)
     assert (plc.lateness.count, plc.lateness.missed, plc.lateness.longest_scan) == (5, 1, 2)
     assert 14 * MS < plc.lateness.longest_ns < 16 * MS
+
+
+def test_a_unit_s_program_is_made_ready_before_time_begins(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Etn21, "prepare", lambda unit: clock.sleep(0.8))
+    plc = Plc(counter_image())
+    plc.attach(Etn21(0, "192.168.250.1"), RealNetwork(clock))
+    run(plc, scans=3)
+    assert clock.slept_ns[0] == 800 * MS
+    assert (plc.lateness.count, plc.lateness.missed) == (3, 0)
 
 
 # --- several PLCs -----------------------------------------------------------------------------------------------------
