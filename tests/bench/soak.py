@@ -161,6 +161,25 @@ def switched(dice: random.Random, changes_bytes: bool) -> list[Fault]:
     return [] if dice.random() < 1 / 3 else [replace(KINDS[kind], peer=SERVER_DOOR, **changed.get(kind, {}))]
 
 
+def _started(script: str, *arguments: str) -> subprocess.Popen[str]:
+    """A program of this folder in a process of its own, which a line on its standard input ends."""
+    return subprocess.Popen([sys.executable, str(HOUSE / "tests" / "bench" / script), *arguments],
+                            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)  # fmt: skip
+
+
+def _end(program: subprocess.Popen[str]) -> None:
+    assert program.stdin
+    program.stdin.write("end\n")
+    program.stdin.flush()
+
+
+def _told(program: subprocess.Popen[str]) -> dict[str, int]:
+    """What a program that ends has counted."""
+    said = json.loads(program.communicate()[0])
+    assert isinstance(said, dict)
+    return said
+
+
 def reconnects(seconds: int) -> None:
     made = compile_text(SERVER_PROGRAM)
     assert made.image is not None, [message.render() for message in made.diagnostics]
@@ -168,24 +187,19 @@ def reconnects(seconds: int) -> None:
     plc.attach(Etn21(0, SERVER_DOOR.host), network)
     port, first, total, lost = network.host_endpoint(SERVER_DOOR).port, None, Counter[str](), 0
     run(plc, for_ns=SECOND_NS)
+    bare = _started("bare_loop.py", str(CYCLE_NS / 1e6))
     began_s = time.time()
     try:
         for part in range(RECONNECT_PARTS):
-            clients = subprocess.Popen(
-                [sys.executable, str(HOUSE / "tests" / "bench" / "reconnecting_clients.py"), str(port), str(part)],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)  # fmt: skip
+            clients = _started("reconnecting_clients.py", str(port), str(part))
             for _ in range(seconds // RECONNECT_PARTS):
                 network.faults[:] = switched(dice, part % 2 == 1)
                 run(plc, for_ns=SWITCH_NS)
             network.faults.clear()
-            assert clients.stdin and clients.stdout
-            clients.stdin.write("end\n")
-            clients.stdin.flush()
+            _end(clients)
             while clients.poll() is None:
                 run(plc, for_ns=SWITCH_NS // 4)
-            counts = Counter(json.loads(clients.stdout.read()))
-            clients.stdin.close()
-            clients.stdout.close()
+            counts = Counter(_told(clients))
             lost += 8 - counts.pop("served at once", 0)
             assert part % 2 == 1 or not counts["wrong"], "a reply is wrong although no fault changes what is said"
             total += counts
@@ -199,7 +213,10 @@ def reconnects(seconds: int) -> None:
             assert network.relays.carried == {}, "a connection is still led through wires"
     finally:
         network.close()
-    print(f"{dict(total)}\n{lost} slots lost; {plc.lateness}; {plc.lateness.missed} periods missed of {plc.scans:,}")
+        _end(bare)
+        host = _told(bare)
+    print(f"{dict(total)}\n{lost} slots lost; {plc.lateness} of {plc.scans:,}; "
+          f"a loop that does nothing missed {host['missed']:,} of {host['periods'] + host['missed']:,} beside it")
     assert not lost, "not all of eight clients were served at once"
 
 

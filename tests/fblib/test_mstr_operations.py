@@ -78,6 +78,13 @@ def test_it_writes_before_it_reads() -> None:
 # --- lengths and registers at their limits ------------------------------------------------------------------------------
 
 
+def test_the_last_registers_are_read_while_others_are_written() -> None:
+    rig = Rig()
+    rig.server.holding_registers[65534], rig.server.holding_registers[65535] = 0x1111, 0x2222
+    assert rig.operate(READ_WRITE, 0, 1, 1, 0x0700, *SERVER_IP, 2, 65535) == "0000"
+    assert rig.databuf(2) == [0x1111, 0x2222]
+
+
 @each_of(("control", "length"), [
     ((WRITE, 0, 123, 65414, 0x07FE), 259),
     ((READ, 0, 125, 65412, 0x07FF), 12),

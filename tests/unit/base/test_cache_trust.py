@@ -147,3 +147,15 @@ def test_a_verb_says_it_once_and_compiles(tmp_path: Path, monkeypatch: pytest.Mo
     result = CliRunner().invoke(main, run, catch_exceptions=False)
     assert (result.exit_code, result.stdout) == (0, "Main.a = 1\n")
     assert result.stderr == f"{tmp_path / 'caches'} in the cache is not used: it {WRITABLE}\n"
+
+
+def test_the_state_of_a_folder_is_that_of_all_files_below(tmp_path: Path) -> None:
+    (tmp_path / "inner" / "deep").mkdir(parents=True)
+    (tmp_path / "inner" / "deep" / "TON.st").write_text("old")
+    (tmp_path / "__pycache__").mkdir()
+    before = list(cache._state(str(tmp_path)))
+    (tmp_path / "__pycache__" / "made.py").write_text("not looked at")
+    (tmp_path / "notes.md").write_text("nothing that is compiled")
+    assert list(cache._state(str(tmp_path))) == before != []
+    (tmp_path / "inner" / "deep" / "TON.st").write_text("newer")
+    assert list(cache._state(str(tmp_path))) != before

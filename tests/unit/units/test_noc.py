@@ -152,6 +152,11 @@ def test_the_head_of_each_slot(rack_slot: int, place: int) -> None:
     assert rig.noc.name == f"NOC {rack_slot}"
 
 
+@each_of("module_type", [*range(6), 7, 8, 10, 11, 12, 14, *range(17, 22)])
+def test_the_board_status_shows_each_type_of_module(module_type: int) -> None:
+    assert Rig(Noc(module_type=module_type)).table()[3] >> 4 & 0xFF == module_type
+
+
 @each_of("wrong", [
     {"rack_slot": -1}, {"rack_slot": 17}, {"rack_slot": 255}, {"module_type": 6}, {"module_type": 22}, {"mac": "00:11"},
     {"mac": "00:00:54:00:12:3g"},
