@@ -41,17 +41,17 @@ _LIBRARIES = (
     (r"MC_\w+|AXIS_REF\w*|_MC_\w+", "PLCopen's motion control (Tc2_MC2, SM3_Basic and their like)"),
     (r"ADS(?:READ|WRITE|RDWRT|RDSTATE|WRTCTL|LOG)\w*|FB_(?:File|EOF|SimpleAdsLogEvent)\w*|T_AmsNetId\w*|T_AmsPort|"
      r"T_IPv4Addr|TwinCAT_SystemInfoVarList|_AppInfo|_TaskInfo|PlcTaskSystemInfo|PlcAppSystemInfo|GETCURTASKINDEX\w*|"
-     r"F_GetSystemTime|MEMCPY|MEMSET|MEMCMP|MEMMOVE", "TwinCAT's Tc2_System"),
-    (r"T_MaxString|FB_(?:FormatString|LocalSystemTime|GetTimeZone\w*|TzSpecific\w*|HashTable\w*|CTRL_\w+)|NT_\w+|T_Arg|F_"
+     r"F_GetSystemTime", "TwinCAT's Tc2_System"),
+    (r"FB_(?:FormatString|LocalSystemTime|GetTimeZone\w*|TzSpecific\w*|HashTable\w*|CTRL_\w+)|NT_\w+|T_Arg|F_"
      r"(?:SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|BYTE|WORD|DWORD|LWORD|BOOL|REAL|LREAL|STRING)|SYSTEMTIME_TO_\w+|"
-     r"(?:BYTE|WORD|DWORD|LWORD)_TO_(?:HEX|BIN|OCT|DEC)STR|TIMESTRUCT", "TwinCAT's Tc2_Utilities"),
+     r"(?:BYTE|WORD|DWORD|LWORD)_TO_(?:BIN|OCT|DEC)STR|TIMESTRUCT", "TwinCAT's Tc2_Utilities"),
     (r"FB_(?:EcSoE|EcCoE|EcGet|EcSet|EcMaster)\w*|ST_Ec\w+|Tc2_EtherCAT", "TwinCAT's Tc2_EtherCAT"),
     (r"FB_Json\w+|SJsonValue|SJsonAIterator", "TwinCAT's Tc3_JsonXml"),
     (r"FB_TcMessage|FB_TcAlarm|FB_TcEvent|TcEventSeverity|TcEventEntry|I_TcMessage|I_TcSourceInfo", "TwinCAT's Tc3_EventLogger"),
     (r"TcUnit|FB_TestSuite|TEST|TEST_FINISHED|AssertEquals\w*|AssertTrue|AssertFalse", "TcUnit"),
     (r"Sys(?:Time|File|Mem|Sock|Com|Task|Target|Process|Cpu|Dir|Event|Lib)\w+|RTS_IEC_\w+|CmpErrors2?|TimerSwitch",
      "CODESYS's system libraries"),
-    (r"(?:BLINK|GEN|HYSTERESIS|LIMITALARM|RAMP_INT|RAMP_REAL|VARIANCE|STATISTICS_\w+|CHARCURVE|LIN_TRAFO)", "CODESYS's Util"),
+    (r"(?:GEN|GEN_MODE|PD|PID|PID_FIXCYCLE|DERIVATIVE|BASE64|\w+_TO_GRAY|GRAY_TO_\w+|\w+HEXinASCII\w*|WORD_AS_STRING)", "CODESYS's Util"),
 )
 """Patterns of names, and the library that they come from."""
 

@@ -1,0 +1,189 @@
+"""Blocks and functions of CODESYS's Util and Standard64 and of TwinCAT's Tc2_Utilities, call by call.
+
+Expected values follow the vendors' pages that each source names; a test's name says what these leave open (`assumed`).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import pytest
+from rows import each_of
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
+
+MS = 1_000_000
+
+
+@cache
+def image_of(text: str) -> Image:
+    made = compile_text(f"PROGRAM Main\n{text}\nEND_PROGRAM")
+    assert made.image is not None, [message.render() for message in made.diagnostics]
+    return made.image
+
+
+def value_of(expression: str, type: str) -> Any:
+    """What an expression is in a scan."""
+    plc = Plc(image_of(f"VAR v : {type}; END_VAR\nv := {expression};"))
+    assert plc.scan() is None
+    return plc.read("Main.v")
+
+
+def outputs(block: str, pins: str, *calls: tuple[Any, ...]) -> list[Any]:
+    """Calls a block once for each row: the time in ms, then the inputs; the row of its outputs `pins` after each call."""
+    given, _, wanted = pins.partition(" -> ")
+    plc = Plc(image_of(f"VAR b : {block}; END_VAR\nb();"))
+    found = []
+    for at_ms, *inputs in calls:
+        for name, value in zip(given.split(), inputs, strict=True):
+            plc.write(f"Main.b.{name}", value)
+        assert plc.scan(at_ms * MS) is None
+        row = [plc.read(f"Main.b.{name}") for name in wanted.split()]
+        found.append(row[0] if len(row) == 1 else tuple(row))
+    return found
+
+
+# --- Util: limits, bits -------------------------------------------------------------------------------------------------
+
+
+def test_hysteresis_switches_beyond_its_limits() -> None:
+    calls = [(0, level, 20, 10) for level in (15, 10, 9, 15, 20, 21, 15)]
+    assert outputs("HYSTERESIS", "IN HIGH LOW -> OUT", *calls) == [False, False, True, True, True, False, False]
+
+
+def test_limitalarm_says_where_the_value_is() -> None:
+    calls = [(0, level, 20, 10) for level in (9, 10, 20, 21)]
+    assert outputs("LIMITALARM", "IN HIGH LOW -> O U IL", *calls) == [
+        (False, True, False), (False, False, True), (False, False, True), (True, False, False)]  # fmt: skip
+
+
+@each_of(("expression", "type", "value"), [
+    ("EXTRACT(16#80000001, 31)", "BOOL", True), ("EXTRACT(16#80000001, 1)", "BOOL", False),
+    ("EXTRACT(16#FFFFFFFF, 32)", "BOOL", False), ("EXTRACT(16#FFFFFFFF, 255)", "BOOL", False),
+    ("PUTBIT(16#F0, 0, TRUE)", "DWORD", 0xF1), ("PUTBIT(16#F0, 7, FALSE)", "DWORD", 0x70), ("PUTBIT(16#F0, 32, TRUE)", "DWORD", 0xF0),
+    ("SETBIT(0, 31)", "DWORD", 1 << 31), ("SWITCHBIT(3, 1)", "DWORD", 1), ("SWITCHBIT(1, 1)", "DWORD", 3),
+    ("PACK(TRUE, FALSE, TRUE, FALSE, FALSE, FALSE, FALSE, TRUE)", "BYTE", 0x85),
+    ("Util.SETBIT(X := 0, N := 2)", "DWORD", 4),
+])  # fmt: skip
+def test_functions_of_bits(expression: str, type: str, value: object) -> None:
+    assert value_of(expression, type) == value
+
+
+@each_of(("block", "whole", "bits"), [
+    ("UNPACK", "B", [f"B{n}" for n in range(8)]), ("BYTE_AS_BIT", "B", [f"B{n}" for n in range(8)]),
+    ("WORD_AS_BIT", "W", [f"B{n:02}" for n in range(16)]), ("DWORD_AS_BIT", "X", [f"B{n:02}" for n in range(32)]),
+])  # fmt: skip
+def test_blocks_from_and_to_bits(block: str, whole: str, bits: list[str]) -> None:
+    number = 0x9ABCDEF1 & (1 << len(bits)) - 1
+    [found] = outputs(block, f"{whole} -> {' '.join(bits)}", (0, number))
+    assert sum(bit << place for place, bit in enumerate(found)) == number
+    back = f"BIT_AS_{block.partition('_')[0]}" if block != "UNPACK" else "BIT_AS_BYTE"
+    assert outputs(back, f"{' '.join(bits)} -> {whole}", (0, *found)) == [number]
+
+
+# --- Util: curves, values -----------------------------------------------------------------------------------------------
+
+CURVE = """VAR c : CHARCURVE; N : BYTE := 4; level : INT;
+    p : ARRAY[0..10] OF POINT := [(X := 0, Y := 0), (X := 250, Y := 50), (X := 500, Y := -150), (X := 750, Y := 400)]; END_VAR
+c(IN := level, N := N, P := p);"""
+
+
+@each_of(("level", "out", "err"), [(0, 0, 0), (125, 25, 0), (250, 50, 0), (375, -50, 0), (750, 400, 0), (751, 400, 2), (-1, 0, 2)])
+def test_charcurve_is_straight_between_its_points(level: int, out: int, err: int) -> None:
+    plc = Plc(image_of(CURVE))
+    plc.write("Main.level", level)
+    plc.scan()
+    assert (plc.read("Main.c.OUT"), plc.read("Main.c.ERR")) == (out, err)
+
+
+@each_of(("name", "value", "err"), [("N", 1, 4), ("N", 12, 4), ("N", 0, 4), ("N", 5, 1), ("p[1].X", 500, 1), ("p[2].X", 100, 1)])
+def test_charcurve_refuses_what_is_no_curve(name: str, value: int, err: int) -> None:
+    plc = Plc(image_of(CURVE))
+    plc.write("Main.level", 125)
+    plc.scan()
+    plc.write(f"Main.{name}", value)
+    plc.write("Main.level", 250)
+    plc.scan()
+    assert (plc.read("Main.c.OUT"), plc.read("Main.c.ERR")) == (25, err)
+
+
+@pytest.mark.parametrize("block", ["RAMP_INT", "RAMP_REAL"])
+def test_a_ramp_rises_and_falls_with_time(block: str) -> None:
+    pins = "IN ASCEND DESCEND TIMEBASE RESET -> OUT"
+    second = 1000 * MS
+    calls = [(0, 100, 50, 20, second, False), (1000, 100, 50, 20, second, False), (1500, 100, 50, 20, second, False),
+             (3000, 100, 50, 20, second, False), (4000, 0, 50, 20, second, False), (5000, 0, 50, 20, second, True),
+             (6000, 0, 50, 20, second, False)]  # fmt: skip
+    assert outputs(block, pins, *calls) == [0, 50, 75, 100, 80, 80, 60]
+
+
+def test_a_ramp_without_time_counts_calls() -> None:
+    calls = [(at, 10, 4, 3, 0, False) for at in (0, 1, 1, 9)] + [(10, -10, 4, 3, 0, False)]
+    assert outputs("RAMP_INT", "IN ASCEND DESCEND TIMEBASE RESET -> OUT", *calls) == [0, 4, 8, 10, 7]
+
+
+def test_a_ramp_keeps_parts_of_a_whole_number_assumed() -> None:
+    calls = [(at, 100, 1, 1, 1000 * MS, False) for at in range(0, 5000, 100)]
+    assert outputs("RAMP_INT", "IN ASCEND DESCEND TIMEBASE RESET -> OUT", *calls)[-1] == 5
+
+
+def test_lin_trafo_carries_a_value_over() -> None:
+    pins = "IN IN_MIN IN_MAX OUT_MIN OUT_MAX -> OUT ERROR"
+    calls = [(0, 5.0, 0.0, 10.0, 100.0, 300.0), (0, 10.5, 0.0, 10.0, 100.0, 300.0), (0, 2.5, 10.0, 0.0, 0.0, 8.0),
+             (0, 1.0, 1.0, 1.0, 0.0, 8.0)]  # fmt: skip
+    assert outputs("LIN_TRAFO", pins, *calls) == [(200.0, False), (200.0, True), (6.0, False), (6.0, True)]
+
+
+def test_statistics_and_variance_of_what_came() -> None:
+    calls = [(0, 3, False), (0, -1, False), (0, 10, False)]
+    assert outputs("STATISTICS_INT", "IN RESET -> MN MX AVG", *calls, (0, 5, True), (0, 5, False)) == [
+        (3, 3, 3), (-1, 3, 1), (-1, 10, 4), (32767, -32768, 0), (5, 5, 5)]  # fmt: skip
+    real = [(0, 1.0, False), (0, 2.0, False), (0, 3.0, False), (0, 9.0, True), (0, 9.0, False)]
+    assert outputs("STATISTICS_REAL", "IN RESET -> AVG", *real) == [1.0, 1.5, 2.0, 0.0, 9.0]
+    assert outputs("VARIANCE", "IN RESET -> OUT", *real) == [0.0, 0.25, pytest.approx(2 / 3), 0.0, 0.0]
+
+
+def test_the_integral_sums_value_times_milliseconds_until_it_is_beyond_real() -> None:
+    calls = [(0, 2.0, 10, False), (0, -1.0, 5, False), (0, 3e38, 2, False), (0, 1.0, 1, False), (0, 1.0, 1, True), (0, 1.0, 1, False)]
+    assert outputs("INTEGRAL", "IN TM RESET -> OUT OVERFLOW", *calls) == [
+        (20.0, False), (15.0, False), (15.0, True), (15.0, True), (0.0, False), (1.0, False)]  # fmt: skip
+
+
+# --- Util: signals ------------------------------------------------------------------------------------------------------
+
+
+def test_blink_begins_high_and_stays_when_it_is_disabled() -> None:
+    low, high = 20 * MS, 30 * MS
+    calls = [(at, at < 90 or at >= 110, low, high) for at in range(0, 150, 10)]
+    assert "".join(" #"[level] for level in outputs("BLINK", "ENABLE TIMELOW TIMEHIGH -> OUT", *calls)) == "###  ###   ### "
+
+
+def test_freq_measure_is_the_mean_of_periods() -> None:
+    calls = [(at, at % 100 < 50 and at < 500, 2, False) for at in range(0, 800, 50)]
+    found = outputs("FREQ_MEASURE", "IN PERIODS RESET -> OUT VALID", *calls)
+    assert found[3] == (0.0, False)
+    assert found[4] == (10.0, True)
+    assert found[12] == (10.0, True)
+    assert found[13] == (0.0, False)
+
+
+# --- texts --------------------------------------------------------------------------------------------------------------
+
+
+@each_of(("expression", "type", "value"), [
+    ('WLEN("ab\u20ac")', "INT", 3), ('WLEFT("abcd", 2)', "WSTRING", "ab"), ('WRIGHT("abcd", 1)', "WSTRING", "d"),
+    ('WMID("abcd", 2, 2)', "WSTRING", "bc"), ('WCONCAT("ab", "cd")', "WSTRING", "abcd"), ('WINSERT("ad", "bc", 1)', "WSTRING", "abcd"),
+    ('WDELETE("abcd", 2, 2)', "WSTRING", "ad"), ('WREPLACE("abcd", "x", 2, 2)', "WSTRING", "axd"), ('WFIND("abcd", "cd")', "INT", 3),
+    ('Standard64.WFIND("abcd", "x")', "INT", 0),
+    ("F_LTrim('  a b ')", "STRING", "a b "), ("F_RTrim(' a b  ')", "STRING", " a b"), ("F_RTrim('   ')", "STRING", ""),
+    ("F_ToLCase('AZaz[09')", "STRING", "azaz[09"), ("F_ToUCase('AZaz{09')", "STRING", "AZAZ{09"),
+    ("BYTE_TO_HEXSTR(16#AF, 4, TRUE)", "STRING", "00af"), ("BYTE_TO_HEXSTR(0, 0, FALSE)", "STRING", ""),
+    ("WORD_TO_HEXSTR(16#AF, 1, FALSE)", "STRING", "AF"), ("DWORD_TO_HEXSTR(16#80000000, 8, FALSE)", "STRING", "80000000"),
+    ("LWORD_TO_HEXSTR(16#FEDCBA9876543210, 8, FALSE)", "STRING", "FEDCBA9876543210"),
+    ("Tc2_Utilities.BYTE_TO_HEXSTR(in := 7, iPrecision := 2, bLoCase := FALSE)", "T_MaxString", "07"),
+])  # fmt: skip
+def test_functions_of_texts(expression: str, type: str, value: object) -> None:
+    assert value_of(expression, type) == value
