@@ -46,7 +46,7 @@ TESTS = {
     "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/plcopen", "tests/cx"),
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
-    "processor": ("tests/unit/machine", "tests/unit/units"),
+    "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
     "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run"),
     "record": ("tests/unit/record", "tests/unit/cli"), "run": ("tests/unit/run", "tests/unit/net"),
     "testing": ("tests/unit/testing",), "cli": ("tests/unit/cli",), "analysis": ("tests/unit/analysis", "tests/unit/lsp"),

@@ -22,6 +22,7 @@ FOLDER = data_folder("fblib") / "iec"
 TIMERS = ["{}", "{}_TIME", "{}_LTIME", "L{}"]
 COUNTERS = {
     "": ("INT", -32768, 32767),
+    "_INT": ("INT", -32768, 32767),
     "_DINT": ("DINT", -(2**31), 2**31 - 1),
     "_LINT": ("LINT", -(2**63), 2**63 - 1),
     "_UDINT": ("UDINT", 0, 2**32 - 1),

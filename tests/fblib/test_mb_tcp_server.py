@@ -274,6 +274,9 @@ def test_a_connection_that_breaks() -> None:
     client = rig.client().connect()
     client.submit(Close(1, reset=True))
     assert rig.statuses(client, 4) == ["7006", "7007", "7002", "7002"]
+    again = rig.client(51)
+    again.submit(Connect(1, again.server))
+    assert "7006" in rig.statuses(again, 4)
 
 
 # --- data areas ---------------------------------------------------------------------------------------------------------

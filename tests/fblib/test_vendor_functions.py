@@ -63,7 +63,8 @@ def test_limitalarm_says_where_the_value_is() -> None:
 @each_of(("expression", "type", "value"), [
     ("EXTRACT(16#80000001, 31)", "BOOL", True), ("EXTRACT(16#80000001, 1)", "BOOL", False),
     ("EXTRACT(16#FFFFFFFF, 32)", "BOOL", False), ("EXTRACT(16#FFFFFFFF, 255)", "BOOL", False),
-    ("PUTBIT(16#F0, 0, TRUE)", "DWORD", 0xF1), ("PUTBIT(16#F0, 7, FALSE)", "DWORD", 0x70), ("PUTBIT(16#F0, 32, TRUE)", "DWORD", 0xF0),
+    ("PUTBIT(16#F0, 0, TRUE)", "DWORD", 0xF1), ("PUTBIT(16#F0, 7, FALSE)", "DWORD", 0x70),
+    ("PUTBIT(16#F0, 32, TRUE)", "DWORD", 0xF0),
     ("SETBIT(0, 31)", "DWORD", 1 << 31), ("SWITCHBIT(3, 1)", "DWORD", 1), ("SWITCHBIT(1, 1)", "DWORD", 3),
     ("PACK(TRUE, FALSE, TRUE, FALSE, FALSE, FALSE, FALSE, TRUE)", "BYTE", 0x85),
     ("Util.SETBIT(X := 0, N := 2)", "DWORD", 4),
@@ -91,7 +92,8 @@ CURVE = """VAR c : CHARCURVE; N : BYTE := 4; level : INT;
 c(IN := level, N := N, P := p);"""
 
 
-@each_of(("level", "out", "err"), [(0, 0, 0), (125, 25, 0), (250, 50, 0), (375, -50, 0), (750, 400, 0), (751, 400, 2), (-1, 0, 2)])
+@each_of(("level", "out", "err"), [
+    (0, 0, 0), (125, 25, 0), (250, 50, 0), (375, -50, 0), (750, 400, 0), (751, 400, 2), (-1, 0, 2)])  # fmt: skip
 def test_charcurve_is_straight_between_its_points(level: int, out: int, err: int) -> None:
     plc = Plc(image_of(CURVE))
     plc.write("Main.level", level)
@@ -147,7 +149,8 @@ def test_statistics_and_variance_of_what_came() -> None:
 
 
 def test_the_integral_sums_value_times_milliseconds_until_it_is_beyond_real() -> None:
-    calls = [(0, 2.0, 10, False), (0, -1.0, 5, False), (0, 3e38, 2, False), (0, 1.0, 1, False), (0, 1.0, 1, True), (0, 1.0, 1, False)]
+    calls = [(0, 2.0, 10, False), (0, -1.0, 5, False), (0, 3e38, 2, False), (0, 1.0, 1, False), (0, 1.0, 1, True),
+             (0, 1.0, 1, False)]  # fmt: skip
     assert outputs("INTEGRAL", "IN TM RESET -> OUT OVERFLOW", *calls) == [
         (20.0, False), (15.0, False), (15.0, True), (15.0, True), (0.0, False), (1.0, False)]  # fmt: skip
 
@@ -175,8 +178,10 @@ def test_freq_measure_is_the_mean_of_periods() -> None:
 
 @each_of(("expression", "type", "value"), [
     ('WLEN("ab\u20ac")', "INT", 3), ('WLEFT("abcd", 2)', "WSTRING", "ab"), ('WRIGHT("abcd", 1)', "WSTRING", "d"),
-    ('WMID("abcd", 2, 2)', "WSTRING", "bc"), ('WCONCAT("ab", "cd")', "WSTRING", "abcd"), ('WINSERT("ad", "bc", 1)', "WSTRING", "abcd"),
-    ('WDELETE("abcd", 2, 2)', "WSTRING", "ad"), ('WREPLACE("abcd", "x", 2, 2)', "WSTRING", "axd"), ('WFIND("abcd", "cd")', "INT", 3),
+    ('WMID("abcd", 2, 2)', "WSTRING", "bc"), ('WCONCAT("ab", "cd")', "WSTRING", "abcd"),
+    ('WINSERT("ad", "bc", 1)', "WSTRING", "abcd"),
+    ('WDELETE("abcd", 2, 2)', "WSTRING", "ad"), ('WREPLACE("abcd", "x", 2, 2)', "WSTRING", "axd"),
+    ('WFIND("abcd", "cd")', "INT", 3),
     ('Standard64.WFIND("abcd", "x")', "INT", 0),
     ("F_LTrim('  a b ')", "STRING", "a b "), ("F_RTrim(' a b  ')", "STRING", " a b"), ("F_RTrim('   ')", "STRING", ""),
     ("F_ToLCase('AZaz[09')", "STRING", "azaz[09"), ("F_ToUCase('AZaz{09')", "STRING", "AZAZ{09"),

@@ -26,6 +26,13 @@ def code_of(program: Image, observations: bool = False) -> str:
     return "\n".join(rest[:rest.index("")] if "" in rest else rest)
 
 
+def test_located_variables_stand_where_they_are() -> None:
+    made = compile_text("PROGRAM Main VAR n : INT; level AT %D7 : INT; lamp AT %Q3.5 : BOOL; END_VAR lamp := n > level; END_PROGRAM")
+    assert made.image is not None
+    shown = dict(line.split()[2:0:-1] for line in listing(made.image).splitlines() if line.startswith("symbol "))
+    assert (shown["Main.level"], shown["Main.lamp"]) == ("D7", "%QX3.5")
+
+
 def test_all_around_the_code() -> None:
     program = counter_image(task("Fast", 1, 10_000_000), task("Edge", 2, 0, "Go"), task("Main"))
     shown = listing(program)
