@@ -27,7 +27,7 @@ def code_of(program: Image, observations: bool = False) -> str:
 
 
 def test_located_variables_stand_where_they_are() -> None:
-    made = compile_text("PROGRAM Main VAR n : INT; level AT %D7 : INT; lamp AT %Q3.5 : BOOL; END_VAR lamp := n > level; END_PROGRAM")
+    made = compile_text("PROGRAM Main VAR level AT %D7 : INT; lamp AT %Q3.5 : BOOL; END_VAR lamp := level > 0; END_PROGRAM")
     assert made.image is not None
     shown = dict(line.split()[2:0:-1] for line in listing(made.image).splitlines() if line.startswith("symbol "))
     assert (shown["Main.level"], shown["Main.lamp"]) == ("D7", "%QX3.5")
