@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fbvm.prove.cells import Cell
-from fbvm.prove.scan import FixedCycle
+from fbvm.prove.encoding.cells import Cell
+from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.summary import Summary
+from fbvm.prove.encoding.terms import Term
 from fbvm.prove.solver import SAT, UNKNOWN, UNSAT, Solver
-from fbvm.prove.summary import Summary
-from fbvm.prove.terms import Term
 from fbvm.prove.unrolling import Unrolling, from_power_on
 
 FIRST_BLOCK = 16

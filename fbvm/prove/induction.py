@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from fbvm.prove.bounded import Goal
+from fbvm.prove.encoding.summary import Summary
+from fbvm.prove.encoding.terms import Term
 from fbvm.prove.solver import UNKNOWN, UNSAT, Solver
-from fbvm.prove.summary import Summary
-from fbvm.prove.terms import Term
 from fbvm.prove.unrolling import from_anywhere
 
 

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from fbvm.prove.scan import FixedCycle
+from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.summary import Summary
+from fbvm.prove.encoding.terms import Term, Terms, signed
 from fbvm.prove.solver import SAT, UNSAT, Solver
-from fbvm.prove.summary import Summary
-from fbvm.prove.terms import Term, Terms, signed
 from fbvm.prove.unrolling import from_anywhere, from_power_on
 
 MOST_LITERALS = 80
@@ -107,20 +107,21 @@ def guesses(variables: Sequence[Term], samples: Sequence[Sample]) -> list[Guess]
         if variable.width == 0 or len(seen) <= FEW_VALUES:
             literals += [Literal(variable, value) for value in (sorted(seen) if variable.width else [1])]
         if variable.width:
-            numbers = [signed(value, variable.width) for value in seen]
-            found.append(Bounds(variable, min(numbers), max(numbers)))
-            if min(numbers) >= 0:
-                found.append(Bounds(variable, 0, (1 << variable.width - 1) - 1))
-            if max(numbers) <= 1 << 48:
-                found.append(Bounds(variable, -(1 << variable.width - 1), max(numbers)))
-        if variable.width == 64:
-            found.append(Ordered(variable, None))
+            found += _about_number(variable, seen)
     wide = [variable for variable in variables if variable.width >= 16]
     found += [Ordered(a, b) for a in wide for b in wide if a is not b and a.width == b.width]
     both = [each for literal in literals[:MOST_LITERALS] for each in (literal, Literal(literal.variable, literal.value, False))]
     found += both
     found += [Clause(a, b) for a, b in combinations(both, 2) if a.variable is not b.variable]
     return _holding(found, samples)
+
+
+def _about_number(variable: Term, seen: set[int]) -> list[Guess]:
+    """Bounds of a number: those that were seen, and each of them alone; for one of 64 bits also the time of the scan."""
+    numbers, top = [signed(value, variable.width) for value in seen], 1 << (variable.width - 1)
+    low, high = min(numbers), max(numbers)
+    found: list[Guess] = [Bounds(variable, low, high), Bounds(variable, min(low, 0), top - 1), Bounds(variable, -top, high)]
+    return [*found, Ordered(variable, None)] if variable.width == 64 else found
 
 
 def _holding(found: list[Guess], samples: Sequence[Sample]) -> list[Guess]:
@@ -174,7 +175,7 @@ class Invariants:
         broken = {guess: terms.not_(guess.term(terms, state, now)) for guess in found}
         while True:
             open_ones = [broken[guess] for guess in found if broken[guess] is not terms.false]
-            answer = solver.ask(*(assumed[guess] for guess in found if before), _balanced(terms, open_ones))
+            answer = solver.ask(*(assumed[guess] for guess in found if before), balanced(terms, open_ones))
             if answer != SAT:
                 return found if answer == UNSAT else None
             values = solver.values({*behind, now})
@@ -182,7 +183,7 @@ class Invariants:
             found = [guess for guess in found if guess.holds(sample)]
 
 
-def _balanced(terms: Terms, some: list[Term]) -> Term:
+def balanced(terms: Terms, some: list[Term]) -> Term:
     """One of many, as a tree that is not deep."""
     while len(some) > 1:
         some = [terms.or_(*some[at:at + 2]) if at + 1 < len(some) else some[at] for at in range(0, len(some), 2)]

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fbvm.base.types import EnumType, SubrangeType, base
 from fbvm.code.image import Image
 from fbvm.machine.plc import STEP_BUDGET
 from fbvm.prove.bounded import BoundedSearch, Goal, Inputs
-from fbvm.prove.execution import UNWOUND, Refused
+from fbvm.prove.encoding.execution import UNWOUND, Refused
+from fbvm.prove.encoding.properties import condition_term, place_term
+from fbvm.prove.encoding.rewriting import cone, leaves
+from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.summary import Summary, summarize
+from fbvm.prove.encoding.terms import Term
 from fbvm.prove.induction import Induction
 from fbvm.prove.invariants import Guess, Invariants, facts_of, guesses
-from fbvm.prove.properties import condition_term
 from fbvm.prove.question import (
     ALWAYS,
     BROKEN,
@@ -26,13 +30,11 @@ from fbvm.prove.question import (
     Run,
     Verdict,
 )
-from fbvm.prove.rewriting import cone, leaves
 from fbvm.prove.runs import Judge, replayed, sampled, simulated
-from fbvm.prove.scan import FixedCycle
 from fbvm.prove.solver import UNSAT
-from fbvm.prove.summary import Summary, summarize
-from fbvm.prove.terms import Term
+from fbvm.prove.unreached import unreached
 from fbvm.watch.names import Names as PlaceNames
+from fbvm.watch.paths import Place
 
 SIMULATED_SCANS = 4_000
 """Scans of each random run before the solver is asked."""
@@ -40,13 +42,15 @@ SAMPLED_SCANS = 200
 DEPTHS = (16, 64)
 """Scans that are searched before induction, and before deeper induction."""
 MOST_INDUCTION = 5
+MOST_LINES = 12
+"""Lines that a note lists."""
 MOST_STATE = 200
 """Variables of the state up to which invariants are guessed."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How far to go: `scans` from power-on on, until `expired` answers True; `seed` is that of random runs; `cycle_ns` the cycle."""
+    """How far to go: `scans` from power-on on, until `expired` answers True.  `seed` is that of random runs."""
 
     cycle_ns: int = 10_000_000
     scans: int = 1000
@@ -61,8 +65,8 @@ Tell = Callable[[str], None]
 def prove(image: Image, question: Question, limits: Limits | None = None, tell: Tell = lambda said: None) -> Verdict:
     """The answer to a question about the runs of a program from power-on, with any inputs, in a fixed cycle.
 
-    `tell` is told what is done.  Raises Refused for a program or property that cannot be followed, ConditionError and UnknownPlace
-    for names that it does not have, SolverMissing."""
+    `tell` is told what is done.  Raises Refused for a program or property that cannot be followed, ConditionError and
+    UnknownPlace for names that it does not have, SolverMissing."""
     return Prover(image, question, limits or Limits(), tell).answer()
 
 
@@ -72,7 +76,7 @@ class Prover:
     def __init__(self, image: Image, question: Question, limits: Limits, tell: Tell) -> None:
         self.image, self.question, self.limits, self.tell = image, question, limits, tell
         self.judge = Judge.of(image, question)
-        names = Names(image)
+        names = Names(image, question.prefix)
         free = [extent for name in question.free for extent in names.extents(name)]
         self.summary: Summary = summarize(image, STEP_BUDGET, free)
         self.clock = FixedCycle(self.summary.terms, image.tasks, limits.cycle_ns)
@@ -86,11 +90,11 @@ class Prover:
         terms, summary = self.summary.terms, self.summary
         stop = terms.any_of(*(trap.condition for trap in summary.traps if trap.code != UNWOUND))
         self.unwound = [trap for trap in summary.traps if trap.code == UNWOUND]
-        given = terms.all_of(*(condition_term(summary.contents, names.condition(text)) for text in self.question.assumptions),
-                             *self._types())  # fmt: skip
+        assumed = (condition_term(summary.contents, names.condition(text).term) for text in self.question.assumptions)
+        given = terms.all_of(*assumed, *self._types())
         if self.question.kind == NO_TRAP:
             return Goal(stop, stop, given)
-        condition = condition_term(summary.contents, names.condition(self.question.text))
+        condition = condition_term(summary.contents, names.condition(self.question.text).term)
         hit = terms.not_(condition) if self.question.kind == ALWAYS else condition
         return Goal(terms.and_(hit, terms.not_(stop)), stop, given)
 
@@ -113,19 +117,31 @@ class Prover:
 
     def answer(self) -> Verdict:
         """Tries one method after the other, the cheap ones first."""
-        self._look_at_what_is_constant()
-        if (found := self._simulated()) is not None:
-            return found
-        for depth in DEPTHS:
-            self.tell(f"searching {depth} scans")
-            if (found := self._searched(depth)) is not None:
-                return found
-            if (found := self._induced([], MOST_INDUCTION if depth == DEPTHS[-1] else 1)) is not None:
-                return found
-        if (found := self._with_invariants()) is not None:
-            return found
-        self.tell(f"searching {self.limits.scans} scans")
-        return self._searched(self.limits.scans) or self._undecided()
+        self._note_limits()
+        shallow, deeper = (min(depth, self.limits.scans) for depth in DEPTHS)
+        methods: tuple[Callable[[], Verdict | None], ...] = (
+            lambda: self._searched(shallow),
+            lambda: self._induced([], 1),
+            self._simulated,
+            lambda: self._searched(deeper),
+            lambda: self._induced([], MOST_INDUCTION),
+            self._with_invariants,
+            lambda: self._searched(self.limits.scans),
+        )
+        for method in methods:
+            if (found := method()) is not None:
+                return self._with_unreached(found) if found.word in (PROVED, UNREACHABLE) else found
+        return self._undecided()
+
+    def _with_unreached(self, verdict: Verdict) -> Verdict:
+        """A proof with the statements of which it says nothing."""
+        self.tell("looking for statements that no run reaches")
+        sites = unreached(self.summary, self.goal, self.clock, DEPTHS[-1], self.limits.expired)
+        if not sites:
+            return verdict
+        lines = dict.fromkeys(f"{self.image.sites[site].file}:{self.image.sites[site].line}" for site in sites)
+        some = ", ".join([*lines][:MOST_LINES]) + (f" and {len(lines) - MOST_LINES} more" if len(lines) > MOST_LINES else "")
+        return replace(verdict, notes=(*verdict.notes, f"no run of {DEPTHS[-1]} scans executes {some}"))
 
     def _undecided(self) -> Verdict:
         cleared = self.search.cleared
@@ -136,18 +152,24 @@ class Prover:
         return self._verdict(UNDECIDED, how)
 
     def _verdict(self, word: str, how: str, run: Run | None = None) -> Verdict:
-        return Verdict(self.question, word, how, self.search.cleared, run, tuple(self.notes))
+        condition = self.judge.condition
+        named = tuple(dict.fromkeys(condition.places)) if condition else ()
+        return Verdict(self.question, word, how, self.search.cleared, run, named, tuple(self.notes))
 
-    def _look_at_what_is_constant(self) -> None:
-        """Notes what makes an answer worth less: constants that nobody writes, operations of which nothing is known."""
-        if self.goal.hit.is_constant and self.question.kind != NO_TRAP:
-            value = bool(self.goal.hit.value) != (self.question.kind == ALWAYS)
-            self.notes.append(f"{self.question.text} is {'TRUE' if value else 'FALSE'} in every scan, whatever happens: "
-                              "nothing that it depends on is an input or ever changes")  # fmt: skip
+    def _note_limits(self) -> None:
+        """Notes what makes an answer worth less: variables that never change, operations of which nothing is known."""
+        for place in self._constants():
+            self.notes.append(f"{place.name} has the same value in every scan: it is no input, and no code changes it")
         if found := self._unknowns():
             self.notes.append(f"taken for any value: {', '.join(found)}")
         if self.question.assumptions:
             self.notes.append(f"assumed: {'; '.join(self.question.assumptions)}")
+
+    def _constants(self) -> list[Place]:
+        """The variables in the property that nothing can change."""
+        condition = self.judge.condition
+        named = dict.fromkeys(condition.places) if condition else {}
+        return [place for place in named if place_term(self.summary.contents, place).is_constant]
 
     def _unknowns(self) -> list[str]:
         """Operations of which nothing is known and on which the answer depends, with their places."""
@@ -174,6 +196,7 @@ class Prover:
         return None
 
     def _searched(self, scans: int) -> Verdict | None:
+        self.tell(f"searching {scans} scans")
         inputs = self.search.until(scans)
         if inputs is not None:
             return self._met(inputs, True)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from fbvm.code.image import Image
 from fbvm.engine.trap import Trap
-from fbvm.watch.conditions import parse_condition
+from fbvm.watch.conditions import Condition, parse_condition
 from fbvm.watch.paths import Place, Span, UnknownPlace, find
-from fbvm.watch.terms import Term
+from fbvm.watch.scopes import Scope
 from fbvm.watch.values import Value
 
 NEVER, ALWAYS, REACH, NO_TRAP = "never", "always", "reach", "no trap"
@@ -27,6 +27,8 @@ class Question:
     text: str = ""
     assumptions: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
+    prefix: str = ""
+    """The path of an instance, with a dot, whose variables are named without it."""
 
     def __str__(self) -> str:
         return self.kind if self.kind == NO_TRAP else f"{self.kind} {self.text}"
@@ -38,27 +40,21 @@ class Question:
 
 @dataclass(frozen=True)
 class Names:
-    """Finds names in a program; inside the only one that runs they need no prefix."""
+    """Finds names in a program; what begins with a variable of `prefix`, a path with a dot behind it, needs no path."""
 
     image: Image
+    prefix: str = ""
 
     def find(self, text: str) -> Place | Span:
         """The place that `text` names.  Raises UnknownPlace."""
         symbols, areas = self.image.symbols, self.image.layout.areas
-        try:
-            return find(symbols, areas, text)
-        except UnknownPlace as error:
-            runs = [run for task in self.image.tasks for run in task.programs]
-            if len(runs) == 1:
-                try:
-                    return find(symbols, areas, f"{runs[0].name}.{text}")
-                except UnknownPlace:
-                    pass
-            raise error
+        whole = find(symbols, areas, self.prefix.rstrip(".")) if self.prefix else None
+        instance = whole if isinstance(whole, Place) else None
+        return Scope(lambda name: find(symbols, areas, name), instance).find(text)
 
-    def condition(self, text: str) -> Term:
+    def condition(self, text: str) -> Condition:
         """The condition that `text` writes.  Raises ConditionError."""
-        return parse_condition(text, self.find).term
+        return parse_condition(text, self.find)
 
     def extents(self, text: str) -> list[tuple[int, int, int | None]]:
         """Where the places lie that a name, address or range names: offset, bytes, bit.  Raises UnknownPlace."""
@@ -97,6 +93,8 @@ class Verdict:
     how: str
     scans: int = 0
     run: Run | None = None
+    places: tuple[Place, ...] = ()
+    """What the property names."""
     notes: tuple[str, ...] = field(default=())
     """What limits the answer: assumptions, values that are constants, statements that nothing reaches."""
 

@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 
-from fbvm.base.types import EnumType, SubrangeType, base
+from fbvm.base.types import BOOL, EnumType, SubrangeType, base
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.bounded import Inputs
-from fbvm.prove.cells import BIT, Cell
+from fbvm.prove.encoding.cells import BIT, Cell
+from fbvm.prove.encoding.terms import Term
 from fbvm.prove.invariants import Sample, Values
 from fbvm.prove.question import ALWAYS, NO_TRAP, Question, Run
 from fbvm.prove.question import Names as QuestionNames
-from fbvm.prove.terms import Term
-from fbvm.watch.conditions import Condition, parse_condition
+from fbvm.watch.conditions import Condition
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value
@@ -38,9 +38,9 @@ class Judge:
     @classmethod
     def of(cls, image: Image, question: Question) -> Judge:
         """Raises ConditionError for conditions that do not fit the program."""
-        find = QuestionNames(image).find
-        condition = None if question.kind == NO_TRAP else parse_condition(question.text, find)
-        return cls(question, condition, tuple(parse_condition(text, find) for text in question.assumptions))
+        names = QuestionNames(image, question.prefix)
+        condition = None if question.kind == NO_TRAP else names.condition(question.text)
+        return cls(question, condition, tuple(names.condition(text) for text in question.assumptions))
 
     def met(self, plc: Plc) -> bool:
         """True if the last scan of a PLC met the goal."""
@@ -82,14 +82,8 @@ def _named(names: Names, cell: Cell) -> list[Place]:
         if place is None or place.bit is not None:
             return [place] if place else []
         number = 8 * (cell.offset - place.offset) + cell.bit
-        return [names.at(cell.offset, cell.bit) or place] if not place.type.size else [_bit_of(place, number)]
+        return [place.inner(f"{place.name}.{number}", BOOL, number // 8, number % 8)]
     return list(dict.fromkeys(names.within(cell.offset, cell.size)))
-
-
-def _bit_of(place: Place, number: int) -> Place:
-    from fbvm.base.types import BOOL
-
-    return place.inner(f"{place.name}.{number}", BOOL, number // 8, number % 8)
 
 
 class RandomInputs:
@@ -105,8 +99,9 @@ class RandomInputs:
             return lambda: random.getrandbits(1)
         top = (1 << cell.width) - 1
         kind = places[0].type if len(places) == 1 and places[0].type.size == cell.size else None
-        if kind is not None and isinstance(base(kind), EnumType):
-            members = sorted(base(kind).shown)  # type: ignore[attr-defined]
+        plain = base(kind) if kind else None
+        if isinstance(plain, EnumType):
+            members = sorted(plain.shown)
             return lambda: random.choice(members) & top
         if isinstance(kind, SubrangeType):
             return lambda: random.randint(kind.low, kind.high) & top
@@ -195,3 +190,11 @@ def replayed(image: Image, cycle_ns: int, judge: Judge, inputs: Inputs, is_short
         if plc.trap:
             return None
     return None
+
+
+def repeated(plc: Plc, run: Run) -> None:
+    """Does a run again on a PLC that has not scanned yet."""
+    for writes in run.writes:
+        for place, value in writes.items():
+            plc.write(place, value)
+        plc.scan()

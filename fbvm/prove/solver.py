@@ -9,7 +9,7 @@ import importlib.util
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from fbvm.prove.terms import Term
+from fbvm.prove.encoding.terms import Term
 
 SAT, UNSAT, UNKNOWN = "sat", "unsat", "unknown"
 HOW_TO_INSTALL = "proofs need the solver bitwuzla: install it by pip install 'fbvm[prove]'"
@@ -41,10 +41,19 @@ class Solver:
         options = self._api.Options()
         options.set(self._api.Option.PRODUCE_MODELS, True)
         self._solver = self._api.Bitwuzla(self._manager, options)
-        self._solver.configure_terminator(expired)
+        self._expired, self._interrupt = expired, False
+        self._solver.configure_terminator(self._is_over)
         self._made: dict[Term, Any] = {}
         self._names = 0
         self.questions = 0
+
+    def _is_over(self) -> bool:
+        """What the solver asks now and then; an exception would not get through it."""
+        try:
+            return self._expired()
+        except KeyboardInterrupt:
+            self._interrupt = True
+            return True
 
     def assume(self, *terms: Term) -> None:
         """Asserts terms for good."""
@@ -55,6 +64,8 @@ class Solver:
         """SAT if what is asserted and these terms can be true together, UNSAT if not, UNKNOWN if the time is over."""
         self.questions += 1
         answer = self._solver.check_sat(*(self._translated(term) for term in terms))
+        if self._interrupt:
+            raise KeyboardInterrupt
         return {self._api.Result.SAT: SAT, self._api.Result.UNSAT: UNSAT}.get(answer, UNKNOWN)
 
     def values(self, terms: Iterable[Term]) -> dict[Term, int]:

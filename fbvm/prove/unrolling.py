@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from fbvm.prove.rewriting import cone, leaves, substituted
-from fbvm.prove.scan import FixedCycle, Signal
-from fbvm.prove.summary import Summary
-from fbvm.prove.terms import Term
+from fbvm.prove.encoding.rewriting import cone, leaves, substituted
+from fbvm.prove.encoding.scan import FixedCycle, Signal
+from fbvm.prove.encoding.summary import Summary
+from fbvm.prove.encoding.terms import Term
 
 
 class Unrolling:

@@ -19,19 +19,19 @@ from fbvm.machine.scan.clock_words import (
     PERIODS_NS,
     TENTH_MS_NS,
 )
-from fbvm.prove.cells import Contents
-from fbvm.prove.execution import Execution, State, Trapped
-from fbvm.prove.expressions import EXPRESSION_ROWS
-from fbvm.prove.statements import STATEMENT_ROWS, call
-from fbvm.prove.terms import Term, Terms
+from fbvm.prove.encoding.cells import Contents
+from fbvm.prove.encoding.execution import Execution, State, Trapped
+from fbvm.prove.encoding.expressions import EXPRESSION_ROWS
+from fbvm.prove.encoding.statements import STATEMENT_ROWS, call
+from fbvm.prove.encoding.terms import Term, Terms
 from fbvm.watch.paths import Place, find_place
 
 Signal = tuple[str, int]
 """What the machine tells a scan: a kind and a number.
 
-now 0: time in ns; first 0: the first scan; pulse N: clock pulse CFN; counter N: free counter AN; cycle 0 and 1: cycle time and the
-longest one, in 0.1 ms; grid N: the interval of task N has passed; level N: what SINGLE of task N was in the scan before; fresh N: task
-N has not been executed yet."""
+now 0: time in ns; first 0: the first scan; pulse N: clock pulse CFN; counter N: free counter AN; cycle 0 and 1: cycle time and
+the longest one, in 0.1 ms; grid N: the interval of task N has passed; level N: what SINGLE of task N was in the scan before;
+fresh N: task N has not been executed yet."""
 WIDTHS = {"now": 64, "first": 0, "pulse": 0, "counter": 16, "cycle": 32, "grid": 0, "level": 0, "fresh": 0}
 Signals = Callable[[Signal], Term]
 MOST_CYCLE_TENTHS = (1 << 32) - 1

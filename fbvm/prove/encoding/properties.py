@@ -1,7 +1,7 @@
 """Conditions of users as terms: the same expressions as `--until` takes, over what memory holds behind a scan.
 
-Integers are exact as in `watch.conditions`: they are computed in as many bits as the result needs.  What is compared as a REAL is a
-free value, the same one for the same bits."""
+Integers are exact as in `watch.conditions`: they are computed in as many bits as the result needs.  What is compared as a REAL
+is a free value, the same one for the same bits."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from collections.abc import Callable
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import REAL, base, machine
 from fbvm.code.operations import BIT_MASK, OFFSET_MASK, OFFSET_SHIFT
-from fbvm.prove.addresses import cases
-from fbvm.prove.cells import Contents
-from fbvm.prove.execution import Refused, State
-from fbvm.prove.expressions import is_signed
-from fbvm.prove.terms import Term, Terms
+from fbvm.prove.encoding.addresses import cases
+from fbvm.prove.encoding.cells import Contents
+from fbvm.prove.encoding.execution import Refused, State
+from fbvm.prove.encoding.expressions import is_signed
+from fbvm.prove.encoding.terms import Term, Terms
 from fbvm.watch import terms as watched
 from fbvm.watch.paths import Place
 
@@ -24,6 +24,11 @@ _REALS = ("f32", "f64")
 def condition_term(contents: Contents, condition: watched.Term) -> Term:
     """A condition as a Boolean over what memory holds.  Raises Refused for texts and arithmetic of REAL."""
     return _Property(contents).boolean(condition)
+
+
+def place_term(contents: Contents, place: Place) -> Term:
+    """What lies at a place, as a term.  Raises Refused for texts."""
+    return _Property(contents).place(place)
 
 
 class _Property:

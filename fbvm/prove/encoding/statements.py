@@ -5,15 +5,16 @@ tail, or leaves the body.  Each outcome is one state with the condition of its p
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from fbvm.code.image import Body
 from fbvm.code.operations import SIZES, TEXT_UNITS, WHOLE_BYTES, Address, Block, Node
-from fbvm.prove.addresses import targets
-from fbvm.prove.execution import UNWOUND, Execution, Refused, Row, State
-from fbvm.prove.expressions import is_signed
-from fbvm.prove.terms import Term
+from fbvm.prove.encoding.addresses import targets
+from fbvm.prove.encoding.execution import UNWOUND, Execution, Refused, Row, State
+from fbvm.prove.encoding.expressions import is_signed
+from fbvm.prove.encoding.terms import Term
 
 MOST_SYMBOLIC_ROUNDS = 260
 """Rounds of a loop of which none is certain."""
@@ -71,7 +72,7 @@ def _joined(ancestor: State, states: list[State], x: Execution) -> State:
 # --- branches ---------------------------------------------------------------------------------------------------------
 
 
-def _branches(x: Execution, state: State, tests: list[Callable[[State], Term]],
+def _branches(x: Execution, state: State, tests: Sequence[Callable[[State], Term]],
               blocks: list[Block]) -> tuple[State | None, Outcomes]:  # fmt: skip
     """The block of the first test that is TRUE, else the last block."""
     terms, left = x.terms, dict[str, list[State]]()
@@ -110,16 +111,24 @@ def _branches(x: Execution, state: State, tests: list[Callable[[State], Term]],
 
 
 def _if(x: Execution, state: State, rows: tuple[tuple[Node, Block], ...], otherwise: Block) -> tuple[State | None, Outcomes]:
-    tests = [lambda at, node=node: x.value(at, node) for node, _ in rows]
+    tests = [partial(_value, x, node) for node, _ in rows]
     return _branches(x, state, tests, [*(block for _, block in rows), otherwise])
 
 
 def _case(x: Execution, state: State, machine: str, a: Node, rows: tuple[tuple[Any, Block], ...],
           otherwise: Block) -> tuple[State | None, Outcomes]:  # fmt: skip
     value = x.value(state, a)
-    tests = [lambda at, labels=labels: x.terms.any_of(*(_labelled(x, value, machine, *label) for label in labels))
-             for labels, _ in rows]
+    tests = [partial(_fitting, x, value, machine, labels) for labels, _ in rows]
     return _branches(x, state, tests, [*(block for _, block in rows), otherwise])
+
+
+def _value(x: Execution, node: Node, state: State) -> Term:
+    return x.value(state, node)
+
+
+def _fitting(x: Execution, value: Term, machine: str, labels: Any, state: State) -> Term:
+    """Whether one of the labels of a CASE fits a value."""
+    return x.terms.any_of(*(_labelled(x, value, machine, low, high) for low, high in labels))
 
 
 def _labelled(x: Execution, value: Term, machine: str, low: Any, high: Any) -> Term:

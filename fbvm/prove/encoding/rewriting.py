@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from fbvm.prove.terms import Term, Terms
+from fbvm.prove.encoding.terms import Term, Terms
 
 
 def substituted(terms: Terms, wanted: Iterable[Term], known: dict[Term, Term]) -> list[Term]:
     """The terms with others in place of their variables and unknowns; what is not in `known` stays.
 
-    Everything is simplified as when it was made, so constants are carried through.  `known` is a cache, too: it takes the results."""
+    Everything is simplified as when it was made, so constants are carried through.  `known` is a cache, too: it takes the
+    results."""
     found = []
     for term in wanted:
         waiting = [term]

@@ -10,8 +10,8 @@ from typing import Any
 
 from fbvm.code.image import Image
 from fbvm.code.operations import Node
-from fbvm.prove.cells import Contents
-from fbvm.prove.terms import Term, Terms
+from fbvm.prove.encoding.cells import Contents
+from fbvm.prove.encoding.terms import Term, Terms
 
 MOST_STEPS = 400_000
 """Statements that one scan may execute symbolically, rounds of loops counted each."""
@@ -20,7 +20,7 @@ UNWOUND = "unwound"
 
 
 class Refused(Exception):
-    """The program, or a part of it that matters, is out of the reach of proofs; `site` is the number of the place, -1 for none."""
+    """The program, or a part of it that matters, cannot be followed; `site` is the number of the place, -1 for none."""
 
     def __init__(self, reason: str, site: int = -1) -> None:
         super().__init__(reason)

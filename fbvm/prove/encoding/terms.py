@@ -1,44 +1,18 @@
 """Terms: Booleans and bit-vectors as a graph in which equal terms are one object, simplified while they are made.
 
-A term has a width: 0 for a Boolean, the number of bits of a bit-vector, TEXT for the characters of a string.  Constants are unsigned
-numbers.  An encoder that is fed with constants gets constants: so it is an interpreter, too.
+A term has a width: 0 for a Boolean, the number of bits of a bit-vector, TEXT for the characters of a string.  Constants are
+unsigned numbers.  An encoder that is fed with constants gets constants: so it is an interpreter, too.
 
-`unknown` terms stand for what the solver is not told, such as a sum of REALs: they may have any value, the same one for the same
-operands.  A proof that needs nothing of them holds; a counterexample in which they have a value may be none."""
+`unknown` terms stand for what the solver is not told, such as a sum of REALs: they may have any value, the same one for the
+same operands.  A proof that needs nothing of them holds; a counterexample in which they have a value may be none."""
 
 from __future__ import annotations
 
 from typing import Any
 
-TEXT = -1
-FEW_LEAVES = 64
-"""Constants at the ends of nested `ite` through which a comparison is carried."""
+from fbvm.prove.encoding.term import FEW_LEAVES, TEXT, Term, bounds, leaf_count, opposite, signed
 
-
-class Term:
-    """An operation (`op`) of operands (`args`); `value` is the number of a constant, the name of a variable, the lowest bit of an
-    `extract`.  `low` and `high` bound the value, read as an unsigned number."""
-
-    __slots__ = ("args", "high", "low", "number", "op", "value", "width")
-
-    def __init__(self, op: str, width: int, args: tuple[Term, ...], value: Any, number: int, low: int, high: int) -> None:
-        self.op, self.width, self.args, self.value, self.number = op, width, args, value, number
-        self.low, self.high = low, high
-
-    @property
-    def is_constant(self) -> bool:
-        return self.op == "const"
-
-    def __repr__(self) -> str:
-        if self.op in ("const", "var"):
-            return f"{self.value}"
-        mark = f":{self.value}" if self.value is not None else ""
-        return f"({self.op}{mark} {' '.join(map(repr, self.args))})"
-
-
-def signed(value: int, width: int) -> int:
-    """An unsigned number of some bits read as a signed one."""
-    return value - (1 << width) if value >> (width - 1) else value
+__all__ = ["TEXT", "Term", "Terms", "bounds", "signed"]
 
 
 class Terms:
@@ -49,12 +23,14 @@ class Terms:
         self.false = self._make("const", 0, (), 0, 0, 0)
         self.true = self._make("const", 0, (), 1, 1, 1)
 
-    def _make(self, op: str, width: int, args: tuple[Term, ...], value: Any = None, low: int = 0, high: int | None = None) -> Term:
+    def _make(self, op: str, width: int, args: tuple[Term, ...], value: Any = None, low: int = 0,
+              high: int | None = None) -> Term:  # fmt: skip
         key = (op, width, value, args) if op != "const" else (op, width, type(value), value)
         term = self._known.get(key)
         if term is None:
             most = (1 << max(width, 1)) - 1
-            term = self._known[key] = Term(op, width, args, value, len(self._known), low, most if high is None else min(high, most))
+            high = most if high is None else min(high, most)
+            term = self._known[key] = Term(op, width, args, value, len(self._known), low, high)
         return term
 
     # --- leaves
@@ -98,25 +74,29 @@ class Terms:
             return a
         if a.number > b.number:
             a, b = b, a
-        if _opposite(a, b):
+        if opposite(a, b):
             return self.false
+        return self._simpler_and(a, b) or self._make("and", 0, (a, b))
+
+    def _simpler_and(self, a: Term, b: Term) -> Term | None:
+        """What a and b come to if one is, or negates, a conjunction with the other in it."""
         for one, other in ((a, b), (b, a)):
             if one.op == "and":
                 if other in one.args:
                     return one
-                if _opposite(one.args[0], other) or _opposite(one.args[1], other):
+                if opposite(one.args[0], other) or opposite(one.args[1], other):
                     return self.false
             elif one.op == "not" and one.args[0].op == "and":
                 left, right = one.args[0].args
                 if other is left or other is right:  # a and not (a and c)
                     return self.and_(other, self.not_(right if other is left else left))
-                if _opposite(left, other) or _opposite(right, other):
+                if opposite(left, other) or opposite(right, other):
                     return other
         if a.op == b.op == "not" and a.args[0].op == b.args[0].op == "and":
             for shared in a.args[0].args:  # not (p and c), not (p and not c)
-                if shared in b.args[0].args and _opposite(_other(a.args[0], shared), _other(b.args[0], shared)):
+                if shared in b.args[0].args and opposite(_other(a.args[0], shared), _other(b.args[0], shared)):
                     return self.not_(shared)
-        return self._make("and", 0, (a, b))
+        return None
 
     def or_(self, a: Term, b: Term) -> Term:
         return self.not_(self.and_(self.not_(a), self.not_(b)))
@@ -163,7 +143,7 @@ class Terms:
                 return self.or_(c, b) if a is c or a.value else self.and_(self.not_(c), b)
             if b.op == "const" or b is c:
                 return self.and_(c, a) if b is c or not b.value else self.or_(self.not_(c), a)
-            if _opposite(a, b):
+            if opposite(a, b):
                 return self.not_(self.xor(c, a))
         return self._make("ite", a.width, (c, a, b), None, min(a.low, b.low), max(a.high, b.high))
 
@@ -181,7 +161,7 @@ class Terms:
         if a.op == "const":
             a, b = b, a
         if b.op == "const":
-            if a.op == "ite" and _leaves(a, FEW_LEAVES) is not None:
+            if a.op == "ite" and leaf_count(a, FEW_LEAVES) is not None:
                 return self.ite(a.args[0], self.eq(a.args[1], b), self.eq(a.args[2], b))
             if a.op in ("zext", "sext"):
                 narrow = self.constant(a.args[0].width, b.value)
@@ -201,7 +181,7 @@ class Terms:
         if al > bh or (not or_equal and al >= bh):
             return self.false
         for one, other in ((a, b), (b, a)):
-            if one.op == "const" and other.op == "ite" and _leaves(other, FEW_LEAVES) is not None:
+            if one.op == "const" and other.op == "ite" and leaf_count(other, FEW_LEAVES) is not None:
                 ways = [self.less(x, b, is_signed, or_equal) if other is a else self.less(a, x, is_signed, or_equal)
                         for x in other.args[1:]]
                 return self.ite(other.args[0], *ways)
@@ -316,6 +296,11 @@ class Terms:
             if low + width <= rest.width:
                 return self.extract(rest, low, width)
             return self.concat(self.extract(high, 0, low + width - rest.width), self.extract(rest, low, rest.width - low))
+        return self._extracted_inside(a, low, width) or self._make(
+            "extract", width, (a,), low, *((a.low, a.high) if low == 0 and a.high < 1 << width else (0, None)))
+
+    def _extracted_inside(self, a: Term, low: int, width: int) -> Term | None:
+        """Some bits of a result as a result of some bits of its operands."""
         if a.op in ("zext", "sext"):
             inner = a.args[0]
             if low + width <= inner.width:
@@ -333,7 +318,7 @@ class Terms:
         if low == 0 and a.op in ("add", "sub", "mul"):
             left, right = self.extract(a.args[0], 0, width), self.extract(a.args[1], 0, width)
             return {"add": self.add, "sub": self.sub, "mul": self.mul}[a.op](left, right)
-        return self._make("extract", width, (a,), low, *((a.low, a.high) if low == 0 and a.high < 1 << width else (0, None)))
+        return None
 
     def concat(self, high: Term, low: Term) -> Term:
         """The bits of `high` in front of those of `low`."""
@@ -347,7 +332,8 @@ class Terms:
         if low.op == "concat" and high.op == "extract" == low.args[0].op and high.args == low.args[0].args \
                 and high.value == low.args[0].value + low.args[0].width:
             return self.concat(self.concat(high, low.args[0]), low.args[1])
-        return self._make("concat", width, (high, low), None, (high.low << low.width) + low.low, (high.high << low.width) + low.high)
+        least, most = (high.low << low.width) + low.low, (high.high << low.width) + low.high
+        return self._make("concat", width, (high, low), None, least, most)
 
     def extend(self, a: Term, width: int, is_signed: bool) -> Term:
         """The same number in a wider bit-vector."""
@@ -390,7 +376,7 @@ class Terms:
             made: Term = getattr(self, _SIMPLE[op])(*args)
             return made
         if op in _COMPARISONS:
-            return self.less(*args, *_COMPARISONS[op])
+            return self.less(args[0], args[1], *_COMPARISONS[op])
         if op in ("udiv", "urem", "sdiv", "srem"):
             return self.divide(op, *args)
         if op in ("bvand", "bvor", "bvxor"):
@@ -409,37 +395,5 @@ _SIMPLE = {"not": "not_", "and": "and_", "xor": "xor", "ite": "ite", "eq": "eq",
 _COMPARISONS = {"ult": (False, False), "ule": (False, True), "slt": (True, False), "sle": (True, True)}
 
 
-def bounds(a: Term, is_signed: bool, depth: int = 4) -> tuple[int, int]:
-    """The least and the greatest number that a bit-vector can be; `depth` operations of it are looked at."""
-    if not is_signed:
-        return a.low, a.high
-    sign = 1 << (a.width - 1)
-    if a.high < sign:
-        return a.low, a.high
-    if a.low >= sign:
-        return a.low - 2 * sign, a.high - 2 * sign
-    if a.op == "sext":
-        return bounds(a.args[0], True, depth)
-    if a.op == "ite" and depth:
-        (al, ah), (bl, bh) = (bounds(way, True, depth - 1) for way in a.args[1:])
-        return min(al, bl), max(ah, bh)
-    return -sign, sign - 1
-
-
-def _opposite(a: Term, b: Term) -> bool:
-    return (a.op == "not" and a.args[0] is b) or (b.op == "not" and b.args[0] is a)
-
-
 def _other(pair: Term, one: Term) -> Term:
     return pair.args[1] if pair.args[0] is one else pair.args[0]
-
-
-def _leaves(term: Term, most: int) -> int | None:
-    """How many constants stand at the ends of nested `ite`; None if others do, or more than `most`."""
-    if term.op == "const":
-        return 1
-    if term.op != "ite" or most < 2:
-        return None
-    left = _leaves(term.args[1], most - 1)
-    right = None if left is None else _leaves(term.args[2], most - left)
-    return None if left is None or right is None else left + right

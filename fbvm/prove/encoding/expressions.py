@@ -1,7 +1,7 @@
 """Expressions of code as terms: one row an operation.
 
-A row decides nothing: it says in bit-vectors what the table of operations says.  What has no row of its own (REAL, text) is worked
-out where all operands are constants; else it is a value of which nothing is known."""
+A row decides nothing: it says in bit-vectors what the table of operations says.  What has no row of its own (REAL, text) is
+worked out where all operands are constants; else it is a value of which nothing is known."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from fbvm.code.operations import (
     Address,
     Node,
 )
-from fbvm.prove.addresses import cases, targets
-from fbvm.prove.cells import Contents
-from fbvm.prove.execution import Execution, Refused, Row, State
-from fbvm.prove.terms import TEXT, Term, signed
+from fbvm.prove.encoding.addresses import cases, targets
+from fbvm.prove.encoding.cells import Contents
+from fbvm.prove.encoding.execution import Execution, Refused, Row, State
+from fbvm.prove.encoding.terms import TEXT, Term, signed
 
 _PACKED = {"f32": "<f", "f64": "<d"}
 
@@ -398,9 +398,10 @@ def _to_bcd(x: Execution, state: State, machine: str, source: str, a: Node, site
     wide = max(width(source), width(machine)) + 1
     value = terms.extend(x.value(state, a), wide, sign)
     digits = width(machine) // 4
-    fits = terms.and_(terms.less(terms.constant(wide, -1), value, True), terms.less(value, terms.constant(wide, 10**digits), True))
-    x.trap(state, terms.not_(fits) if 10**digits < 1 << (wide - 1) else terms.less(value, terms.constant(wide, 0), True),
-           "R0105", site)
+    wrong = terms.less(value, terms.constant(wide, 0), True)
+    if 10**digits < 1 << (wide - 1):
+        wrong = terms.or_(wrong, terms.less(terms.constant(wide, 10**digits), value, True, True))
+    x.trap(state, wrong, "R0105", site)
     made, ten = terms.constant(4, 0), terms.constant(wide, 10)
     for digit in range(digits):
         nibble = terms.extract(terms.divide("urem", value, ten), 0, 4)

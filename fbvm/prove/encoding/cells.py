@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from fbvm.prove.terms import Term, Terms
+from fbvm.prove.encoding.terms import Term, Terms
 
 NUMBER, BOOL, BIT = 0, 1, 2
 """Kinds of cells."""

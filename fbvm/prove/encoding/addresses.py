@@ -14,8 +14,8 @@ from fbvm.code.operations import (
     OFFSET_SHIFT,
     Address,
 )
-from fbvm.prove.execution import Execution, Refused, State
-from fbvm.prove.terms import Term, Terms, bounds, signed
+from fbvm.prove.encoding.execution import Execution, Refused, State
+from fbvm.prove.encoding.terms import Term, Terms, bounds, signed
 
 MOST_CASES = 4096
 """Places that one access may choose from."""

@@ -12,10 +12,10 @@ from fbvm.base.areas import AREAS
 from fbvm.base.types import ArrayType, Field, StructType
 from fbvm.code.image import Image
 from fbvm.engine.depths import with_recursion_room
-from fbvm.prove.cells import BIT, Cell, Contents, Partition, Reshape, constant_of, initial_bytes
-from fbvm.prove.execution import Refused, TrapCondition
-from fbvm.prove.scan import WIDTHS, Scanned, Signal, scan
-from fbvm.prove.terms import Term, Terms
+from fbvm.prove.encoding.cells import BIT, Cell, Contents, Partition, Reshape, constant_of, initial_bytes
+from fbvm.prove.encoding.execution import Refused, TrapCondition
+from fbvm.prove.encoding.scan import WIDTHS, Scanned, Signal, scan
+from fbvm.prove.encoding.terms import Term, Terms
 
 FRAMES_A_LEVEL = 8
 """Python frames that executing takes at most for each level of nested code."""
