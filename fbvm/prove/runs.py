@@ -23,6 +23,7 @@ from fbvm.watch.values import Value
 
 HOLD_SCANS = (1, 10, 100, 1000)
 """How long an input keeps its value in a random run, on the average."""
+SCANS_AT_A_TIME = 64
 EDGES = 3
 """One number of so many is one of the edges: 0, 1, the greatest, the smallest."""
 
@@ -123,7 +124,7 @@ class Found:
 
 def simulated(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], scans: int, seed: int, *,
               budget: int) -> Iterator[Found | None]:  # fmt: skip
-    """Runs with random inputs, some scans each; yields None behind each run, and the run that met the goal, at last."""
+    """Runs with random inputs, some scans each; yields None now and then, and the run that met the goal, at last."""
     for number, hold_scans in enumerate(HOLD_SCANS):
         plc = Plc(image, cycle_ns, budget=budget, engine="python")
         random = Random(f"{seed} {number}")
@@ -146,7 +147,8 @@ def simulated(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], 
                 return
             if plc.trap:
                 break
-        yield None
+            if plc.scans % SCANS_AT_A_TIME == 0:
+                yield None
 
 
 def sampled(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], state: dict[Term, Cell], scans: int, seed: int, *,
