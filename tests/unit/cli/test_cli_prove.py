@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 
 from fbvm.base.data import data_folder
 from fbvm.cli.main import main
+from fbvm.cli.programs.prove import command
 from fbvm.prove import solver
 
 INTERLOCK = str(data_folder("examples") / "classics" / "interlock.st")
@@ -69,8 +70,8 @@ def test_wrong_use_has_status_2(arguments: list[str]) -> None:
 
 def test_a_program_that_cannot_be_followed_has_status_3_and_its_line(tmp_path: Path) -> None:
     program = tmp_path / "program.st"
-    program.write_text("PROGRAM Main\nVAR i AT %ID0 : DINT; a : ARRAY [0..9999] OF INT; END_VAR\n    a[i] := 1;\nEND_PROGRAM\n",
-                       encoding="utf-8")  # fmt: skip
+    text = "PROGRAM Main\nVAR i AT %ID0 : DINT; a : ARRAY [0..9999] OF INT; END_VAR\n    a[i] := 1;\nEND_PROGRAM\n"
+    program.write_text(text, encoding="utf-8")
     result = proved(str(program), "--no-trap")
     assert result.exit_code == 3
     assert "program.st:3:5" in result.stderr
@@ -82,7 +83,6 @@ def test_without_the_solver_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
         raise ImportError(name)
 
     monkeypatch.setattr(solver.importlib, "import_module", missing)
-    monkeypatch.setattr(main, "get_command", lambda ctx, name: __import__("fbvm.cli.programs.prove", fromlist=["command"]).command)
-    result = proved(INTERLOCK, "--never", "Main.Left")
+    result = CliRunner().invoke(command, [INTERLOCK, "--never", "Main.Left"])
     assert result.exit_code == 2
     assert "pip install 'fbvm[prove]'" in result.stderr
