@@ -60,6 +60,7 @@ ORDERS = {
     "wire": ("", "fins"),
     "units": ("", "etn21/fins", "etn21", "port"),
     "machine": ("scan", "servicing", "fast", ""),
+    "prove": ("encoding", ""),
     "record": ("trace", "recording", "draw", "export", "page"),
     "cli": ("shared", "shared/debug", "programs", "running", "recordings", "projects", "editors", ""),
 }
@@ -93,6 +94,7 @@ ONLY_IN = {
     "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap", "cli/shared/ending.py"},
     "subprocess": {"engine/apart.py", "engine/native/llvm/worker.py", "cli", "campaign", "testing"},
     "llvmlite": {"engine/native/llvm/compiler.py"},
+    "bitwuzla": {"prove/solver.py"},
     "concurrent": {"campaign"},
     "multiprocessing": {"campaign"},
     "_thread": set(),

@@ -41,6 +41,7 @@ VERB_GROUPS = {
     }),
     "programs": ("Look at programs", {
         "check": "Say what is wrong with a program; silent when nothing is.",
+        "prove": "Prove a property for all inputs and scans, or show the shortest run that breaks it.",
         "fmt": "Rewrite a program in canonical Structured Text.",
         "list": "Print the compiled program, readable.",
         "explain": "Print the page of a diagnostic.",

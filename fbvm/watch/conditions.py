@@ -139,4 +139,4 @@ class _Parser:
         if not isinstance(place, Place) or not isinstance(base(place.type), Elementary | StringType | EnumType):
             raise ConditionError(f"{word} is no single value and cannot be compared")
         self.places.append(place)
-        return Term(word, lambda read: read(place), sort_of(place.type), place.type, place=True)
+        return Term(word, lambda read: read(place), sort_of(place.type), place.type, place=place)

@@ -32,8 +32,11 @@ class Term:
     type: Type | None = None
     constant: Value = None
     literal: bool = False
-    place: bool = False
+    place: Place | None = None
     unknown: str = ""
+    sign: str = ""
+    parts: tuple[Term, ...] = ()
+    """The operator, - and NOT of one operand among them, and its operands, for those who do more with a term than compute it."""
 
     def resolved(self) -> Term:
         """The same term.  Raises ConditionError for a name that is no variable."""
@@ -124,14 +127,14 @@ def signed(sign: str, inner: Term, whole: str) -> Term:
         return inner
     constant = None if inner.constant is None else -cast(float, inner.constant)
     return replace(inner, text=f"-{inner.text}", value=lambda read: -cast(float, inner.value(read)), constant=constant,
-                   place=False)  # fmt: skip
+                   place=None, sign="-", parts=(inner,))  # fmt: skip
 
 
 def inverted(inner: Term, whole: str) -> Term:
     """`NOT inner`."""
     if inner.resolved().sort != "BOOL":
         raise ConditionError(f"NOT needs a BOOL in {whole!r}")
-    return Term(f"NOT {inner.text}", lambda read: not inner.value(read), "BOOL", BOOL)
+    return Term(f"NOT {inner.text}", lambda read: not inner.value(read), "BOOL", BOOL, sign="NOT", parts=(inner,))
 
 
 def _computed(text: str, sign: str, left: Term, right: Term, sort: str, kind: Type | None) -> Term:
@@ -151,7 +154,7 @@ def _computed(text: str, sign: str, left: Term, right: Term, sort: str, kind: Ty
             constant = value(lambda place: None)
         except (ArithmeticError, TypeError) as error:
             raise ConditionError(f"{text} cannot be computed: {error}") from None
-    return Term(text, value, sort, kind, constant)
+    return Term(text, value, sort, kind, constant, sign=sign, parts=(left, right))
 
 
 def _rounded(term: Term, other: Term) -> Term:

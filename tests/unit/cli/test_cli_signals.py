@@ -69,6 +69,7 @@ VERBS: dict[str, list[list[str]]] = {
     "peer": [["--port", "0"]], "demo": [[]], "new": [["project", ]], "test": [["tests"]], "learn": [["1"]],
     "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["long.fbtrace", "Main.Step"]],
     "lsp": [[]],
+    "prove": [["big.st", "--always", "Main.b0.a <> 4711", "--budget", "100s", "--scans", "100000"]],
     "convert": [["long.fbtrace", "out.html"], ["long.fbtrace", "out.csv"]],
 }  # fmt: skip
 """Arguments with which each verb has something to do for a while."""

@@ -1,0 +1,166 @@
+"""`fbvm prove`: whether a property holds in every run, and the shortest run in which it does not."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fbvm.base.files import write_file
+from fbvm.cli.shared import status
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.options import CYCLE_NS, time_ns
+from fbvm.cli.shared.progress import show_progress
+from fbvm.cli.shared.run_recording import described, program_text, record_run
+from fbvm.cli.shared.run_result import chart_width
+from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_arguments
+from fbvm.cli.shared.terminal import say, say_json
+from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
+from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.prover import Limits, Prover, SpuriousRun
+from fbvm.prove.pytest_text import pytest_text
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Run, Verdict
+from fbvm.prove.runs import repeated
+from fbvm.prove.solver import SolverMissing
+from fbvm.record.draw.chart import draw
+from fbvm.record.trace.recorder import Recorder
+from fbvm.run.time_limit import time_limit
+from fbvm.watch.paths import UnknownPlace
+from fbvm.watch.scanner import ConditionError
+from fbvm.watch.values import plain_value, show_time
+
+BUDGET_NS = 60_000_000_000
+_COLOURS = {"proved": "green", "reached": "green"}
+_FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+@click.command("prove")
+@source_arguments
+@click.option("--never", multiple=True, metavar="EXPRESSION", help="It never holds behind a scan: 'Main.Up AND Main.Down'.")
+@click.option("--always", multiple=True, metavar="EXPRESSION", help="It holds behind every scan.")
+@click.option("--reach", multiple=True, metavar="EXPRESSION", help="Find the shortest run to a scan behind which it holds.")
+@click.option("--no-trap", is_flag=True, help="No scan ends in a trap.")
+@click.option("--assume", multiple=True, metavar="EXPRESSION", help="Look only at runs in which it holds behind every scan.")
+@click.option("--free", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST",
+              help="Takes any value in each scan, as inputs do.")
+@click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
+              help="How often the PLC scans.")
+@click.option("--scans", type=click.IntRange(min=1), default=1000, show_default=True, metavar="N",
+              help="Look no further than N scans after power-on where there is no proof for all.")
+@click.option("--budget", "budget_ns", type=time_ns, default=BUDGET_NS, show_default="1m", metavar="TIME",
+              help="Give up a property after this time on the clock of the wall.")
+@click.option("--seed", type=int, default=0, metavar="N", help="What random runs begin with.")
+@click.option("--trace", type=_FILE, metavar="FILE", help="Record the first run that is found for `fbvm chart`, `table`, `why`.")
+@click.option("--test", "test_file", type=_FILE, metavar="FILE", help="Write each run that is found as a test of pytest.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], never: tuple[str, ...],
+            always: tuple[str, ...], reach: tuple[str, ...], no_trap: bool, as_json: bool, **options: Any) -> None:  # fmt: skip
+    """Prove properties of a program for all inputs and all scans, or draw the shortest run that breaks one.
+
+    Conditions are written as for `fbvm run --until`.  Inputs are free in each scan: %I, CIO that the program reads and never
+    writes, VAR_INPUT of the PROGRAM.
+
+    Status 0 if all is proved or reached, 1 if a property is broken or undecided, 3 if the program has errors or cannot be
+    followed."""
+    kinds = [(NEVER, never), (ALWAYS, always), (REACH, reach)]
+    questions = [Question(kind, text, options["assume"], options["free"]) for kind, texts in kinds for text in texts]
+    questions += [Question(NO_TRAP, "", options["assume"], options["free"])] * no_trap
+    if not questions:
+        raise click.UsageError("say what to prove: --never, --always, --reach or --no-trap")
+    image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
+    verdicts = []
+    for question in questions:
+        verdict = _answered(image, question, options)
+        verdicts.append(verdict)
+        if not as_json:
+            _print(image, verdict)
+    if as_json:
+        say_json({"cycle_ns": options["cycle_ns"], "properties": [_as_dict(verdict) for verdict in verdicts]})
+    found = [verdict for verdict in verdicts if verdict.run is not None]
+    chosen = ({"program": program} if program else {}) | compile_options()
+    if options["test_file"] and found:
+        with writing(options["test_file"]):
+            write_file(options["test_file"], pytest_text(found, files, chosen))
+    if options["trace"] and found:
+        _record(image, found[0], options, files, libraries, program)
+    sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
+
+
+def _answered(image: Image, question: Question, options: dict[str, Any]) -> Verdict:
+    """The answer to one question.  Ends the verb for one that cannot be answered."""
+    limits = Limits(options["cycle_ns"], options["scans"], options["seed"], time_limit(options["budget_ns"]))
+    try:
+        with _told(str(question)) as tell:
+            return Prover(image, question, limits, tell).answer()
+    except (UnknownPlace, ConditionError) as error:
+        raise click.UsageError(str(error)) from None
+    except SolverMissing as error:
+        raise click.UsageError(str(error)) from None
+    except Refused as refused:
+        place = f"{image.sites[refused.site]}: " if refused.site >= 0 else ""
+        say(f"{place}{question}: {refused.reason}", fg="red", err=True)
+        sys.exit(status.PROGRAM_ERRORS)
+    except SpuriousRun as error:
+        say(f"{question}: {error}", fg="red", err=True)
+        sys.exit(status.STOPPED)
+
+
+@contextmanager
+def _told(text: str) -> Iterator[Callable[[str], None]]:
+    with show_progress(text) as update:
+        yield lambda said: update(said, 0, 1)
+
+
+def _print(image: Image, verdict: Verdict) -> None:
+    """What a person reads: the verdict, the run as a chart, what limits the answer."""
+    say(f"{verdict.question}: {verdict.word.upper()} {verdict.how}", fg=_COLOURS.get(verdict.word, "red"), bold=True)
+    for note in verdict.notes:
+        say(f"  {note}")
+    if verdict.run is not None:
+        say(_chart(image, verdict, verdict.run), nl=False)
+        if verdict.run.trap is not None:
+            say(f"  {verdict.run.trap}")
+
+
+def _chart(image: Image, verdict: Verdict, run: Run) -> str:
+    """The chart of a run: the inputs that change, then what the property names."""
+    plc = Plc(image, run.cycle_ns)
+    inputs = dict.fromkeys(place.name for writes in run.writes for place in writes)
+    names = dict.fromkeys([*inputs, *(place.name for place in verdict.places)])
+    if not names:
+        return ""
+    recorder = Recorder(plc, names)
+    repeated(plc, run)
+    return str(draw(recorder, width=chart_width(), ruler=True, compress=True))
+
+
+def _as_dict(verdict: Verdict) -> dict[str, object]:
+    """One property for --json; the values of inputs by scan, only where they change."""
+    found: dict[str, object] = {"kind": verdict.question.kind, "expression": verdict.question.text, "verdict": verdict.word,
+                                "how": verdict.how, "clear_scans": verdict.scans, "notes": list(verdict.notes)}  # fmt: skip
+    if run := verdict.run:
+        found["run"] = {
+            "scans": run.scans, "shortest": run.is_shortest, "trap": run.trap.code if run.trap else None,
+            "writes": [{"scan": number, "values": {place.name: plain_value(place.type, value) for place, value in writes.items()}}
+                       for number, writes in enumerate(run.writes) if writes],
+        }  # fmt: skip
+    return found
+
+
+def _record(image: Image, verdict: Verdict, options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],
+            program: str | None) -> None:  # fmt: skip
+    """Writes the run of a verdict as a recording."""
+    assert verdict.run is not None
+    about = {"journal": None, "trace": options["trace"], "selected": (), "verify": False, "depth": "scans"}
+    plc = Plc(image, verdict.run.cycle_ns)
+    with record_run(about, {"proof": str(verdict.question), "cycle": show_time(verdict.run.cycle_ns)}) as recorded:
+        text = program_text(files, libraries, program=program, drawn=False, e_banks=(), **compile_options())
+        recorded.add(files[0].stem, plc, described(plc, text, about, files, libraries))
+        repeated(plc, verdict.run)
+
+

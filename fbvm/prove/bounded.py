@@ -1,0 +1,127 @@
+"""Bounded search: whether a run of so many scans from power-on gets to a goal, asked in blocks of scans that grow.
+
+A block without a run is asserted as a lemma for those behind it.  A run that is found is made the shortest, then one with few
+changes of its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fbvm.prove.encoding.cells import Cell
+from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.summary import Summary
+from fbvm.prove.encoding.terms import Term
+from fbvm.prove.solver import SAT, UNKNOWN, UNSAT, Solver
+from fbvm.prove.unrolling import Unrolling, from_power_on
+
+FIRST_BLOCK = 16
+MOST_IN_BLOCK = 512
+MOST_SIMPLER = 300
+"""Questions that may be asked to find a run with fewer changes."""
+
+Inputs = list[dict[Cell, int]]
+"""The inputs of each scan of a run, as unsigned numbers."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is looked for behind a scan: `hit` is TRUE there, in no scan before it `stop` was (a trap), and in all of them and it
+    `given` is (assumptions)."""
+
+    hit: Term
+    stop: Term
+    given: Term
+
+    @property
+    def terms(self) -> list[Term]:
+        return [self.hit, self.stop, self.given]
+
+
+class BoundedSearch:
+    """Looks for runs to a goal.  `cleared` is the number of scans after power-on in which it is known that none gets there."""
+
+    def __init__(self, summary: Summary, goal: Goal, clock: FixedCycle, expired: Callable[[], bool]) -> None:
+        self.summary, self.terms = summary, summary.terms
+        self.unrolling: Unrolling = from_power_on(summary, goal.terms, clock)
+        self.solver = Solver(expired)
+        self.cleared = 0
+        self._expired = expired
+        self._alive: list[Term] = [self.terms.true]
+        """Before each scan: no trap until then, and all assumptions kept."""
+        self._block = FIRST_BLOCK
+
+    def hit(self, number: int) -> Term:
+        """The goal is met behind the scan of a number, from power-on on."""
+        terms = self.terms
+        while len(self._alive) <= number + 1:
+            hit, stop, given = self.unrolling.scan(len(self._alive) - 1)
+            self._alive.append(terms.all_of(self._alive[-1], given, terms.not_(stop)))
+        hit, _, given = self.unrolling.scan(number)
+        return terms.all_of(self._alive[number], given, hit)
+
+    def until(self, scans: int) -> Inputs | None:
+        """The inputs of the shortest run of at most so many scans that gets to the goal, None if there is none or the time is
+        over (then `cleared` is less than `scans`)."""
+        while self.cleared < scans:
+            end = min(scans, self.cleared + self._block)
+            hits = []
+            for number in range(self.cleared, end):
+                if self._expired():
+                    return None
+                hits.append(self.hit(number))
+            answer = self.solver.ask(self.terms.any_of(*hits))
+            if answer == SAT:
+                return self._shortest(hits)
+            if answer == UNKNOWN:
+                return None
+            self.solver.assume(*(self.terms.not_(hit) for hit in hits))
+            self.cleared = end
+            self._block = min(2 * self._block, MOST_IN_BLOCK)
+        return None
+
+    def all_runs_end(self) -> bool:
+        """True if no run is left to go on: each has trapped, or broken an assumption."""
+        return self.solver.ask(self._alive[self.cleared]) == UNSAT
+
+    def _shortest(self, hits: list[Term]) -> Inputs | None:
+        while True:
+            values = self.solver.values(hits)
+            last = next(number for number, hit in enumerate(hits) if values[hit])
+            model = self._model(self.cleared + last)
+            if not last or self.solver.ask(self.terms.any_of(*hits[:last])) != SAT:
+                break
+            hits = hits[:last]
+        return self._simplest(model, self.cleared + last)
+
+    def _model(self, last: int) -> dict[Term, int]:
+        names = [self.unrolling.input(variable, number) for number in range(last + 1) for variable in self.unrolling.inputs]
+        return self.solver.values(names)
+
+    def _simplest(self, model: dict[Term, int], last: int) -> Inputs:
+        """A run to the goal in the scan `last` in which inputs keep their values where they can, beginning with 0."""
+        terms, kept = self.terms, [self.hit(last)]
+        wishes = []
+        for number in range(last + 1):
+            for variable in self.unrolling.inputs:
+                here = self.unrolling.input(variable, number)
+                before = self.unrolling.input(variable, number - 1) if number else terms.constant(here.width, 0)
+                wishes.append(terms.eq(here, before))
+        model = self._granted(kept, wishes, model, last)
+        cells = self.summary.inputs
+        return [{cells[variable]: model[self.unrolling.input(variable, number)] for variable in self.unrolling.inputs}
+                for number in range(last + 1)]  # fmt: skip
+
+    def _granted(self, kept: list[Term], wishes: list[Term], model: dict[Term, int], last: int) -> dict[Term, int]:
+        """The model of a run that grants as many wishes, the latest first, as can be found out by some questions."""
+        waiting, asked = [wishes], 0
+        while waiting and asked < MOST_SIMPLER and not self._expired():
+            some = waiting.pop()
+            asked += 1
+            if self.solver.ask(*kept, *some) == SAT:
+                kept += some
+                model = self._model(last)
+            elif len(some) > 1:
+                half = len(some) // 2
+                waiting += [some[:half], some[half:]]
+        return model

@@ -1,0 +1,185 @@
+"""The summary of a program: one scan, executed symbolically once, from any state that the program can be in.
+
+State is what a scan can change; everything else keeps its initial value and is a constant.  Inputs are free in each scan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import partial
+
+from fbvm.base.areas import AREAS
+from fbvm.base.types import ArrayType, Field, StructType
+from fbvm.code.image import Image
+from fbvm.engine.depths import with_recursion_room
+from fbvm.prove.encoding.cells import BIT, Cell, Contents, Partition, Reshape, constant_of, initial_bytes
+from fbvm.prove.encoding.execution import Refused, TrapCondition
+from fbvm.prove.encoding.scan import WIDTHS, Scanned, Signal, scan
+from fbvm.prove.encoding.terms import Term, Terms
+
+FRAMES_A_LEVEL = 8
+"""Python frames that executing takes at most for each level of nested code."""
+MOST_ROUNDS = 400
+"""Symbolic executions until state and constants are told apart."""
+
+
+@dataclass
+class Summary:
+    """One scan in terms of the variables of the state before it, of its inputs, and of what the machine says (`signals`)."""
+
+    image: Image
+    terms: Terms
+    contents: Contents
+    """What memory holds behind the scan."""
+    initial: dict[Term, Term] = field(default_factory=dict)
+    """The value of each variable of the state before the first scan."""
+    next: dict[Term, Term] = field(default_factory=dict)
+    """The term of each of them behind the scan."""
+    cells: dict[Term, Cell] = field(default_factory=dict)
+    """The cells of variables of the state."""
+    inputs: dict[Term, Cell] = field(default_factory=dict)
+    """The cells of the variables that are free in each scan."""
+    signals: dict[Term, Signal] = field(default_factory=dict)
+    traps: list[TrapCondition] = field(default_factory=list)
+    reached: dict[int, Term] = field(default_factory=dict)
+    """When the statement at each site is executed."""
+    unknowns: dict[str, int] = field(default_factory=dict)
+    """Operations of which nothing is known, with the site of one each."""
+    never_written: set[Cell] = field(default_factory=set)
+    """Cells that the code reads and nobody writes: they keep their initial value."""
+
+
+IsInput = Callable[[Cell], bool]
+
+
+def summarize(image: Image, budget: int, free: Iterable[tuple[int, int, int | None]] = ()) -> Summary:
+    """The summary of a program.
+
+    `budget` is the step budget of a scan; `free` are places (offset, bytes, bit or None) that are inputs besides those that
+    `input_places` finds.  Raises Refused for a program that cannot be followed, with the site."""
+    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_summarized, image, budget, [*input_places(image), *free]))
+
+
+def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None]]) -> Summary:
+    partition = Partition()
+    numbers: frozenset[int] = frozenset()
+    for _ in range(MOST_ROUNDS):
+        try:
+            used = set(partition.used)
+            found = _Fixpoint(image, budget, partition, free).summary()
+            if partition.used == used:
+                return found
+            partition = partition.shaped()
+        except Reshape as reshape:
+            numbers |= {reshape.offset}
+            fresh = Partition(numbers)
+            fresh.used = partition.used
+            partition = fresh.shaped()
+    raise Refused("its memory is used in too many shapes")
+
+
+class _Fixpoint:
+    """Finds what is state: at first nothing is, then what some scan leaves with another value than it may have had before."""
+
+    def __init__(self, image: Image, budget: int, partition: Partition, free: list[tuple[int, int, int | None]]) -> None:
+        self.image, self.budget, self.partition, self.terms = image, budget, partition, Terms()
+        self.power_on = initial_bytes(image.initial)
+        self.free_bytes = {at for offset, size, bit in free if bit is None for at in range(offset, offset + size)}
+        self.free_bits = {(offset, bit) for offset, _, bit in free if bit is not None}
+        self.variable: set[Cell] = set()
+        self.changing: set[Signal] = set()
+        self.written: set[Cell] = set()
+        self.signals: dict[Term, Signal] = {}
+
+    def summary(self) -> Summary:
+        for _ in range(MOST_ROUNDS):
+            before = len(self.partition.at), len(self.variable), len(self.written), len(self.changing)
+            scanned, inputs = self._scan()
+            self._take(scanned, inputs)
+            if before == (len(self.partition.at), len(self.variable), len(self.written), len(self.changing)):
+                return self._made(scanned, inputs)
+        raise Refused("what is state cannot be told")
+
+    def is_input(self, cell: Cell) -> bool:
+        """True for a cell that is free in each scan: named so, or a CIO cell that no code writes."""
+        if cell.offset in self.free_bytes or (cell.kind == BIT and (cell.offset, cell.bit) in self.free_bits):
+            return True
+        area = AREAS["CIO"]
+        return area.offset <= cell.offset < area.offset + area.size_bytes and cell not in self.written
+
+    def initial(self, cell: Cell) -> Term:
+        if cell in self.variable:
+            return self.terms.variable(("state", cell), cell.width)
+        return constant_of(self.terms, cell, self.power_on(cell.offset, cell.size))
+
+    def signal(self, signal: Signal) -> Term:
+        if signal[0] in ("level", "fresh") and signal not in self.changing:
+            return self.terms.boolean(signal[0] == "fresh")
+        term = self.terms.variable(signal, WIDTHS[signal[0]])
+        self.signals[term] = signal
+        return term
+
+    def _scan(self) -> tuple[Scanned, dict[Term, Cell]]:
+        contents = Contents(self.terms, self.partition, self.initial)
+        inputs = {}
+        for cell in dict.fromkeys(cell for cells in self.partition.at.values() for cell in cells):
+            if self.is_input(cell):
+                term = self.terms.variable(("input", cell), cell.width)
+                inputs[term] = cell
+                contents.written[cell] = term
+        begun = contents.child()
+        return scan(self.image, begun, self.signal, self.budget), inputs
+
+    def _take(self, scanned: Scanned, inputs: dict[Term, Cell]) -> None:
+        """What the scan shows to be written, and to be state."""
+        given = {cell: term for term, cell in inputs.items()}
+        for cell in scanned.contents.written_since(None):
+            value = scanned.contents.get(cell)
+            if cell in given and value is given[cell]:
+                continue
+            self.written.add(cell)
+            if not self.is_input(cell) and value is not self.initial(cell):
+                self.variable.add(cell)
+        for signal, term in scanned.following.items():
+            if term is not self.signal(signal):
+                self.changing.add(signal)
+
+    def _made(self, scanned: Scanned, inputs: dict[Term, Cell]) -> Summary:
+        terms, x = self.terms, scanned.execution
+        made = Summary(self.image, terms, scanned.contents, inputs=inputs, traps=x.traps, reached=x.reached, unknowns=x.unknowns)
+        for cell in sorted(self.variable):
+            if self.is_input(cell):
+                continue
+            term = terms.variable(("state", cell), cell.width)
+            made.cells[term] = cell
+            made.initial[term] = constant_of(terms, cell, self.power_on(cell.offset, cell.size))
+            made.next[term] = scanned.contents.get(cell)
+        for signal in self.changing:
+            term = self.signal(signal)
+            made.initial[term] = terms.boolean(signal[0] == "fresh")
+            made.next[term] = scanned.following.get(signal, term)
+        made.signals = {term: signal for term, signal in self.signals.items() if term not in made.next}
+        known = {cell for cells in self.partition.at.values() for cell in cells}
+        made.never_written = known - self.written - set(inputs.values())
+        return made
+
+
+def input_places(image: Image) -> list[tuple[int, int, int | None]]:
+    """The places (offset, bytes, bit) of inputs: %I, and VAR_INPUT of programs."""
+    area = AREAS["I"]
+    found: list[tuple[int, int, int | None]] = [(area.offset, area.size_bytes, None)]
+    for task in image.tasks:
+        for run in task.programs:
+            symbol = image.symbols.get(run.name.upper())
+            if symbol is not None and isinstance(symbol.type, StructType):
+                found += [place for member in symbol.type.fields.values() if member.kind == "VAR_INPUT" and not member.reference
+                          for place in _extent(member, symbol.offset)]  # fmt: skip
+    return found
+
+
+def _extent(member: Field, base: int) -> list[tuple[int, int, int | None]]:
+    offset = member.offset if member.absolute else base + member.offset
+    if member.bit is None:
+        return [(offset, member.type.size, None)]
+    count = member.type.count if isinstance(member.type, ArrayType) else 1
+    return [(offset + (member.bit + at) // 8, 1, (member.bit + at) % 8) for at in range(count)]

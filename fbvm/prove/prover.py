@@ -1,0 +1,259 @@
+"""Answers a question about a program: runs on the engine first, then bounded search, induction and invariants in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+from fbvm.base.types import EnumType, SubrangeType, base
+from fbvm.code.image import Image
+from fbvm.machine.plc import STEP_BUDGET
+from fbvm.prove.bounded import BoundedSearch, Goal, Inputs
+from fbvm.prove.encoding.execution import UNWOUND, Refused
+from fbvm.prove.encoding.properties import condition_term, place_term
+from fbvm.prove.encoding.rewriting import cone, leaves
+from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.summary import Summary, summarize
+from fbvm.prove.encoding.terms import Term
+from fbvm.prove.induction import Induction
+from fbvm.prove.invariants import Guess, Invariants, facts_of, guesses
+from fbvm.prove.question import (
+    ALWAYS,
+    BROKEN,
+    NO_TRAP,
+    PROVED,
+    REACHED,
+    UNDECIDED,
+    UNREACHABLE,
+    Names,
+    Question,
+    Run,
+    Verdict,
+)
+from fbvm.prove.runs import Judge, replayed, sampled, simulated
+from fbvm.prove.solver import UNSAT
+from fbvm.prove.unreached import unreached
+from fbvm.watch.names import Names as PlaceNames
+from fbvm.watch.paths import Place
+
+SIMULATED_SCANS = 4_000
+"""Scans of each random run before the solver is asked."""
+SAMPLED_SCANS = 200
+DEPTHS = (16, 64)
+"""Scans that are searched before induction, and before deeper induction."""
+MOST_INDUCTION = 5
+MOST_LINES = 12
+"""Lines that a note lists."""
+MOST_STATE = 200
+"""Variables of the state up to which invariants are guessed."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How far to go: `scans` from power-on on, until `expired` answers True.  `seed` is that of random runs."""
+
+    cycle_ns: int = 10_000_000
+    scans: int = 1000
+    seed: int = 0
+    expired: Callable[[], bool] = lambda: False
+    simulated_scans: int = SIMULATED_SCANS
+
+
+Tell = Callable[[str], None]
+
+
+def prove(image: Image, question: Question, limits: Limits | None = None, tell: Tell = lambda said: None) -> Verdict:
+    """The answer to a question about the runs of a program from power-on, with any inputs, in a fixed cycle.
+
+    `tell` is told what is done.  Raises Refused for a program or property that cannot be followed, ConditionError and
+    UnknownPlace for names that it does not have, SolverMissing."""
+    return Prover(image, question, limits or Limits(), tell).answer()
+
+
+class Prover:
+    """One question on its way to an answer."""
+
+    def __init__(self, image: Image, question: Question, limits: Limits, tell: Tell) -> None:
+        self.image, self.question, self.limits, self.tell = image, question, limits, tell
+        self.judge = Judge.of(image, question)
+        names = Names(image, question.prefix)
+        free = [extent for name in question.free for extent in names.extents(name)]
+        self.summary: Summary = summarize(image, STEP_BUDGET, free)
+        self.clock = FixedCycle(self.summary.terms, image.tasks, limits.cycle_ns)
+        self.goal = self._goal(names)
+        self.notes: list[str] = []
+        relevant = leaves([*self.goal.terms, *self.summary.next.values()])
+        self.inputs = [cell for variable, cell in self.summary.inputs.items() if variable in relevant]
+        self.search = BoundedSearch(self.summary, self.goal, self.clock, limits.expired)
+
+    def _goal(self, names: Names) -> Goal:
+        terms, summary = self.summary.terms, self.summary
+        stop = terms.any_of(*(trap.condition for trap in summary.traps if trap.code != UNWOUND))
+        self.unwound = [trap for trap in summary.traps if trap.code == UNWOUND]
+        assumed = (condition_term(summary.contents, names.condition(text).term) for text in self.question.assumptions)
+        given = terms.all_of(*assumed, *self._types())
+        if self.question.kind == NO_TRAP:
+            return Goal(stop, stop, given)
+        condition = condition_term(summary.contents, names.condition(self.question.text).term)
+        hit = terms.not_(condition) if self.question.kind == ALWAYS else condition
+        return Goal(terms.and_(hit, terms.not_(stop)), stop, given)
+
+    def _types(self) -> Iterable[Term]:
+        """What the types of inputs say: enumerations have their members, subranges their limits."""
+        terms, names = self.summary.terms, PlaceNames.of(self.image, self.image.layout.areas)
+        for variable, cell in self.summary.inputs.items():
+            place = names.at(cell.offset) if cell.width else None
+            if place is None or place.offset != cell.offset or place.type.size != cell.size:
+                continue
+            kind = base(place.type)
+            if isinstance(kind, EnumType):
+                yield terms.any_of(*(terms.eq(variable, terms.constant(cell.width, value)) for value in kind.shown))
+            elif isinstance(place.type, SubrangeType):
+                low, high = (terms.constant(cell.width, limit) for limit in (place.type.low, place.type.high))
+                sign = place.type.low < 0
+                yield terms.and_(terms.less(low, variable, sign, True), terms.less(variable, high, sign, True))
+
+    # --- the answer
+
+    def answer(self) -> Verdict:
+        """Tries one method after the other, the cheap ones first."""
+        self._note_limits()
+        shallow, deeper = (min(depth, self.limits.scans) for depth in DEPTHS)
+        methods: tuple[Callable[[], Verdict | None], ...] = (
+            lambda: self._searched(shallow),
+            lambda: self._induced([], 1),
+            self._simulated,
+            lambda: self._searched(deeper),
+            lambda: self._induced([], MOST_INDUCTION),
+            self._with_invariants,
+            lambda: self._searched(self.limits.scans),
+        )
+        for method in methods:
+            if (found := method()) is not None:
+                return self._with_unreached(found) if found.word in (PROVED, UNREACHABLE) else found
+        return self._undecided()
+
+    def _with_unreached(self, verdict: Verdict) -> Verdict:
+        """A proof with the statements of which it says nothing."""
+        self.tell("looking for statements that no run reaches")
+        sites = unreached(self.summary, self.goal, self.clock, DEPTHS[-1], self.limits.expired)
+        if not sites:
+            return verdict
+        lines = dict.fromkeys(f"{self.image.sites[site].file}:{self.image.sites[site].line}" for site in sites)
+        some = ", ".join([*lines][:MOST_LINES]) + (f" and {len(lines) - MOST_LINES} more" if len(lines) > MOST_LINES else "")
+        return replace(verdict, notes=(*verdict.notes, f"no run of {DEPTHS[-1]} scans executes {some}"))
+
+    def _undecided(self) -> Verdict:
+        cleared = self.search.cleared
+        if self.search.cleared >= self.limits.scans:
+            how = f"no run of {cleared} scans gets there, and no proof was found that none ever does"
+        else:
+            how = f"the time is over: no run of {cleared} scans gets there"
+        return self._verdict(UNDECIDED, how)
+
+    def _verdict(self, word: str, how: str, run: Run | None = None) -> Verdict:
+        condition = self.judge.condition
+        named = tuple(dict.fromkeys(condition.places)) if condition else ()
+        return Verdict(self.question, word, how, self.search.cleared, run, named, tuple(self.notes))
+
+    def _note_limits(self) -> None:
+        """Notes what makes an answer worth less: variables that never change, operations of which nothing is known."""
+        for place in self._constants():
+            self.notes.append(f"{place.name} has the same value in every scan: it is no input, and no code changes it")
+        if found := self._unknowns():
+            self.notes.append(f"taken for any value: {', '.join(found)}")
+        if self.question.assumptions:
+            self.notes.append(f"assumed: {'; '.join(self.question.assumptions)}")
+
+    def _constants(self) -> list[Place]:
+        """The variables in the property that nothing can change."""
+        condition = self.judge.condition
+        named = dict.fromkeys(condition.places) if condition else {}
+        return [place for place in named if place_term(self.summary.contents, place).is_constant]
+
+    def _unknowns(self) -> list[str]:
+        """Operations of which nothing is known and on which the answer depends, with their places."""
+        depends = cone(self.summary.next, self.goal.terms)
+        wanted = [*self.goal.terms, *(self.summary.next[variable] for variable in depends)]
+        if not any(leaf.op == "unknown" for leaf in leaves(wanted)):
+            return []
+        return [f"{what} ({self.image.sites[site]})" if site >= 0 else what for what, site in self.summary.unknowns.items()] or \
+            ["comparisons of REAL"]  # fmt: skip
+
+    # --- methods
+
+    def _simulated(self) -> Verdict | None:
+        """Random runs; what they find is made shorter by the solver."""
+        self.tell("trying random inputs")
+        for found in simulated(self.image, self.limits.cycle_ns, self.judge, self.inputs, self.limits.simulated_scans,
+                               self.limits.seed, budget=STEP_BUDGET):  # fmt: skip
+            if found is not None:
+                self.tell(f"a random run gets there in scan {len(found.inputs)}: looking for the shortest")
+                shorter = self._searched(min(len(found.inputs), self.limits.scans))
+                return shorter or self._met(found.inputs, False)
+            if self.limits.expired():
+                break
+        return None
+
+    def _searched(self, scans: int) -> Verdict | None:
+        self.tell(f"searching {scans} scans")
+        inputs = self.search.until(scans)
+        if inputs is not None:
+            return self._met(inputs, True)
+        if self.search.cleared and self.search.all_runs_end():
+            raise Refused("no run keeps the assumptions, or does not trap, for longer than "
+                          f"{self.search.cleared} scans: there is nothing to prove")
+        return None
+
+    def _met(self, inputs: Inputs, is_shortest: bool) -> Verdict:
+        """The verdict about a run that gets to the goal, which the engine has to confirm."""
+        run = replayed(self.image, self.limits.cycle_ns, self.judge, inputs, is_shortest, budget=STEP_BUDGET)
+        if run is not None:
+            word = REACHED if self.question.is_reach else BROKEN
+            return self._verdict(word, f"in scan {run.scans}, by {'the shortest run' if is_shortest else 'a random run'}", run)
+        if self._unknowns():
+            how = f"a run of {len(inputs)} scans may get there, but does not on the engine: it depends on values of which the " \
+                  "solver knows nothing"  # fmt: skip
+            return self._verdict(UNDECIDED, how)
+        raise SpuriousRun(f"the solver's run of {len(inputs)} scans does not do on the engine what the solver says; this is a "
+                          f"defect of the encoding, not of the program (image {self.image.fingerprint})")  # fmt: skip
+
+    def _induced(self, found: list[Guess], most: int) -> Verdict | None:
+        """k-induction up to a depth, which the bounded search has cleared."""
+        facts = facts_of(self.summary, found, self.limits.cycle_ns)
+        induction = Induction(self.summary, self._whole_goal(), self.limits.cycle_ns, self.limits.expired, facts)
+        while induction.depth <= min(most, self.search.cleared - 1) and not self.limits.expired():
+            if induction.step() == UNSAT:
+                how = f"by induction over {induction.depth + 1} scan{'s' * (induction.depth > 0)}"
+                if found:
+                    how += f" with {len(found)} invariants"
+                return self._verdict(UNREACHABLE if self.question.is_reach else PROVED, how)
+        return None
+
+    def _whole_goal(self) -> Goal:
+        """The goal of a proof, which loops that were not followed to their end are part of."""
+        if not self.unwound:
+            return self.goal
+        terms = self.summary.terms
+        return Goal(terms.or_(self.goal.hit, terms.any_of(*(trap.condition for trap in self.unwound))), self.goal.stop,
+                    self.goal.given)  # fmt: skip
+
+    def _with_invariants(self) -> Verdict | None:
+        state = [variable for variable in self.search.unrolling.cone if variable in self.summary.cells]
+        if not state or len(state) > MOST_STATE or self.limits.expired():
+            return None
+        self.tell(f"guessing invariants of {len(state)} variables")
+        cells = {variable: self.summary.cells[variable] for variable in state}
+        samples = sampled(self.image, self.limits.cycle_ns, self.judge, self.inputs, cells, SAMPLED_SCANS, self.limits.seed,
+                          budget=STEP_BUDGET)  # fmt: skip
+        if not samples:
+            return None
+        found = guesses(state, samples)
+        self.tell(f"trying {len(found)} invariants")
+        invariants = Invariants(self.summary, state, self.goal.stop, self.goal.given, self.clock, self.limits.expired)
+        kept = invariants.kept(found)
+        return self._induced(kept, MOST_INDUCTION) if kept else None
+
+
+class SpuriousRun(Exception):
+    """A run of the solver that the engine does not do: a defect of fbvm."""

@@ -1,0 +1,106 @@
+"""What is asked of a program, and the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fbvm.code.image import Image
+from fbvm.engine.trap import Trap
+from fbvm.watch.conditions import Condition, parse_condition
+from fbvm.watch.paths import Place, Span, UnknownPlace, find
+from fbvm.watch.scopes import Scope
+from fbvm.watch.values import Value
+
+NEVER, ALWAYS, REACH, NO_TRAP = "never", "always", "reach", "no trap"
+
+PROVED, BROKEN, REACHED, UNREACHABLE, UNDECIDED = "proved", "broken", "reached", "unreachable", "undecided"
+
+
+@dataclass(frozen=True)
+class Question:
+    """A property: `kind` is NEVER, ALWAYS, REACH (of `text`, a condition behind a scan) or NO_TRAP.
+
+    Each of `assumptions` holds behind each scan that is looked at; `free` are names and addresses that are inputs, besides those
+    that `summary.input_places` finds."""
+
+    kind: str
+    text: str = ""
+    assumptions: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
+    prefix: str = ""
+    """The path of an instance, with a dot, whose variables are named without it."""
+
+    def __str__(self) -> str:
+        return self.kind if self.kind == NO_TRAP else f"{self.kind} {self.text}"
+
+    @property
+    def is_reach(self) -> bool:
+        return self.kind == REACH
+
+
+@dataclass(frozen=True)
+class Names:
+    """Finds names in a program; what begins with a variable of `prefix`, a path with a dot behind it, needs no path."""
+
+    image: Image
+    prefix: str = ""
+
+    def find(self, text: str) -> Place | Span:
+        """The place that `text` names.  Raises UnknownPlace."""
+        symbols, areas = self.image.symbols, self.image.layout.areas
+        whole = find(symbols, areas, self.prefix.rstrip(".")) if self.prefix else None
+        instance = whole if isinstance(whole, Place) else None
+        return Scope(lambda name: find(symbols, areas, name), instance).find(text)
+
+    def condition(self, text: str) -> Condition:
+        """The condition that `text` writes.  Raises ConditionError."""
+        return parse_condition(text, self.find)
+
+    def extents(self, text: str) -> list[tuple[int, int, int | None]]:
+        """Where the places lie that a name, address or range names: offset, bytes, bit.  Raises UnknownPlace."""
+        found = self.find(text)
+        places = found.places if isinstance(found, Span) else (found,)
+        if any(place.hops for place in places):
+            raise UnknownPlace(f"{text} lies behind a reference: name the variable itself")
+        return [(place.offset, place.type.size, place.bit) for place in places]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that answers a question: what is written before each scan, and what was seen behind each.
+
+    `writes` has for each scan the inputs that change, with their values; `is_shortest` tells whether no shorter run does it."""
+
+    writes: tuple[dict[Place, Value], ...]
+    cycle_ns: int
+    is_shortest: bool
+    trap: Trap | None = None
+
+    @property
+    def scans(self) -> int:
+        return len(self.writes)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The answer to a question.
+
+    `word` is PROVED, BROKEN, REACHED, UNREACHABLE or UNDECIDED; `how` says by which method, in words; `scans` is the number of
+    scans from power-on in which it is certain that no run gets there."""
+
+    question: Question
+    word: str
+    how: str
+    scans: int = 0
+    run: Run | None = None
+    places: tuple[Place, ...] = ()
+    """What the property names."""
+    notes: tuple[str, ...] = field(default=())
+    """What limits the answer: assumptions, values that are constants, statements that nothing reaches."""
+
+    @property
+    def is_good(self) -> bool:
+        """True if the property holds for certain, or what was to be reached was reached."""
+        return self.word in (PROVED, REACHED)
+
+

@@ -1,0 +1,202 @@
+"""Runs on the engine: random ones, before any solver is asked, and those that a solver has found, which have to do there what the
+solver says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from random import Random
+
+from fbvm.base.types import BOOL, EnumType, SubrangeType, base
+from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
+from fbvm.prove.bounded import Inputs
+from fbvm.prove.encoding.cells import BIT, Cell
+from fbvm.prove.encoding.terms import Term
+from fbvm.prove.invariants import Sample, Values
+from fbvm.prove.question import ALWAYS, NO_TRAP, Question, Run
+from fbvm.prove.question import Names as QuestionNames
+from fbvm.watch.conditions import Condition
+from fbvm.watch.names import Names
+from fbvm.watch.paths import Place
+from fbvm.watch.values import Value
+
+HOLD_SCANS = (1, 10, 100, 1000)
+"""How long an input keeps its value in a random run, on the average."""
+SCANS_AT_A_TIME = 64
+EDGES = 3
+"""One number of so many is one of the edges: 0, 1, the greatest, the smallest."""
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Tells behind a scan whether a run got to the goal of a question, and whether it keeps the assumptions."""
+
+    question: Question
+    condition: Condition | None
+    assumptions: tuple[Condition, ...]
+
+    @classmethod
+    def of(cls, image: Image, question: Question) -> Judge:
+        """Raises ConditionError for conditions that do not fit the program."""
+        names = QuestionNames(image, question.prefix)
+        condition = None if question.kind == NO_TRAP else names.condition(question.text)
+        return cls(question, condition, tuple(names.condition(text) for text in question.assumptions))
+
+    def met(self, plc: Plc) -> bool:
+        """True if the last scan of a PLC met the goal."""
+        if self.condition is None:
+            return plc.trap is not None
+        return plc.trap is None and self.condition.holds(plc.read) != (self.question.kind == ALWAYS)
+
+    def kept(self, plc: Plc) -> bool:
+        """True if the assumptions hold now."""
+        return all(assumption.holds(plc.read) for assumption in self.assumptions)
+
+
+class InputWriter:
+    """Writes cells of inputs into the memory of a PLC, and tells which variables these are."""
+
+    def __init__(self, plc: Plc, cells: Sequence[Cell]) -> None:
+        self.plc = plc
+        self.cells = cells
+        names = Names.of(plc.image, plc.memory.areas)
+        self.places = {cell: _named(names, cell) for cell in cells}
+
+    def write(self, cell: Cell, value: int) -> None:
+        memory = self.plc.memory
+        if cell.kind == BIT:
+            memory.write(cell.offset, "b", bool(value), cell.bit)
+        else:
+            memory.u8[cell.offset : cell.offset + cell.size] = value.to_bytes(cell.size, "little")
+
+    def read(self, cell: Cell) -> int:
+        """What lies in a cell now."""
+        data = bytes(self.plc.memory.u8[cell.offset : cell.offset + cell.size])
+        return data[0] >> cell.bit & 1 if cell.kind == BIT else int.from_bytes(data, "little")
+
+
+def _named(names: Names, cell: Cell) -> list[Place]:
+    """The variables, or parts of them, that a cell consists of."""
+    if cell.kind == BIT:
+        place = names.at(cell.offset, cell.bit)
+        if place is None or place.bit is not None:
+            return [place] if place else []
+        number = 8 * (cell.offset - place.offset) + cell.bit
+        return [place.inner(f"{place.name}.{number}", BOOL, number // 8, number % 8)]
+    return list(dict.fromkeys(names.within(cell.offset, cell.size)))
+
+
+class RandomInputs:
+    """Random values for the cells of inputs.  Inputs of enumerations and subranges get values of their type."""
+
+    def __init__(self, writer: InputWriter, random: Random) -> None:
+        self._random = random
+        self._choices: dict[Cell, Callable[[], int]] = {cell: self._choice(cell, writer.places[cell]) for cell in writer.cells}
+
+    def _choice(self, cell: Cell, places: list[Place]) -> Callable[[], int]:
+        random = self._random
+        if cell.width == 0:
+            return lambda: random.getrandbits(1)
+        top = (1 << cell.width) - 1
+        kind = places[0].type if len(places) == 1 and places[0].type.size == cell.size else None
+        plain = base(kind) if kind else None
+        if isinstance(plain, EnumType):
+            members = sorted(plain.shown)
+            return lambda: random.choice(members) & top
+        if isinstance(kind, SubrangeType):
+            return lambda: random.randint(kind.low, kind.high) & top
+        edges = (0, 1, top, top >> 1, (top >> 1) + 1, 10, 100)
+        return lambda: random.choice(edges) if random.randrange(EDGES) == 0 else random.getrandbits(cell.width)
+
+    def value(self, cell: Cell) -> int:
+        return self._choices[cell]()
+
+
+@dataclass(frozen=True)
+class Found:
+    """A random run that met the goal: its inputs, scan by scan."""
+
+    inputs: Inputs
+    seed: int
+    hold_scans: int
+
+
+def simulated(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], scans: int, seed: int, *,
+              budget: int) -> Iterator[Found | None]:  # fmt: skip
+    """Runs with random inputs, some scans each; yields None now and then, and the run that met the goal, at last."""
+    for number, hold_scans in enumerate(HOLD_SCANS):
+        plc = Plc(image, cycle_ns, budget=budget, engine="python")
+        random = Random(f"{seed} {number}")
+        writer = InputWriter(plc, cells)
+        values = RandomInputs(writer, random)
+        inputs: Inputs = []
+        for _ in range(scans):
+            now = dict(inputs[-1]) if inputs else {}
+            for cell in cells:
+                if not inputs or random.randrange(hold_scans) == 0:
+                    now[cell] = values.value(cell)
+            inputs.append(now)
+            for cell, value in now.items():
+                writer.write(cell, value)
+            plc.scan()
+            if not judge.kept(plc):
+                break
+            if judge.met(plc):
+                yield Found(inputs, seed, hold_scans)
+                return
+            if plc.trap:
+                break
+            if plc.scans % SCANS_AT_A_TIME == 0:
+                yield None
+
+
+def sampled(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], state: dict[Term, Cell], scans: int, seed: int, *,
+            budget: int) -> list[Sample]:  # fmt: skip
+    """States behind scans of random runs: the values of the cells `state`."""
+    found: list[Sample] = []
+    for number, hold_scans in enumerate(HOLD_SCANS[:3] * 2):
+        plc = Plc(image, cycle_ns, budget=budget, engine="python")
+        random = Random(f"states {seed} {number}")
+        writer = InputWriter(plc, cells)
+        values = RandomInputs(writer, random)
+        for _ in range(scans):
+            for cell in cells:
+                if not plc.scans or random.randrange(hold_scans) == 0:
+                    writer.write(cell, values.value(cell))
+            plc.scan()
+            if plc.trap or not judge.kept(plc):
+                break
+            seen: Values = {variable: writer.read(cell) for variable, cell in state.items()}
+            found.append(Sample(seen, plc.now_ns))
+    return found
+
+
+def replayed(image: Image, cycle_ns: int, judge: Judge, inputs: Inputs, is_shortest: bool, *, budget: int,
+             plc: Plc | None = None) -> Run | None:  # fmt: skip
+    """The run with these inputs, done on the engine; None if it does not meet the goal in its last scan, or earlier only."""
+    plc = plc or Plc(image, cycle_ns, budget=budget, engine="python")
+    writer = InputWriter(plc, list(inputs[0]) if inputs else [])
+    writes: list[dict[Place, Value]] = []
+    for number, now in enumerate(inputs):
+        before = inputs[number - 1] if number else {cell: writer.read(cell) for cell in now}
+        changed = [cell for cell, value in now.items() if value != before[cell]]
+        for cell in changed:
+            writer.write(cell, now[cell])
+        writes.append({place: plc.read(place) for cell in changed for place in writer.places[cell]})
+        plc.scan()
+        if not judge.kept(plc):
+            return None
+        if judge.met(plc):
+            return Run(tuple(writes), cycle_ns, is_shortest, plc.trap) if number == len(inputs) - 1 else None
+        if plc.trap:
+            return None
+    return None
+
+
+def repeated(plc: Plc, run: Run) -> None:
+    """Does a run again on a PLC that has not scanned yet."""
+    for writes in run.writes:
+        for place, value in writes.items():
+            plc.write(place, value)
+        plc.scan()

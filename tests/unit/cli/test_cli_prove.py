@@ -1,0 +1,88 @@
+"""`fbvm prove`: verdicts, charts, recordings, tests, and exit statuses."""
+
+from __future__ import annotations
+
+import json
+import runpy
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fbvm.base.data import data_folder
+from fbvm.cli.main import main
+from fbvm.cli.programs.prove import command
+from fbvm.prove import solver
+
+INTERLOCK = str(data_folder("examples") / "classics" / "interlock.st")
+DIVIDES = "PROGRAM Main\nVAR a AT %IW0 : INT; b : INT; END_VAR\n    b := 100 / a;\nEND_PROGRAM\n"
+
+
+def proved(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["prove", *arguments])
+
+
+def test_a_proof_has_status_0_and_says_how() -> None:
+    result = proved(INTERLOCK, "--never", "Main.Left AND Main.Right")
+    assert (result.exit_code, result.stdout) == (0, "never Main.Left AND Main.Right: PROVED by induction over 1 scan\n")
+
+
+def test_a_broken_property_has_status_1_and_a_chart() -> None:
+    result = proved(INTERLOCK, "--never", "Main.Left")
+    assert result.exit_code == 1
+    assert result.stdout.splitlines() == [
+        "never Main.Left: BROKEN in scan 1, by the shortest run", "               0", "Main.Backward  #", "Main.Left      #"]
+
+
+def test_json_has_the_inputs_scan_by_scan() -> None:
+    result = proved(INTERLOCK, "--never", "Main.Left", "--json")
+    [found] = json.loads(result.stdout)["properties"]
+    assert (result.exit_code, found["verdict"], found["run"]["writes"]) == (
+        1, "broken", [{"scan": 0, "values": {"Main.Backward": True}}])
+
+
+def test_the_test_that_is_written_fails_until_the_program_keeps_the_property(tmp_path: Path) -> None:
+    program, test = tmp_path / "program.st", tmp_path / "test_found.py"
+    program.write_text(DIVIDES, encoding="utf-8")
+    assert proved(str(program), "--no-trap", "--test", str(test)).exit_code == 1
+    found = runpy.run_path(str(test))["test_no_trap"]
+    with pytest.raises(AssertionError):
+        found()
+    program.write_text(DIVIDES.replace("100 / a", "100 + a"), encoding="utf-8")
+    found()
+    assert proved(str(program), "--no-trap").exit_code == 0
+
+
+def test_the_run_is_recorded(tmp_path: Path) -> None:
+    trace = tmp_path / "found.fbtrace"
+    assert proved(INTERLOCK, "--never", "Main.Left", "--trace", str(trace)).exit_code == 1
+    chart = CliRunner().invoke(main, ["chart", str(trace), "Main.Left", "Main.Backward"])
+    assert (chart.exit_code, chart.stdout.split()) == (0, ["0", "Main.Left", "#", "Main.Backward", "#"])
+
+
+@pytest.mark.parametrize("arguments", [[], ["--never", "Main.Nobody"], ["--never", "Main.Left +"], ["--always", "3"],
+                                       ["--never", "Main.Left", "--free", "Nobody"]])  # fmt: skip
+def test_wrong_use_has_status_2(arguments: list[str]) -> None:
+    result = proved(INTERLOCK, *arguments)
+    assert result.exit_code == 2, result.output
+    assert "Error: " in result.stderr
+
+
+def test_a_program_that_cannot_be_followed_has_status_3_and_its_line(tmp_path: Path) -> None:
+    program = tmp_path / "program.st"
+    text = "PROGRAM Main\nVAR i AT %ID0 : DINT; a : ARRAY [0..9999] OF INT; END_VAR\n    a[i] := 1;\nEND_PROGRAM\n"
+    program.write_text(text, encoding="utf-8")
+    result = proved(str(program), "--no-trap")
+    assert result.exit_code == 3
+    assert "program.st:3:5" in result.stderr
+    assert "an index has no bounds that could be followed" in result.stderr
+
+
+def test_without_the_solver_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> object:
+        raise ImportError(name)
+
+    monkeypatch.setattr(solver.importlib, "import_module", missing)
+    result = CliRunner().invoke(command, [INTERLOCK, "--never", "Main.Left"])
+    assert result.exit_code == 2
+    assert "pip install 'fbvm[prove]'" in result.stderr

@@ -1,0 +1,93 @@
+"""The encoder executes what the engine executes: the same memory, cell by cell, and the same traps."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from random import Random
+
+import lang_check
+import lang_corpus
+import pytest
+import st_programs
+from depth import times
+from encoded import compare_scans
+from rows import go_through
+
+from fbvm.base.data import data_folder
+from fbvm.base.diagnostics import Source
+from fbvm.code.compiler import compile_files, compile_sources, compile_text
+from fbvm.machine.plc import Plc
+from fbvm.prove.encoding.execution import Refused
+
+CLASSICS = sorted((data_folder("examples") / "classics").glob("*.st"))
+CYCLE_NS, BUDGET = 10_000_000, 20_000
+
+
+def pressed(random: Random, plc: Plc, number: int) -> None:
+    """Writes some inputs at random, and a word that programs scale."""
+    for bit in range(6):
+        if random.random() < 0.3:
+            plc.write(f"CIO 0.{bit:02}", random.random() < 0.5)
+    plc.write("D100", random.randrange(1 << 16))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [pytest.param(path, id=path.stem) for path in CLASSICS])
+def test_classics_with_random_inputs(path: Path) -> None:
+    image = compile_files([path], runnable=True).image
+    assert image is not None
+    compare_scans(image, CYCLE_NS, 60 * times(5), BUDGET, partial(pressed, Random(1)))
+
+
+ENCODED = [p for p in lang_corpus.programs() if p.runs]
+REFUSED_AT_MOST = 20
+"""Programs of the corpus with pointers to variables that end with their call."""
+
+
+def compare_program(program: lang_corpus.Program, refused: Counter[str]) -> None:
+    source = Source(program.name, program.text)
+    image = compile_sources([source], runnable=True, dialect=program.dialect, lint=False).image
+    assert image is not None
+
+    def write(plc: Plc, number: int) -> None:
+        for item in lang_check._at(program.written, number + 1):
+            place = lang_check._place(plc, item)
+            plc.write(place, lang_check._value(place, item.value))
+
+    try:
+        compare_scans(image, program.cycle_ns, program.scans, BUDGET, write)
+    except Refused as reason:
+        refused[reason.reason] += 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", [pytest.param(list(inside), id=name)
+                                    for name, inside in groupby(ENCODED, lambda p: p.path.parent.name)])
+def test_programs_of_the_corpus(folder: list[lang_corpus.Program]) -> None:
+    refused: Counter[str] = Counter()
+    go_through((f"{p.name}:{p.line} {p.title}", partial(compare_program, p, refused)) for p in folder)
+    assert refused.total() <= REFUSED_AT_MOST, refused
+    assert set(refused) <= {"a pointer to a variable that ends with its call cannot be followed"}
+
+
+@pytest.mark.slow
+def test_random_programs() -> None:
+    refused = 0
+    for seed in range(20 * times(20)):
+        text, _ = st_programs.text_of(st_programs.made(seed))
+        image = compile_text(text).image
+        if image is not None:
+            try:
+                compare_scans(image, CYCLE_NS, 3, st_programs.budget(image))
+            except Refused:
+                refused += 1
+    assert refused <= 4 * times(20)
+
+
+def test_an_interlock_with_random_inputs() -> None:
+    image = compile_files([data_folder("examples") / "classics" / "interlock.st"], runnable=True).image
+    assert image is not None
+    compare_scans(image, CYCLE_NS, 8, BUDGET, partial(pressed, Random(2)))

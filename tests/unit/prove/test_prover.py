@@ -1,0 +1,215 @@
+"""Verdicts about small programs: proofs, shortest runs, what is undecided, and what limits an answer."""
+
+from __future__ import annotations
+
+import pytest
+
+from fbvm.base.data import data_folder
+from fbvm.code.compiler import compile_files, compile_text
+from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
+from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.prover import Limits, prove
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Verdict
+from fbvm.prove.runs import repeated
+
+FEW = Limits(simulated_scans=200, scans=120)
+
+
+def image_of(text: str) -> Image:
+    image = compile_text(text).image
+    assert image is not None
+    return image
+
+
+def program(body: str, variables: str = "") -> Image:
+    return image_of(f"PROGRAM Main\nVAR\n    In AT %IX0.0 : BOOL; Other AT %IX0.1 : BOOL; Level AT %IW2 : INT;\n{variables}\n"
+                    f"END_VAR\n{body}\nEND_PROGRAM\n")  # fmt: skip
+
+
+def asked(image: Image, kind: str, text: str = "", *assumed: str, limits: Limits = FEW) -> Verdict:
+    verdict = prove(image, Question(kind, text, assumed), limits)
+    if verdict.run is not None:
+        plc = Plc(image, verdict.run.cycle_ns)
+        repeated(plc, verdict.run)
+        assert plc.scans == verdict.run.scans
+        assert (plc.trap is None) == (kind != NO_TRAP)
+    return verdict
+
+
+def classic(name: str) -> Image:
+    image = compile_files([data_folder("examples") / "classics" / f"{name}.st"], runnable=True).image
+    assert image is not None
+    return image
+
+
+COUNTER = "IF In THEN n := n + 1; ELSE n := 0; END_IF\nQ := n >= 5;"
+COUNTED = "n : INT; Q : BOOL;"
+
+
+def test_two_outputs_of_an_interlock_are_never_on_together() -> None:
+    verdict = asked(classic("interlock"), NEVER, "Main.Left AND Main.Right")
+    assert (verdict.word, verdict.how, verdict.notes) == ("proved", "by induction over 1 scan", ())
+
+
+def test_the_shortest_run_that_breaks_a_property_is_found_and_simple() -> None:
+    verdict = asked(program(COUNTER, COUNTED), NEVER, "Main.Q")
+    assert verdict.run is not None
+    writes = [{place.name: value for place, value in scan.items()} for scan in verdict.run.writes]
+    assert (verdict.word, writes) == ("broken", [{"Main.In": True}, {}, {}, {}, {}])
+
+
+def test_reach_finds_the_shortest_inputs() -> None:
+    verdict = asked(program(COUNTER, COUNTED), REACH, "Main.n = 3")
+    assert verdict.run is not None
+    assert (verdict.word, verdict.run.scans, verdict.is_good) == ("reached", 3, True)
+
+
+def test_what_is_never_reached_is_said_to_be_unreachable() -> None:
+    verdict = asked(program(COUNTER.replace("5;", "5; IF n > 9 THEN n := 0; END_IF"), COUNTED), REACH, "Main.n = 11")
+    assert (verdict.word, verdict.is_good) == ("unreachable", False)
+
+
+@pytest.mark.slow
+def test_a_property_that_needs_an_invariant_is_proved() -> None:
+    verdict = asked(classic("batch_sequence"), NEVER, "Main.Inlet AND Main.Outlet")
+    assert verdict.word == "proved"
+    assert "invariants" in verdict.how
+
+
+@pytest.mark.slow
+def test_without_a_proof_the_scans_without_a_run_are_told() -> None:
+    deep = program("IF In THEN n := n + 1; ELSE n := 0; END_IF", "n : DINT;")
+    verdict = asked(deep, NEVER, "Main.n = 100000", limits=Limits(simulated_scans=10, scans=40))
+    assert (verdict.word, verdict.scans) == ("undecided", 40)
+    assert verdict.how == "no run of 40 scans gets there, and no proof was found that none ever does"
+
+
+def test_no_time_at_all_is_undecided() -> None:
+    image = program(COUNTER, COUNTED)
+    verdict = asked(image, NEVER, "Main.n = 30000", limits=Limits(simulated_scans=10, expired=lambda: True))
+    assert (verdict.word, verdict.scans) == ("undecided", 0)
+    assert verdict.how.startswith("the time is over")
+
+
+def test_division_by_an_input_traps() -> None:
+    verdict = asked(program("n := 10 / Level;", "n : INT;"), NO_TRAP)
+    assert verdict.run is not None and verdict.run.trap is not None
+    assert (verdict.word, verdict.run.trap.code, verdict.run.scans) == ("broken", "R0101", 1)
+
+
+def test_an_index_that_is_limited_never_traps() -> None:
+    image = program("n := LIMIT(0, Level, 9); a[n] := a[n] + 1;", "a : ARRAY [0..9] OF INT; n : INT;")
+    assert asked(image, NO_TRAP).word == "proved"
+
+
+def test_an_index_that_is_one_too_large_traps() -> None:
+    image = program("n := LIMIT(0, Level, 10); a[n] := a[n] + 1;", "a : ARRAY [0..9] OF INT; n : INT;")
+    verdict = asked(image, NO_TRAP)
+    assert verdict.run is not None and verdict.run.trap is not None
+    assert (verdict.word, verdict.run.trap.code) == ("broken", "R0102")
+
+
+def test_an_assumption_leaves_runs_out() -> None:
+    image = program("n := 10 / Level;", "n : INT;")
+    verdict = asked(image, NO_TRAP, "", "Main.Level > 0")
+    assert (verdict.word, verdict.notes) == ("proved", ("assumed: Main.Level > 0",))
+
+
+def test_assumptions_that_no_run_keeps_are_refused() -> None:
+    with pytest.raises(Refused, match="nothing to prove"):
+        asked(program(COUNTER, COUNTED), NEVER, "Main.Q", "Main.In AND NOT Main.In")
+
+
+def test_a_word_is_free_if_it_is_named() -> None:
+    image = program("Q := w > 5;", "w AT %D100 : INT; Q : BOOL;")
+    assert prove(image, Question(NEVER, "Main.Q"), FEW).word == "proved"
+    verdict = prove(image, Question(NEVER, "Main.Q", free=("D100",)), FEW)
+    assert verdict.word == "broken"
+
+
+def test_a_variable_that_nothing_changes_is_told() -> None:
+    verdict = asked(program("Q := In AND Enabled;", "Q, Enabled : BOOL;"), NEVER, "Main.Q")
+    assert verdict.word == "proved"
+    assert "Main.Q has the same value in every scan: it is no input, and no code changes it" in verdict.notes
+
+
+def test_statements_that_no_run_reaches_are_told() -> None:
+    verdict = asked(program("Q := In;\nIF Mode = 7 THEN\n    Q := FALSE;\nEND_IF", "Q : BOOL; Mode : INT;"), NEVER,
+                    "Main.Q AND NOT Main.In")  # fmt: skip
+    assert verdict.notes == ("no run of 64 scans executes text.st:8",)
+
+
+def rung(contact: str) -> Image:
+    return image_of(f"PROGRAM Main\nVAR Q : BOOL; END_VAR\nLADDER\n{contact}\nOUT Q\nEND_LADDER\nEND_PROGRAM\n")
+
+
+@pytest.mark.parametrize("contact", ["LD P_On", "LDNOT P_Off"])
+def test_what_stands_behind_the_always_on_flag_is_executed(contact: str) -> None:
+    image = rung(contact)
+    verdict = prove(image, Question(REACH, "Main.Q"), FEW)
+    assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 1)
+
+
+def test_the_first_cycle_flag_is_on_in_the_first_scan_only() -> None:
+    image = program("IF First THEN n := n + 1; END_IF", "First AT A200.11 : BOOL; n : INT;")
+    assert prove(image, Question(ALWAYS, "Main.n = 1"), FEW).word == "proved"
+
+
+def test_clock_pulses_follow_the_cycle() -> None:
+    verdict = prove(rung("LD P_0_1s"), Question(REACH, "Main.Q"), FEW)
+    assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 6)
+
+
+def test_a_timer_ends_after_its_time_and_not_before() -> None:
+    image = program("t(IN := In, PT := T#100ms);", "t : TON;")
+    verdict = asked(image, REACH, "Main.t.Q")
+    assert verdict.run is not None
+    assert (verdict.word, verdict.run.scans) == ("reached", 11)
+    assert asked(image, NEVER, "Main.t.Q AND Main.t.ET < T#100ms").word == "proved"
+
+
+def test_tasks_run_at_their_intervals() -> None:
+    image = image_of("""PROGRAM Slow VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+PROGRAM Fast VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+CONFIGURATION C RESOURCE R ON PLC
+TASK S(INTERVAL := T#50ms, PRIORITY := 2); TASK F(INTERVAL := T#10ms, PRIORITY := 1);
+PROGRAM A WITH S : Slow; PROGRAM B WITH F : Fast;
+END_RESOURCE END_CONFIGURATION
+""")
+    verdict = prove(image, Question(REACH, "A.n = 3"), FEW)
+    assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 11)
+
+
+def test_a_comparison_of_reals_is_taken_for_any_value() -> None:
+    image = program("Q := r > 10.0 AND In; Z := Q AND NOT In;", "r AT %ID4 : REAL; Q, Z : BOOL;")
+    verdict = asked(image, NEVER, "Main.Q AND NOT Main.In")
+    assert verdict.word == "proved"
+    broken = asked(program("Q := r * 0.0 > 1.0;", "r AT %ID4 : REAL; Q : BOOL;"), NEVER, "Main.Q")
+    assert broken.word == "undecided"
+    assert broken.notes[0].startswith("taken for any value: ")
+
+
+def test_a_program_in_the_loop_of_a_pointer_to_a_local_is_refused_with_its_line() -> None:
+    image = image_of("""FUNCTION Look : INT
+VAR local : INT; p : POINTER TO INT; END_VAR
+local := 3; p := ADR(local); Look := p^;
+END_FUNCTION
+PROGRAM Main VAR n : INT; END_VAR n := Look(); END_PROGRAM
+""")
+    with pytest.raises(Refused, match="ends with its call") as refused:
+        prove(image, Question(NEVER, "Main.n > 3"), FEW)
+    assert image.sites[refused.value.site].line == 3
+
+
+def test_inputs_of_an_enumeration_have_its_values_only() -> None:
+    image = image_of("""TYPE Colour : (Red, Green, Blue); END_TYPE
+PROGRAM Main
+VAR_INPUT c : Colour; END_VAR
+VAR n : INT; END_VAR
+CASE c OF Red: n := 1; Green: n := 2; Blue: n := 3; ELSE n := 99; END_CASE
+END_PROGRAM
+""")
+    verdict = prove(image, Question(NEVER, "Main.n = 99"), FEW)
+    assert verdict.word == "proved"
+    assert verdict.notes and "executes" in verdict.notes[0]
