@@ -97,7 +97,7 @@ def test_conditions_that_are_drawn_with_contacts_and_blocks() -> None:
                  value(9, "T#20ms"), RAIL.replace('localId="1"', 'localId="8"'), contact(10, "8", "go"),
                  block(11, "TON", "IN=10 PT=9", "Q,ET", "t"), declared=variable("go") + variable("x") + variable("t", "TON"))
     assert made.errors == []
-    assert states(made, "x", ["", "go=1", "", "", ""]) == ["0", "0", "0", "1", "1"]
+    assert states(made, "x", ["", "go=1", "", "", ""]) == ["0", "0", "0", "0", "1"]
 
 
 @each_of("body", ["go AND NOT stop", ":= go AND NOT stop;", "leave := go AND NOT stop;",
