@@ -125,8 +125,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
                    integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
                    bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
-                   initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True, instances_are_values=True,
-                   action_inputs=True)
+                   initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
+                   instances_are_values=True, action_inputs=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

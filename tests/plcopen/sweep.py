@@ -2,9 +2,9 @@
 
 `python tests/plcopen/sweep.py DIR [DIALECT]` prints the counts, and the causes that kept documents from a stage.  A document
 counts as imported if nothing of its program is lost, as checked if the sources have no errors, as run if 50 scans with inputs
-at random stop at no trap, and as equal if the document that is made of the sources gives the same values in every scan.  A document
-without a program that runs is compiled, and goes no further.  Documents belong to whoever wrote them: they are never part of
-this repository."""
+at random stop at no trap, and as equal if the document that is made of the sources gives the same values in every scan.  A
+document without a program that runs is compiled, and goes no further.  Documents belong to whoever wrote them: they are never
+part of this repository."""
 
 from __future__ import annotations
 

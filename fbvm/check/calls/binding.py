@@ -52,8 +52,8 @@ def bind_inputs(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None
     inputs = {fold(variable.name) for variable in pou.parameters("VAR_INPUT")}
     for argument in call.arguments:
         if argument.name is None or fold(argument.name.text) not in inputs:
-            scope.error("S0402", argument, f"an ACTION of {pou.name} takes inputs of {pou.name}, by name",
-                        scope.project.choices(argument.name.text, inputs) if argument.name is not None else "write input := value")
+            hint = scope.project.choices(argument.name.text, inputs) if argument.name is not None else "write input := value"
+            scope.error("S0402", argument, f"an ACTION of {pou.name} takes inputs of {pou.name}, by name", hint)
         else:
             _named(scope, argument, pou, bound, given)
 

@@ -7,7 +7,7 @@ Divergences, convergences and jumps only pass wires on: the textual form has non
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from fbvm.base.digits import whole_number
@@ -23,6 +23,12 @@ from fbvm.syntax.tree.sfc import QUALIFIERS
 PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
 COMPUTE = "COMPUTE_FUNCTION_BLOCKS"
 """The action that calls the blocks which conditions need (Beremiz)."""
+ENTRY, ACTIVE, EXIT = "entry", "active", "exit"
+QUALIFIER = {ENTRY: "P1", ACTIVE: "N", EXIT: "P0"}
+STEP_ACTIONS = {"a6b08bd8-b696-47e3-9cbf-7408b61c9ff8": ENTRY, "700a583f-b4d4-43e4-8c14-629c7cd3bec8": ACTIVE,
+                "a2621e18-7de3-4ea6-ae6d-89e9e0b7befd": EXIT}
+"""Attributes of CODESYS's data at a step (`sfc/element`) that name actions; read off published projects, whose actions are
+called accordingly."""
 _ASSIGNED = re.compile(r"(?s)\s*([^\W\d]\w*)?\s*:=\s*(.*?);?\s*\Z")
 
 
@@ -126,8 +132,27 @@ class Chart:
         associations = []
         for number, action in enumerate(block.all("action") if block else [], 1):
             associations.append(self._association(step, action, number))
-        associations += [f"{compute}(S);"] if compute else []
+        associations += [*self._step_actions(step), *([f"{compute}(S);"] if compute else [])]
         return [f"{word} {self._name(step)}:", *(f"    {text}" for text in associations), "END_STEP"]
+
+    def _step_actions(self, step: Element) -> Iterator[str]:
+        """The associations for the entry, active and exit action of a step (CODESYS).  The active action is called while the
+        step is active, and not once more when it is left."""
+        added = step.one("addData")
+        listed = (part for data in (added.all("data") if added else ()) if data.get("name").endswith("/sfc/element")
+                  for part in data.walk() if part.name == "attribute")
+        for attribute in listed:
+            kind, called = STEP_ACTIONS.get(attribute.get("guid"), ""), attribute.text.strip()
+            if not kind or not called:
+                continue
+            name = self._free(f"{self._name(step)}_{kind}")
+            call = f"{called}();" if kind != ACTIVE else f"IF {self._name(step)}.X THEN {called}(); END_IF;"
+            lines = [f"ACTION {name}:", call, "END_ACTION"]
+            if kind == EXIT:
+                self.actions[:0] = lines  # a step is left in front of what follows being entered
+            else:
+                self.actions += lines
+            yield f"{name}({QUALIFIER[kind]});"
 
     def _association(self, step: Element, action: Element, number: int) -> str:
         qualifier = action.get("qualifier") or "N"

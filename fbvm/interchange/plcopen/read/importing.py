@@ -34,7 +34,8 @@ _DECLARED_TWICE, _HEAD = "xmlns:ns1=", 4_000
 def import_xml(document: Path | str | bytes, name: str = "", order: str = "") -> Imported:
     """Import a file by its path, or the bytes of one, whose `name` messages then use.
 
-    `order` says in which order drawings are evaluated, one of `fbvm.ORDERS`; without it, as the tool does it that wrote the
+    `order` says in which order drawings are evaluated, "network", "beremiz1", "document",
+    "position" or "ids"; without it, as the tool does it that wrote the
     document.  Never raises for what the document contains; the same document gives the same files."""
     if isinstance(document, bytes):
         found = parse_markup(document, name or "document.xml")

@@ -32,7 +32,8 @@ IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
 OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "itf", "namespace"}
 """Last words of the names of `addData` with object-oriented parts of programs (CODESYS)."""
-READ = {"pou", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location", "action"}
+READ = {"pou", "element", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location",
+        "action"}
 """Last words of the names of `addData` whose contents are taken over."""
 SETTINGS = {"objectid", "tasksettings", "projectinformation", "projectstructure", "fbdcalltype", "fbdelementtype",
             "interfaceasplaintext", "buildproperties"}
