@@ -45,6 +45,8 @@ class Dialect:
     """How a text that is no literal is converted: "leading", "whole", or "" for a trap."""
     whole_powers: bool = False
     no_open_inputs: bool = False
+    instances_are_values: bool = False
+    action_inputs: bool = False
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
@@ -94,6 +96,12 @@ QUESTIONS = {
     "no_open_inputs": ("ARRAY [*] as VAR_INPUT of a FUNCTION",
                        "taken: the function reads the argument where it lies, without a copy, and cannot write it",
                        "refused (S0903); VAR_IN_OUT takes it"),
+    "instances_are_values": ("VAR_INPUT t : TON of a FUNCTION_BLOCK or PROGRAM: an instance as an input",
+                             "read where the argument lies: its outputs are read, it is not called",
+                             "an instance of the block's own, which may be called; an argument is copied into it in front of "
+                             "the body"),
+    "action_inputs": ("motor.Stop(now := TRUE): an ACTION of an instance, called with inputs of the instance", "an error",
+                      "the inputs are written, then the action is called"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
                   "an error that names the conversion",
                   "cut to the width; without its fraction, the nearest number that there is; 1 and 0; as it is"),
@@ -117,13 +125,15 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
                    integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
                    bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
-                   initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True)
+                   initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
+                   instances_are_values=True, action_inputs=True)
 _ROWS = (
     STANDARD,
     _CODESYS,
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does"),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
-            real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading", no_open_inputs=True),
+            real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading", no_open_inputs=True,
+            instances_are_values=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors", ("codesys/blocks",),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True),

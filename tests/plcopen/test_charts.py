@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 import pytest
-from drawings import RAIL, block, codes, contact, imported, pou, states, value, variable, wires
+from drawings import RAIL, block, codes, contact, document, imported, plc, pou, states, value, variable, wires
 from rows import each_of
 
-from fbvm.interchange.plcopen.read.importing import Imported
+from fbvm.interchange.plcopen.read.charts import STEP_ACTIONS
+from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+
+CODESYS = "http://www.3s-software.com/plcopenxml/"
 
 
 def step(number: int, name: str, sources: str = "", first: bool = False) -> str:
@@ -97,7 +102,7 @@ def test_conditions_that_are_drawn_with_contacts_and_blocks() -> None:
                  value(9, "T#20ms"), RAIL.replace('localId="1"', 'localId="8"'), contact(10, "8", "go"),
                  block(11, "TON", "IN=10 PT=9", "Q,ET", "t"), declared=variable("go") + variable("x") + variable("t", "TON"))
     assert made.errors == []
-    assert states(made, "x", ["", "go=1", "", "", ""]) == ["0", "0", "0", "1", "1"]
+    assert states(made, "x", ["", "go=1", "", "", ""]) == ["0", "0", "0", "0", "1"]
 
 
 @each_of("body", ["go AND NOT stop", ":= go AND NOT stop;", "leave := go AND NOT stop;",
@@ -153,3 +158,114 @@ def test_a_condition_in_an_instruction_list() -> None:
                  negated, jump(6, "5", "idle"), declared="go done x")
     assert made.errors == []
     assert states(made, "x", ["go=1 done=1", "done=0", "done=1"]) == ["0", "1", "1"]
+
+
+def phases(made: Imported, name: str, scans: int) -> list[int]:
+    """How many scans a BOOL variable stayed as it was, in each of its states; the last one is not over."""
+    machine = plc(made)
+    machine.cycle_ns = 20_000_000
+    seen = []
+    for _ in range(scans):
+        machine.scan()
+        seen.append(machine.read(f"Main.{name}"))
+    return [len(list(group)) for _, group in groupby(seen)][:-1]
+
+
+LIGHT = (step(1, "red", first=True), transition(2, "1", wires("11.Q")), step(3, "green", "2"), transition(4, "3", wires("12.Q")),
+         jump(5, "4", "red"), actions(7, "3", does("x")), value(8, "red.X"), value(9, "T#100ms"), value(10, "green.X"),
+         block(11, "TON", "IN=8 PT=9", "Q,ET", "t1"), block(12, "TON", "IN=10 PT=9", "Q,ET", "t2"))
+TIMERS = variable("x") + variable("t1", "TON") + variable("t2", "TON")
+
+
+def test_timers_that_are_wired_to_transitions_run_in_every_scan() -> None:
+    made = chart(*LIGHT, declared=TIMERS)
+    assert made.errors == []
+    assert phases(made, "x", 60) == [6] * 9
+
+
+def test_a_timer_in_the_diagram_of_a_named_transition_runs_in_every_scan() -> None:
+    def body(number: int, name: str) -> str:
+        drawn = value(1, f"{name}.X") + value(2, "T#100ms") + block(3, "TON", "IN=1 PT=2", "Q,ET", f"t{number}") \
+            + f'<outVariable localId="4">{wires("3.Q")}<expression>after_{name}</expression></outVariable>'
+        return f'<transition name="after_{name}"><body><FBD>{drawn}</FBD></body></transition>'
+
+    made = chart(step(1, "red", first=True), transition(2, "1", does("after_red")), step(3, "green", "2"),
+                 transition(4, "3", does("after_green")), jump(5, "4", "red"), actions(7, "3", does("x")), declared=TIMERS,
+                 more=f"<transitions>{body(1, 'red')}{body(2, 'green')}</transitions>")
+    assert made.errors == []
+    assert phases(made, "x", 60) == [6] * 9
+
+
+def test_a_function_in_front_of_a_transition_is_one_scan_late_as_beremiz_has_it() -> None:
+    text = document(pou("".join((step(1, "s", first=True), transition(2, "1", wires("5")), step(3, "e", "2"),
+                                 actions(4, "3", does("x")), value(6, "n"), value(7, "INT#1"),
+                                 block(5, "GT", "IN1=6 IN2=7", "OUT"))),
+                        variable("x") + variable("n", "INT"), language="SFC"))
+    seen = ["", "n=2", "", ""]
+    assert states(import_xml(text), "x", seen) == ["0", "1", "1", "1"]
+    assert states(import_xml(text, order="document"), "x", seen) == ["0", "0", "1", "1"]
+
+
+def acting(*inner: str, main: str, declared: str) -> Imported:
+    """A chart that runs the chart of its action Sub."""
+    named = f'<actions><action name="Sub"><body><SFC>{"".join(inner)}</SFC></body></action></actions>'
+    return chart(main, declared=declared, more=named)
+
+
+def test_a_variable_is_set_by_one_chart_and_reset_by_another() -> None:
+    made = acting(step(1, "a", first=True), transition(2, "1", inline("back")), step(3, "b", "2"),
+                  actions(4, "3", f"{does('x')}|qualifier=\"R\""), transition(5, "3", inline("NOT back")), jump(6, "5", "a"),
+                  main=step(1, "idle", first=True) + actions(2, "1", does("Sub")) + transition(3, "1", inline("go"))
+                  + step(4, "on", "3") + actions(5, "4", f"{does('x')}|qualifier=\"S\"", does("Sub"))
+                  + transition(6, "4", inline("NOT go")) + jump(7, "6", "idle"), declared="go back x")
+    assert made.errors == []
+    assert states(made, "x", ["", "go=1", "go=0", "back=1", "back=0", "go=1"]) == ["0", "1", "1", "0", "0", "1"]
+
+
+def test_steps_of_two_charts_may_have_one_name_and_each_flag_is_of_its_own() -> None:
+    made = acting(step(1, "Init", first=True), transition(2, "1", inline("Init.X AND go")), step(3, "b", "2"),
+                  actions(4, "3", does("y")),
+                  main=step(1, "Init", first=True) + actions(2, "1", does("Sub")) + transition(3, "1", inline("Init.X AND leave"))
+                  + step(4, "e", "3") + actions(5, "4", does("x")), declared="go leave x y")
+    assert made.errors == []
+    assert states(made, "x y", ["", "go=1", "leave=1"]) == ["0 0", "0 1", "1 1"]
+
+
+def test_the_actions_of_a_step_in_codesys_run_when_it_is_entered_active_and_left() -> None:
+    guids = {kind: guid for guid, kind in STEP_ACTIONS.items()}
+    listed = "".join(f'<attribute guid="{guids[kind]}">{name}</attribute>'
+                     for kind, name in (("entry", "In"), ("active", "Is"), ("exit", "Out")))
+    added = f'<addData><data name="{CODESYS}sfc/element"><attributes>{listed}</attributes></data></addData>'
+    bodies = "".join(f'<action name="{name}"><body><ST><xhtml:p>{text}</xhtml:p></ST></body></action>'
+                     for name, text in (("In", "a := a + 1;"), ("Is", "b := b + 1;"), ("Out", "c := c + 1;")))
+    entered = step(3, "e", "2").replace("</step>", f"{added}</step>")
+    made = chart(step(1, "s", first=True), transition(2, "1", inline("go")), entered,
+                 transition(4, "3", inline("NOT go")), jump(5, "4", "s"), more=f"<actions>{bodies}</actions>",
+                 declared=variable("go") + variable("a", "INT") + variable("b", "INT") + variable("c", "INT"))
+    assert codes(made) == []
+    assert states(made, "a b c", ["", "go=1", "", "go=0", ""]) == ["0 0 0", "1 1 0", "1 2 0", "1 2 1", "1 2 1"]
+
+
+def test_a_step_calls_an_action_of_an_instance_after_a_time() -> None:
+    block_of = '<actions><action name="Stop"><body><ST><xhtml:p>stops := stops + 1;</xhtml:p></ST></body></action></actions>'
+    motor = pou("stops := stops;", f"<localVars>{variable('stops', 'INT')}</localVars>", "functionBlock", "Drive",
+                "ST").replace("<ST>", "<ST><xhtml:p>").replace("</ST>", "</xhtml:p></ST>", 1).replace("</interface>",
+                                                                                                   f"</interface>{block_of}")
+    main = pou(step(1, "s", first=True) + actions(2, "1", f"{does('Motor.Stop')}|qualifier=\"D\" duration=\"T#20ms\"")
+               + transition(3, "1", inline("FALSE")) + jump(4, "3", "s"), variable("Motor", "Drive"), language="SFC")
+    made = import_xml(document(main, motor))
+    assert made.errors == []
+    machine = plc(made)
+    seen = []
+    for _ in range(5):
+        machine.scan()
+        seen.append(machine.read("Main.Motor.stops"))
+    assert seen == [0, 0, 1, 2, 3]
+
+
+@each_of("text", ["a AND NOT b;", "a AND NOT b ;;", "a\n AND NOT b;\n"])
+def test_a_condition_that_ends_with_a_semicolon(text: str) -> None:
+    beside = chart(step(1, "s", first=True), transition(2, "1", wires("9")), step(3, "e", "2"), actions(4, "3", does("x")),
+                   value(9, text), declared="a b x")
+    assert beside.errors == []
+    assert states(beside, "x", ["a=1 b=1", "b=0"]) == ["0", "1"]

@@ -46,6 +46,18 @@ def bind(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
                     f"pass a variable: {missing[0].name} := ...")
 
 
+def bind_inputs(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
+    """Match the arguments of a call of an ACTION with the inputs of its POU `pou`; report those that do not fit."""
+    given: dict[str, tree.Node] = {}
+    inputs = {fold(variable.name) for variable in pou.parameters("VAR_INPUT")}
+    for argument in call.arguments:
+        if argument.name is None or fold(argument.name.text) not in inputs:
+            hint = scope.project.choices(argument.name.text, inputs) if argument.name is not None else "write input := value"
+            scope.error("S0402", argument, f"an ACTION of {pou.name} takes inputs of {pou.name}, by name", hint)
+        else:
+            _named(scope, argument, pou, bound, given)
+
+
 def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument], named: Sequence[tree.Argument], pou: Pou,
                 bound: PouCall, given: dict[str, tree.Node]) -> None:
     names = {fold(a.name.text) for a in named if a.name is not None}
@@ -59,8 +71,7 @@ def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument
     for argument, variable in zip(arguments, parameters, strict=False):
         assert argument.value is not None
         given[fold(variable.name)] = argument
-        if variable.kind != "VAR_INPUT" or not is_block(variable.type):
-            _pass(scope, argument, variable, bound)
+        _pass(scope, argument, variable, bound)
     open_inputs = [v.name for v in parameters[len(arguments):] if v.kind == "VAR_INPUT" and not v.explicit]
     if open_inputs and not named:
         scope.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
@@ -92,8 +103,6 @@ def _named(scope: Scope, argument: tree.Argument, pou: Pou, bound: PouCall, give
         arrow = "=>" if variable.kind == "VAR_OUTPUT" else ":="
         scope.error("S0402", argument, f"{variable.name} is {_described(variable)}: write {variable.name} {arrow} ...")
     elif argument.value is not None:
-        if variable.kind == "VAR_INPUT" and is_block(variable.type):
-            return  # refused where it is declared
         _pass(scope, argument, variable, bound)
 
 
@@ -121,6 +130,9 @@ def _pass(scope: Scope, argument: tree.Argument, variable: Variable, bound: PouC
         if fold(variable.name) == "EN":
             if scope.fit(value, BOOL, "S0405", "EN"):
                 bound.enable = value
+        elif is_block(variable.type):
+            if _in_out(scope, value, variable):
+                bound.inputs.append((variable, value))
         elif isinstance(variable.type, RefType) and variable.type.follows:
             if references.lend(scope, value, followed(variable.type), "S0405", f"the input {variable.name}"):
                 bound.inputs.append((variable, value))
@@ -158,7 +170,8 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
         return False
     if isinstance(value, ladder.Words):
         value = value.of
-    return variable.constant or writable(scope, value, f"be passed to the {role} {variable.name}")
+    return variable.constant or variable.kind == "VAR_INPUT" or \
+        writable(scope, value, f"be passed to the {role} {variable.name}")
 
 
 def _long_enough(kind: Type, variable: Variable) -> bool:

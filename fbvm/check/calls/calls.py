@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, StructType, Type, fold
 from fbvm.check.calls import generics, standard
-from fbvm.check.calls.binding import bind
+from fbvm.check.calls.binding import bind, bind_inputs
 from fbvm.check.expressions import names, qualified
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
@@ -75,11 +76,15 @@ def action(scope: Scope, callee: tree.Expr) -> tuple[Pou, tree.Expr | None] | No
 
 def _bind_action(scope: Scope, call: tree.Call, found: tuple[Pou, tree.Expr | None]) -> str:
     called, instance = found
-    if call.arguments:
+    bound = PouCall(called, instance)
+    if call.arguments and scope.dialect.action_inputs and instance is not None and called.home is not None:
+        bind_inputs(scope, call, called.home, bound)
+    elif call.arguments:
         scope.error("S0402", call.arguments[0], f"the ACTION {called.tree.name.text} has no parameters",
-                    "write the inputs of its instance first")
+                    "write the inputs of its instance first" +
+                    (f", or take {takers('action_inputs')}" if instance is not None else ""))
     scope.note_call(called, call)
-    scope.facts.calls[call] = PouCall(called, instance)
+    scope.facts.calls[call] = bound
     return ""
 
 

@@ -146,8 +146,8 @@ class _Interface:
             made = make_variable(self.context, declared, name, section, self.pou.source, resolved)
             made.owner = self.pou
             self._pass_by_reference(made, section)
-            if is_block(made.type) and made.kind == "VAR_OUTPUT":
-                self._error("S0901", name, f"an instance as {section.kind} is understood but not "
+            if is_block(made.type) and made.kind == "VAR_OUTPUT" and self.pou.is_function:
+                self._error("S0901", name, f"an instance as {section.kind} of a FUNCTION is understood but not "
                             "executed by this version", "pass it as VAR_IN_OUT")
             self._place(made, declared)
             self._register(made)
@@ -176,9 +176,13 @@ class _Interface:
             return
         if self.scope.dialect.pragmas_act and passes_places(self.pou.source, section):
             made.kind, made.by_reference = "VAR_IN_OUT", True
-        elif isinstance(made.type, AnyType) or is_block(made.type) or self._is_open_input(made):
+        elif isinstance(made.type, AnyType) or self._is_instance_elsewhere(made) or self._is_open_input(made):
             made.kind, made.by_reference = "VAR_IN_OUT", True
             made.constant = not isinstance(made.type, AnyType)
+
+    def _is_instance_elsewhere(self, made: Variable) -> bool:
+        """True for an input that is an instance and reads it where it lies; some dialects copy it into one of the block's own."""
+        return is_block(made.type) and (self.pou.is_function or not self.scope.dialect.instances_are_values)
 
     def _is_open_input(self, made: Variable) -> bool:
         """True for an input ARRAY [*] of a FUNCTION, which reads the argument where it lies and may not write it."""

@@ -74,7 +74,7 @@ class Variable:
     @property
     def role_of_parameter(self) -> str:
         """What the declaration makes of a parameter that stands for its argument: an input or an in-out."""
-        return "input" if self.by_reference else "in-out"
+        return "input" if self.by_reference or self.kind == "VAR_INPUT" else "in-out"
 
     @property
     def hexadecimal(self) -> bool:

@@ -12,12 +12,13 @@ import click
 from fbvm.base.files import SOURCE_BYTES, read_file, write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
-from fbvm.cli.shared.given_sources import imported
+from fbvm.cli.shared.given_sources import is_cx_project
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
 from fbvm.interchange.cx.read.importing import ImportedProject, import_project
 from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.plcopen.read.producer import ORDERS
 
 
 @click.command("import")
@@ -29,14 +30,18 @@ from fbvm.interchange.plcopen.read.importing import Imported, import_xml
 @click.option("--encoding", metavar="NAME", default="", help="The code page of the PC that wrote a .cxp or .cxt, such as cp932; "
               "found out if not given.")
 @click.option("--memory", is_flag=True, help="Of a .cxp or .cxt, take the contents of D, H, W and E as initial values.")
+@click.option("--order", type=click.Choice(list(ORDERS)), help="Of PLCopen XML, in which order "
+              "drawings are evaluated; without it, as the tool that wrote the document does it. `network`: producers in front of "
+              "consumers; `beremiz1`, `document`, `position`: as generators of Beremiz and OpenPLC Editor; `ids`: by number.")
 @click.option("--json", "as_json", is_flag=True, help="Print messages as one JSON object.")
-def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: str, memory: bool, as_json: bool) -> None:
+def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: str, memory: bool, order: str | None,
+            as_json: bool) -> None:
     """Make sources of a project in PLCopen XML, or of CX-Programmer (.cxp, .cxt), and say what could not be taken over.
 
     Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
     blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
-    if imported(file) is None:
-        made: Imported | ImportedProject = import_xml(file)
+    if not is_cx_project(file):
+        made: Imported | ImportedProject = import_xml(file, order=order or "")
     else:
         made = import_project(read_file(file, SOURCE_BYTES), str(file), plc, _encoding(encoding), memory)
     there = [name for name in made.files if os.path.lexists(folder / name)]

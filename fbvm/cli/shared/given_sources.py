@@ -1,4 +1,4 @@
-"""The sources that a command line names: files, and the sources within a project of CX-Programmer."""
+"""The sources that a command line names: files, and the sources within a project of CX-Programmer or in PLCopen XML."""
 
 from __future__ import annotations
 
@@ -12,13 +12,24 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file, reason
 from fbvm.interchange.cx.markup import is_project
 from fbvm.interchange.cx.read.importing import ImportedProject, import_project
+from fbvm.interchange.plcopen.read.importing import Imported, import_xml
 from fbvm.syntax.text import read
 
 SUFFIXES = (".cxp", ".cxt")
 
 
-def imported(path: Path) -> ImportedProject | None:
-    """The sources within a file if it is a project of CX-Programmer, or is called so; None for all others.
+DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
+"""What a document in PLCopen XML has among its first bytes."""
+
+
+def is_cx_project(path: Path) -> bool:
+    """Whether a file is a project of CX-Programmer, or is called so."""
+    return path.suffix.lower() in SUFFIXES or is_project(read_file(path, SOURCE_BYTES))
+
+
+def imported(path: Path) -> ImportedProject | Imported | None:
+    """The sources within a file if it is a project of CX-Programmer, or is called so, or a document in PLCopen XML; None for
+    all others.
 
     The option --resource of the present command chooses a PLC where the project has several.  Ends the verb with status 2 if the
     file cannot be read."""
@@ -29,6 +40,8 @@ def imported(path: Path) -> ImportedProject | None:
         if path.suffix.lower() in SUFFIXES:
             raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
         return None
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and DOCUMENT in data[:HEAD_BYTES]:
+        return _document(data, str(path))
     if path.suffix.lower() not in SUFFIXES and not is_project(data):
         return None
     return _imported(data, str(path), resource)
@@ -37,6 +50,11 @@ def imported(path: Path) -> ImportedProject | None:
 @lru_cache(maxsize=4)
 def _imported(data: bytes, name: str, resource: str | None) -> ImportedProject:
     return import_project(data, name, resource)
+
+
+@lru_cache(maxsize=4)
+def _document(data: bytes, name: str) -> Imported:
+    return import_xml(data, name)
 
 
 def given_sources(paths: Sequence[Path]) -> dict[str, Path | str]:

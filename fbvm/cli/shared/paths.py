@@ -9,7 +9,9 @@ from typing import Any
 
 import click
 
-_HEAD_BYTES = 512
+_HEAD_BYTES = 4_000
+_DOCUMENT = b"plcopen.org/xml/tc6"
+"""What a document in PLCopen XML has among its first bytes: it is taken as the sources within it."""
 _FORMS = (
     ((b"fbvmrec",), "a recording", "`fbvm chart`, `fbvm table` and `fbvm why` look at it, `fbvm replay` does its run again"),
     ((b"fbvmtrc",), "a trace", "`fbvm chart`, `fbvm table` and `fbvm why` look at it"),
@@ -71,6 +73,8 @@ def foreign(path: Path) -> str:
     except OSError:
         return ""
     start = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
+    if start.startswith(b"<") and _DOCUMENT in start:
+        return ""
     row = next((row for row in _FORMS if start.startswith(row[0])), None)
     if row is None and path.suffix.lower() in _SUFFIXES:
         row = _FORMS[_SUFFIXES[path.suffix.lower()]]

@@ -29,6 +29,9 @@ def run(body: BodyContext, call: tree.Call, called: PouCall) -> None:
         _enabled(body, call, called, ())
         return
     instance = body.place(called.instance) if called.instance is not None else Place(("self", 0, ()), BOOL)
+    if called.inputs:
+        instance = body.reusable(instance)
+        _inputs(body, called, instance, body.site(call))
     body.emit(("call", body.program.number(called.pou), instance.address))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fbvm.base.types import fold
-from fbvm.syntax.sfc.context import action_flags
+from fbvm.syntax.sfc.context import Associations, action_flags
 from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.sfc.flags import declared
 from fbvm.syntax.sfc.lowering import ChartLowering
@@ -13,7 +13,7 @@ from fbvm.syntax.sfc.rules import sound
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Action, Block, VarSection
 from fbvm.syntax.tree.node import changed
-from fbvm.syntax.tree.sfc import Sfc, Step, Transition
+from fbvm.syntax.tree.sfc import Association, Sfc, Step, Transition
 
 
 class Charts:
@@ -29,6 +29,10 @@ class Charts:
         self.sections: list[VarSection] = []
         self._users: dict[str, Action | None] = {}
         """By folded name of an action, the action whose chart has an association with it; None for the chart of the body."""
+        self._controls: dict[str, str] = {}
+        """By folded name of an action, the variable that is its control: charts that act on one variable share it."""
+        self._associations: list[tuple[Action | None, Step, Association]] = []
+        """All associations of the POU, with the action whose chart they stand in."""
 
     def body(self, word: Token, body: Block, elements: Sequence[Action | Part]) -> Block:
         """The body of the POU that begins with `word`: the chart if the POU has steps, else `body` as it is."""
@@ -40,6 +44,8 @@ class Charts:
         if word.type == "FUNCTION":
             self.builder.report("S0111", word.start, word.end, "a FUNCTION has no steps: it remembers nothing",
                                 "make it a FUNCTION_BLOCK")
+        for inside, inner in ((None, parts), *charted.items()):
+            self._associations += [(inside, step, one) for step in inner if isinstance(step, Step) for one in step.associations]
         if parts:
             self._alone(body, "in an ACTION of a step, or in a POU of its own")
             body = (self._chart(parts, elements[0].start, elements[-1].end, None),)
@@ -62,10 +68,16 @@ class Charts:
         told = self.builder.diagnostics
         damaged = any(each.severity == "error" and start <= each.start <= end for each in told)
         good = not damaged and sound(steps, transitions, self.builder.report)
+        coded = {fold(each.name.text) for each in self.actions}
         for association in (one for step in steps for one in step.associations):
             name = association.action
-            if self._users.setdefault(fold(name.text), action) is not action:
+            if self._users.setdefault(fold(name.text), action) is not action and fold(name.text) in coded:
                 self.builder.report("S0112", name.start, name.end, f"{name.text} is an action of another chart of this POU", "")
-        made = ChartLowering(self.builder, steps, transitions, self.actions, action, self.flags).sfc(start, end, good)
+        elsewhere: dict[str, Associations] = {}
+        for inside, step, association in self._associations:
+            if inside is not action and fold(association.action.text) not in coded:
+                elsewhere.setdefault(fold(association.action.text), []).append((step, association))
+        made = ChartLowering(self.builder, steps, transitions, self.actions, action, self.flags, self._controls,
+                             elsewhere).sfc(start, end, good)
         self.sections += made.sections
         return made

@@ -27,9 +27,10 @@ class ChartContext:
     """The state of one chart while its elements are lowered; `at` is the offset at which statements are placed."""
 
     def __init__(self, builder: Expressions, steps: Sequence[Step], actions: Iterable[tree.Action],
-                 inside: tree.Action | None, flags: frozenset[str] = frozenset()) -> None:
+                 inside: tree.Action | None, flags: frozenset[str], controls: dict[str, str]) -> None:
         """`builder` makes literals; `actions` are all ACTIONs of the POU; `inside` is the action that the chart is the body
-        of, None for the body of the POU; `flags` are the flags of CODESYS that the POU declares, folded."""
+        of, None for the body of the POU; `flags` are the flags of CODESYS that the POU declares, folded; `controls` are the
+        controls that charts of the POU have declared so far, by folded name of their action, and grow by those of this one."""
         self.builder = builder
         self.steps = steps
         self.actions = {fold(action.name.text): action for action in actions}
@@ -40,8 +41,7 @@ class ChartContext:
         """Variables that last from call to call, by name."""
         self.temporaries: dict[str, VarDecl] = {}
         """Variables that live during one call, by name."""
-        self._spellings: dict[str, str] = {}
-        """By folded name of an action, its first spelling."""
+        self._controls = controls
 
     # --- variables ---
 
@@ -71,7 +71,11 @@ class ChartContext:
 
     def control(self, action: Name) -> NameRef:
         """The instance of CONTROL for an action."""
-        return self.keep(f"${self._spellings.setdefault(fold(action.text), action.text)} control", CONTROL)
+        known = self._controls.get(fold(action.text))
+        if known is not None:
+            return self.name(known)
+        self._controls[fold(action.text)] = f"${action.text} control"
+        return self.keep(f"${action.text} control", CONTROL)
 
     # --- statements and expressions ---
 

@@ -33,10 +33,13 @@ class ChartLowering(ChartContext):
     """Writes the statements of one chart."""
 
     def __init__(self, builder: Expressions, steps: Sequence[Step], transitions: Sequence[Transition],
-                 actions: Iterable[tree.Action], inside: tree.Action | None, flags: frozenset[str] = frozenset()) -> None:
-        """As ChartContext, with the transitions of the chart."""
-        super().__init__(builder, steps, actions, inside, flags)
+                 actions: Iterable[tree.Action], inside: tree.Action | None, flags: frozenset[str], controls: dict[str, str],
+                 elsewhere: dict[str, Associations]) -> None:
+        """As ChartContext, with the transitions of the chart, and the associations of other charts of the POU by folded name of
+        the BOOL variable that is their action."""
+        super().__init__(builder, steps, actions, inside, flags, controls)
         self.transitions = transitions
+        self.elsewhere = elsewhere
         self.named = {fold(step.name.text): step for step in steps}
         self.is_called_often = inside is not None
 
@@ -135,7 +138,8 @@ class ChartLowering(ChartContext):
         for name, pairs in used.items():
             self.at = pairs[0][1].start
             yield from self._wake_for_actions(pairs)
-            inputs = self._control_inputs(pairs, name in self.actions)
+            lasting = [pair for pair in self.elsewhere.get(name, ()) if pair[1].qualifier not in PULSES]
+            inputs = self._control_inputs([*pairs, *lasting], name in self.actions)
             arguments = tuple(tree.Argument(self.at, self.at, ":=", Name(self.at, self.at, pin), value)
                               for pin, value in inputs.items())
             control = self.control(pairs[0][1].action)

@@ -3,17 +3,22 @@ statements, charts in their textual form."""
 
 from __future__ import annotations
 
-from fbvm.interchange.plcopen.read.charts import Chart, NotImportable
+from fbvm.interchange.plcopen.read.accesses import accesses, swapped
+from fbvm.interchange.plcopen.read.charts import Chart
+from fbvm.interchange.plcopen.read.conditions import NotImportable
 from fbvm.interchange.plcopen.read.diagram import Diagram, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading
-from fbvm.interchange.plcopen.read.networks import Network, networks
+from fbvm.interchange.plcopen.read.networks import RAILS, Network, networks
+from fbvm.interchange.plcopen.read.producer import GENERATED, GIVEN, ORDERS
 from fbvm.interchange.plcopen.read.rung_steps import rung_steps
 from fbvm.interchange.plcopen.read.scope import Scope
+from fbvm.interchange.plcopen.read.sequence import sequence
 from fbvm.interchange.plcopen.read.spans import divided
 from fbvm.interchange.plcopen.read.statements import Statements
 from fbvm.interchange.plcopen.read.values import Unexecutable
 
 NOTE = "//"
+LEAVING = ("jump", "label", "return")
 
 
 class Bodies:
@@ -23,6 +28,8 @@ class Bodies:
         self.reading, self.pou = reading, pou
         self.scope = Scope(document, pou)
         self.rungs = 0
+        self.actions: list[str] = []
+        """Lines of the ACTIONs that charts of the POU need."""
 
     def lines(self, body: Body) -> list[str]:
         """The lines of a body."""
@@ -39,7 +46,10 @@ class Bodies:
         if len({tuple(p.attributes.values()) for child in body.element.children for p in child.all("position")}) > 1:
             self._lose_places(body)
         try:
-            return Chart(self.reading, self.scope, self.pou, self.lines).lines(body.element)
+            chart = Chart(self.reading, self.scope, self.pou, self.lines)
+            lines = chart.lines(body.element)
+            self.actions += chart.actions
+            return lines
         except NotImportable as refusal:
             self.reading.report("X0203", *refusal.args)
             return [f"{NOTE} the sequential function chart was not taken over: {refusal.args[1]}"]
@@ -51,7 +61,7 @@ class Bodies:
             self._lose_places(body)
         self._check_jumps(diagram)
         ours = any(item.mnemonic for item in diagram.objects)
-        found = networks(diagram)
+        found = self._networks(diagram)
         rungs = [rung_steps(network, self.scope, ours) if body.language == "LD" and not network.broken else None
                  for network in found]
         among = divided(rungs)
@@ -70,6 +80,33 @@ class Bodies:
                 in_ladder = not in_ladder
             lines += rung if rung is not None else self._written(statements, network)
         return [*lines, "END_LADDER"] if in_ladder else lines
+
+    def _networks(self, diagram: Diagram) -> list[Network]:
+        """The networks in the order of the tool that wrote the document; jumps are left out where that tool executes none."""
+        producer = self.reading.producer
+        if producer.generates:
+            for item in diagram.objects:
+                if item.kind in LEAVING:
+                    self.reading.report("X0292", item.element, f"Beremiz and OpenPLC Editor do not execute <{item.kind}>",
+                                        "`--order network` executes it")
+            diagram.objects = [item for item in diagram.objects if item.kind not in LEAVING]
+            if producer.because != GIVEN:
+                self._compare_orders(diagram)
+        return networks(diagram, self.scope, producer.order)
+
+    def _compare_orders(self, diagram: Diagram) -> None:
+        """Warn if the generators that Beremiz and OpenPLC Editor have had evaluate the diagram with another effect."""
+        producer = self.reading.producer
+        items = [item for item in diagram.objects if item.kind not in RAILS]
+        known = accesses(items, self.scope)
+        taken, _ = sequence(items, producer.order)
+        for other in GENERATED:
+            if other != producer.order and (pair := swapped(taken, sequence(items, other)[0], known)):
+                first, second = (f"{item.kind} {item.instance or item.text} ({item.id})" for item in pair)
+                self.reading.report("X0292", pair[1].element, f"{first} is evaluated before {second} by the order "
+                                    f"{producer.order!r}, which was taken since {producer.because}; by {other!r} it is behind",
+                                    f"`--order {other}`, if the PLC is built with {ORDERS[other].partition(':')[0]}")
+                return
 
     def _check_jumps(self, diagram: Diagram) -> None:
         """Report jumps to labels that do not exist."""

@@ -85,7 +85,7 @@ class Calls:
         context = self.context
         if not context.uses[item, "ENO"] and not wanted:
             return None
-        name = context.scope.new(f"Enabled_{item.id}", "BOOL", False)
+        name = context.scope.new(f"Enabled_{item.id}", "BOOL", context.apart)
         arguments.append(f"ENO => {name}")
         return variable(name)
 
@@ -166,13 +166,12 @@ class Calls:
     def _guarded(self, item: Object, wire: Wire, condition: Value, value: Value) -> None:
         """Set a result that is evaluated while `condition` is TRUE, and otherwise keeps its value."""
         context, scope = self.context, self.context.scope
-        sinks = [(sink, pin) for sink in context.network.objects for pin in sink.pins if pin.wires == [wire]]
         if (sink := self._next_sink(item, wire)) is not None:
             context.assign(sink, value, condition)
         elif context.uses[wire.source, wire.pin]:
-            eno = scope.new(f"Enabled_{item.id}", "BOOL", False)
+            eno = scope.new(f"Enabled_{item.id}", "BOOL", context.apart)
             enabled = variable(eno)
-            name = self._result(item, wire, sinks)
+            name = self._result(item, wire)
             context.write(f"{eno} := {condition.text};", enabled.reads)
             context.write(f"IF {eno} THEN {name} := {value.text}; END_IF;", frozenset((name.upper(),)))
             self.guards[item, wire.pin] = enabled
@@ -187,11 +186,10 @@ class Calls:
             return None
         return next((sink for sink, found in self._next_sinks(item) if found == wire), None)
 
-    def _result(self, item: Object, wire: Wire, sinks: list[tuple[Object, Pin]]) -> str:
+    def _result(self, item: Object, wire: Wire) -> str:
         """The name of a new variable that keeps a result from pass to pass."""
         scope = self.context.scope
-        kind = scope.wire_type(wire) or next((found for sink, _ in sinks if sink.kind != "block"
-                                              and (found := scope.type_of(sink.text))), "")
+        kind = scope.wire_type(wire) or self.context.sink_type(wire)
         if not kind:
             raise Unexecutable(item, f"the type of the result of {item.text} is not known", "lead it to a variable")
         return scope.new(f"Result_{item.id}", kind, True)
@@ -241,14 +239,13 @@ class Calls:
         eno = self._eno(item, arguments)
         target = ""
         if wire is not None:
-            sinks = [(sink, pin) for sink in context.network.objects for pin in sink.pins if pin.wires == [wire]]
-            target = self._result(item, wire, sinks)
+            target = self._result(item, wire)
             writes |= {target.upper()}
         call = f"{f'{target} := ' if target else ''}{item.text}({', '.join(arguments)});"
         if eno:
             context.write(f"{eno.text} := FALSE;", eno.reads)
         if condition is not None:
-            enabled = context.scope.new(f"Enable_{item.id}", "BOOL", False)
+            enabled = context.scope.new(f"Enable_{item.id}", "BOOL", context.apart)
             context.write(f"{enabled} := {condition.text};", frozenset((enabled.upper(),)))
             if wire is not None:
                 self.guards[item, wire.pin] = variable(enabled)

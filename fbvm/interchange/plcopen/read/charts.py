@@ -7,26 +7,29 @@ Divergences, convergences and jumps only pass wires on: the textual form has non
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from fbvm.base.digits import whole_number
 from fbvm.interchange.plcopen.markup import Element
-from fbvm.interchange.plcopen.read.diagram import Diagram, Object, placed, read_diagram
+from fbvm.interchange.plcopen.read.conditions import Conditions, NotImportable, feeding
+from fbvm.interchange.plcopen.read.diagram import Diagram, placed, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Pou, Reading
-from fbvm.interchange.plcopen.read.networks import LARGEST, Network, networks
+from fbvm.interchange.plcopen.read.networks import LARGEST
 from fbvm.interchange.plcopen.read.scope import Scope
-from fbvm.interchange.plcopen.read.statements import Statements
 from fbvm.interchange.plcopen.read.types import duration
-from fbvm.interchange.plcopen.read.values import Unexecutable
 from fbvm.syntax.tree.sfc import QUALIFIERS
 
 PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
+COMPUTE = "COMPUTE_FUNCTION_BLOCKS"
+"""The action that calls the blocks which conditions need (Beremiz)."""
+ENTRY, ACTIVE, EXIT = "entry", "active", "exit"
+QUALIFIER = {ENTRY: "P1", ACTIVE: "N", EXIT: "P0"}
+STEP_ACTIONS = {"a6b08bd8-b696-47e3-9cbf-7408b61c9ff8": ENTRY, "700a583f-b4d4-43e4-8c14-629c7cd3bec8": ACTIVE,
+                "a2621e18-7de3-4ea6-ae6d-89e9e0b7befd": EXIT}
+"""Attributes of CODESYS's data at a step (`sfc/element`) that name actions; read off published projects, whose actions are
+called accordingly."""
 _ASSIGNED = re.compile(r"(?s)\s*([^\W\d]\w*)?\s*:=\s*(.*?);?\s*\Z")
-
-
-class NotImportable(Exception):
-    """The chart cannot be taken over; the arguments are an element, a message and a hint."""
 
 
 @dataclass(eq=False)
@@ -44,22 +47,57 @@ class Chart:
     def __init__(self, reading: Reading, scope: Scope, pou: Pou, write: Callable[[Body], list[str]]) -> None:
         self.reading, self.scope, self.pou, self.write = reading, scope, pou, write
         self.actions: list[str] = []
+        """Lines of the ACTIONs that the chart needs, which stand behind those of the POU."""
+        self.conditions = Conditions(reading, scope)
+        self.indirect: dict[str, str] = {}
+        """By text in capitals, the actions that stand for actions and variables of instances."""
+        self.renamed: dict[str, str] = {}
+        """By name in capitals, the new names of steps whose names stand for something else in the POU, too."""
 
     def lines(self, body: Element) -> list[str]:
         """Steps, transitions and inline actions.  Raises NotImportable."""
         self._index(body)
         self._check(body)
         steps = body.all("step")
-        self.scope.taken |= {step.get("name").upper() for step in steps}
+        self._rename(steps)
+        self.scope.taken |= {self._name(step).upper() for step in steps}
         diagram = read_diagram(self.reading, body, chart=True)
         if len(body.children) > LARGEST:
             raise NotImportable(body, f"the chart has more than {LARGEST} elements", "")
         arrows = [self._arrow(transition) for transition in body.all("transition")]
         blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
-        lines = [line for step in steps for line in self._step(step, blocks.get(step.get("localId")))]
-        lines += [line for arrow in sorted(arrows, key=_order(arrows)) for line in self._transition(arrow, diagram)]
+        self.conditions.compute(diagram)
+        ways = [line for arrow in sorted(arrows, key=_order(arrows)) for line in self._transition(arrow, diagram)]
+        compute = self._free(COMPUTE) if self.conditions.statements else ""
+        begin = next(step for step in steps if step.get("initialStep") == "true")
+        lines = [line for step in steps
+                 for line in self._step(step, blocks.get(step.get("localId")), compute if step is begin else "")]
         self._report_unused(diagram)
-        return [*lines, *self.actions]
+        if compute:
+            self.actions += [f"ACTION {compute}:", *self.conditions.statements, "END_ACTION"]
+        self.actions = [self._with_new_names(line) for line in self.actions]
+        return [self._with_new_names(line) for line in (*lines, *ways)]
+
+    def _rename(self, steps: list[Element]) -> None:
+        """Give other names to steps that are called like a variable, an action, or a step of another chart of the POU: in
+        CODESYS each chart has its own names."""
+        for step in steps:
+            name = step.get("name")
+            if name.upper() in self.scope.taken and name.upper() not in self.renamed:
+                self.renamed[name.upper()] = self._free(name)
+                self.reading.count("names of steps that a variable, an action or another chart of the POU has, too, are changed",
+                                   step)
+
+    def _name(self, step: Element) -> str:
+        """What a step is called here."""
+        name = step.get("name")
+        return self.renamed.get(name.upper(), name)
+
+    def _with_new_names(self, line: str) -> str:
+        """A line in which the flags of steps are read by the new names of their steps."""
+        for old, new in self.renamed.items():
+            line = re.sub(rf"(?i)\b{re.escape(old)}\s*\.\s*(?=[XT]\b)", f"{new}.", line)
+        return line
 
     def _index(self, body: Element) -> None:
         """Note the elements by localId, and by localId the elements to which wires lead from each."""
@@ -78,8 +116,7 @@ class Chart:
 
     def _report_unused(self, diagram: Diagram) -> None:
         """Report what is drawn in the chart and feeds no condition of a transition."""
-        conditions = (item for item in diagram.objects if item.kind == "condition")
-        used = {item for condition in conditions for item in _feeding(condition)}
+        used = set(feeding(item for item in diagram.objects if item.kind == "condition"))
         for item in diagram.objects:
             if item not in used and item.kind != "rightPowerRail":
                 self.reading.report("X0203", item.element, f"{item.text or item.kind} belongs to no transition of the chart, "
@@ -87,14 +124,35 @@ class Chart:
 
     # --- steps ---
 
-    def _step(self, step: Element, block: Element | None) -> list[str]:
+    def _step(self, step: Element, block: Element | None, compute: str) -> list[str]:
+        """A step with its actions; `compute` is the action that it stores for the conditions of the chart, if it does."""
         word = "INITIAL_STEP" if step.get("initialStep") == "true" else "STEP"
         if not step.get("name"):
             raise NotImportable(step, "a step has no name", "")
         associations = []
         for number, action in enumerate(block.all("action") if block else [], 1):
             associations.append(self._association(step, action, number))
-        return [f"{word} {step.get('name')}:", *(f"    {text}" for text in associations), "END_STEP"]
+        associations += [*self._step_actions(step), *([f"{compute}(S);"] if compute else [])]
+        return [f"{word} {self._name(step)}:", *(f"    {text}" for text in associations), "END_STEP"]
+
+    def _step_actions(self, step: Element) -> Iterator[str]:
+        """The associations for the entry, active and exit action of a step (CODESYS).  The active action is called while the
+        step is active, and not once more when it is left."""
+        added = step.one("addData")
+        listed = (part for data in (added.all("data") if added else ()) if data.get("name").endswith("/sfc/element")
+                  for part in data.walk() if part.name == "attribute")
+        for attribute in listed:
+            kind, called = STEP_ACTIONS.get(attribute.get("guid"), ""), attribute.text.strip()
+            if not kind or not called:
+                continue
+            name = self._free(f"{self._name(step)}_{kind}")
+            call = f"{called}();" if kind != ACTIVE else f"IF {self._name(step)}.X THEN {called}(); END_IF;"
+            lines = [f"ACTION {name}:", call, "END_ACTION"]
+            if kind == EXIT:
+                self.actions[:0] = lines  # a step is left in front of what follows being entered
+            else:
+                self.actions += lines
+            yield f"{name}({QUALIFIER[kind]});"
 
     def _association(self, step: Element, action: Element, number: int) -> str:
         qualifier = action.get("qualifier") or "N"
@@ -103,8 +161,10 @@ class Chart:
         reference, inline = action.one("reference"), action.one("inline")
         name = reference.get("name").strip() if reference else ""
         if inline is not None and (language := _language(inline)) is not None:
-            name = self._free(f"{step.get('name')}_{number}")
+            name = self._free(f"{self._name(step)}_{number}")
             self.actions += [f"ACTION {name}:", *self.write(Body(language.name, language)), "END_ACTION"]
+        if "." in name:
+            name = self._of_instance(name)
         if not name:
             raise NotImportable(action, f"an action of step {step.get('name')} names nothing", "")
         given = [qualifier]
@@ -113,6 +173,16 @@ class Chart:
         if action.get("indicator"):
             given.append(action.get("indicator"))
         return f"{name}({', '.join(given)});"
+
+    def _of_instance(self, text: str) -> str:
+        """The action that does what `Motor.Stop` says: calls the action of that instance, or gives a BOOL variable of the
+        instance the state that the association has."""
+        known = self.indirect.get(text.upper())
+        if known is None:
+            known = self.indirect[text.upper()] = self._free(text.replace(".", "_"))
+            statement = f"{text}();" if self.scope.names_action(text) else f"{text} := {known}.Q;"
+            self.actions += [f"ACTION {known}:", statement, "END_ACTION"]
+        return known
 
     def _free(self, stem: str) -> str:
         name, number = stem, 1
@@ -147,7 +217,7 @@ class Chart:
         while todo:
             for other in beside(todo.pop(0)):
                 if other.name == "step":
-                    found[other.get("name")] = None
+                    found[self._name(other)] = None
                 elif other.name == "jumpStep":
                     found.update(dict.fromkeys(self._jumped(other)))
                 elif other.name in PASSING and other.get("localId") not in seen:
@@ -160,12 +230,12 @@ class Chart:
         name = jump.get("targetName").upper()
         for element in self.known.values():
             if element.get("name").upper() == name:
-                return [element.get("name")] if element.name == "step" else self._divided(element)
+                return [self._name(element)] if element.name == "step" else self._divided(element)
         raise NotImportable(jump, f"there is no step {jump.get('targetName')} to jump to", "")
 
     def _divided(self, divergence: Element) -> list[str]:
         """The steps directly behind a simultaneous divergence."""
-        return [other.get("name") for other in self.followers.get(divergence.get("localId"), ()) if other.name == "step"]
+        return [self._name(other) for other in self.followers.get(divergence.get("localId"), ()) if other.name == "step"]
 
     def _transition(self, arrow: Arrow, diagram: Diagram) -> list[str]:
         element = arrow.element
@@ -194,7 +264,8 @@ class Chart:
             if language is None:
                 raise NotImportable(inline, "the condition is empty", "")
             return self._bodied(name, Body(language.name, language), negated)
-        return self._drawn(name, element, diagram, negated)
+        expression, lines = self.conditions.drawn(name, element, diagram)
+        return name, expression, lines
 
     def _bodied(self, name: str, body: Body, negated: bool) -> tuple[str, str, list[str]]:
         """A condition that has a body: an expression, with or without `:=`, or statements that assign to its name."""
@@ -204,29 +275,11 @@ class Chart:
             plain = match[2] if match else text.rstrip("; \n")
             if ";" not in plain and ":=" not in plain and (not match or not match[1] or match[1].upper() == name.upper()):
                 return name, _turned(" ".join(plain.split()) or "TRUE", negated), []
+        if body.language in ("LD", "FBD") and (made := self.conditions.named(name, body)):
+            return name, _turned(made, negated), []
         lines = self.write(body)
         turned = "NOT" if body.language == "IL" else f"{name} := NOT {name};"
         return name, "", [*lines, turned] if negated else lines
-
-    def _drawn(self, name: str, element: Element, diagram: Diagram, negated: bool) -> tuple[str, str, list[str]]:
-        """A condition that is drawn: the objects that feed it."""
-        number = element.get("localId")
-        condition = next((item for item in diagram.objects if item.kind == "condition" and item.id == number), None)
-        if condition is None or not condition.inputs[0].connected:
-            raise NotImportable(element, f"transition {number} has no condition", "")
-        condition.text, condition.negated = name, negated
-        part = networks(Diagram(_feeding(condition), []))
-        network = Network([item for one in part for item in one.objects], {wire for one in part for wire in one.cut})
-        if network.broken:
-            raise NotImportable(element, f"the condition of transition {number} was not understood", "")
-        try:
-            lines = Statements(self.reading, self.scope).write(network)
-        except Unexecutable as refusal:
-            item, message, hint = refusal.args
-            raise NotImportable(item.element, message, hint) from None
-        if len(lines) == 1:
-            return name, lines[0].removeprefix(f"{name} := ").removesuffix(";"), []
-        return name, "", lines
 
 
 def _language(body: Element) -> Element | None:
@@ -261,16 +314,3 @@ def _order(arrows: list[Arrow]) -> Callable[[Arrow], tuple[float, tuple[str, ...
         return top[tuple(arrow.sources)], tuple(arrow.sources), _place(arrow.element)[1], arrows.index(arrow)
 
     return key
-
-
-def _feeding(condition: Object) -> list[Object]:
-    """An object and all that feeds it, in the order of writing."""
-    found = {condition}
-    todo = [condition]
-    while todo:
-        for pin in todo.pop().pins:
-            for wire in pin.wires:
-                if wire.source not in found:
-                    found.add(wire.source)
-                    todo.append(wire.source)
-    return sorted(found, key=lambda item: item.place)

@@ -48,6 +48,10 @@ class NetworkContext:
 
     def __init__(self, reading: Reading, scope: Scope) -> None:
         self.reading, self.scope = reading, scope
+        self.generates = reading.producer.generates
+        """Whether drawings are executed as the generator of Beremiz and OpenPLC Editor writes them."""
+        self.apart = False
+        """Whether the statements are executed apart from what reads their values: variables last to the next call then."""
         self._clear()
 
     def _clear(self) -> None:
@@ -60,14 +64,17 @@ class NetworkContext:
         """Variables with the values of outputs in the pass before, for wires that make a loop."""
         self.done: set[Object] = set()
         """Variables that were written before their turn."""
+        self.conditions: dict[Object, str] = {}
+        """The expression of each condition of a transition."""
 
     def begin(self, network: Network) -> None:
         """Begin a network: count the consumers of each output, and declare memories for its loops."""
         self._clear()
         self.network = network
         self.uses = Counter((wire.source, wire.pin) for item in network.objects for pin in item.pins for wire in pin.wires)
-        for consumer, wire in network.cut:
+        for _, wire in network.cut:
             self.uses[wire.source, wire.pin] -= 1
+        for consumer, wire in sorted(network.cut, key=lambda cut: (cut[0].place, cut[1].source.place)):
             self._add_memory(consumer, wire)
 
     # --- values ---
@@ -93,15 +100,18 @@ class NetworkContext:
             value = negation(value)
         if not edge:
             return value
+        if negated and self.generates:
+            self.warn(item, f"negated and {edge}: Beremiz and OpenPLC Editor leave the edge out")
+            return value
         if negated:
             self.warn(item, f"negated and {edge}: it is read as the {edge} edge of the inverse")
         if edge not in ("rising", "falling"):
             raise Unexecutable(item, f"there is no edge {edge!r}", "")
         if self.scope.is_function:
             raise Unexecutable(item, "an edge needs memory, which a function does not have", "make it a function block")
-        if edge == "falling":
+        if edge == "falling" and not self.generates:
             return self._falling_edge(item, value)
-        instance = self.scope.new(f"Edge_{item.id}", "R_TRIG", True)
+        instance = self.scope.new(f"Edge_{item.id}", "F_TRIG" if edge == "falling" else "R_TRIG", True)
         self.write(f"{instance}(CLK := {value.text});", frozenset((instance.upper(),)))
         return Value(f"{instance}.Q", ATOM, frozenset((instance.upper(),)))
 
@@ -142,7 +152,9 @@ class NetworkContext:
         uses = self.uses[wire.source, wire.pin]
         if not self.is_used(wire):
             return
-        if keep and uses > 1 and value.level < ATOM:
+        function = wire.source.kind == "block" and not wire.source.instance
+        if (function and (self.network.rereads or (self.apart and self.generates))) or (
+                keep and uses > 1 and value.level < ATOM and not self._is_reread(wire)):
             value = self.in_variable(wire, value)
         if memory := self.memories.get((wire.source, wire.pin)):
             self.lines.append(f"{memory} := {value.text};")
@@ -159,7 +171,7 @@ class NetworkContext:
                                    "lead it over a variable")
             self.warn(wire.source, "its type is not known, and it is worked out where it is used")
             return value
-        name = self.scope.new(f"{'Power' if kind == 'BOOL' else 'Value'}_{wire.source.id}", kind, False)
+        name = self.scope.new(f"{'Power' if kind == 'BOOL' else 'Value'}_{wire.source.id}", kind, self.apart)
         self.lines.append(f"{name} := {value.text};")
         return variable(name)
 
@@ -171,16 +183,23 @@ class NetworkContext:
     def save_values(self, writes: frozenset[str]) -> None:
         """Put values that were read of the variables `writes` into variables of their own."""
         for held in self.held.values():
-            if held.value.reads & writes:
+            if held.value.reads & writes and not self._is_reread(held.wire):
                 held.value = self.in_variable(held.wire, held.value)
+
+    def _is_reread(self, wire: Wire) -> bool:
+        """Whether each consumer of an output reads the variables that it depends on anew."""
+        item = wire.source
+        return self.network.rereads and (item.kind in ("contact", "inVariable", "inOutVariable") or bool(item.instance))
 
     def _add_memory(self, consumer: Object, wire: Wire) -> None:
         """Declare a variable for the value that a loop brings back from the pass before, unless an instance keeps that value."""
         item = wire.source
-        self.reading.report("X0290", consumer.element, "the wires make a loop: what comes back is the value of the pass before")
-        if item.kind == "inOutVariable" or (item.instance and wire.pin.upper() != "ENO") or (item, wire.pin) in self.memories:
+        if (item, wire.pin) in self.memories:
             return
-        kind = self.scope.wire_type(wire)
+        self.reading.report("X0290", consumer.element, "the wires make a loop: what comes back is the value of the pass before")
+        if item.kind == "inOutVariable" or (item.instance and wire.pin.upper() != "ENO"):
+            return
+        kind = self.scope.wire_type(wire) or self.sink_type(wire)
         if self.scope.is_function or not kind:
             raise Unexecutable(consumer, "the wires make a loop, and nothing in it keeps a value",
                                "lead the wire over a variable")
@@ -192,6 +211,11 @@ class NetworkContext:
             return variable(memory)
         text = f"{item.instance}.{wire.pin}" if item.kind == "block" else item.text
         return written(text, self.scope.roots(text))
+
+    def sink_type(self, wire: Wire) -> str:
+        """The type of a variable to which an output leads; "" if it leads to none."""
+        sinks = (sink for sink in self.network.objects if sink.kind != "block" for pin in sink.pins if pin.wires == [wire])
+        return next((found for sink in sinks if (found := self.scope.type_of(sink.text))), "")
 
     def warn(self, item: Object, message: str) -> None:
         self.reading.report("X0292", item.element, message)

@@ -218,7 +218,8 @@ def _conditions(element: Element, place: int) -> list[Object]:
     points = condition.all("connectionPointIn") if condition else []
     if not points:
         return []
-    made = Object("condition", element.get("localId"), place, inf, inf, 0, "", element, inputs=[Pin("")])
+    negated = condition is not None and _true(condition, "negated")
+    made = Object("condition", element.get("localId"), place, inf, inf, 0, "", element, negated=negated, inputs=[Pin("")])
     for point in points:
         _wire_in(made.inputs[0], point)
     return [made]
@@ -242,7 +243,7 @@ def _number(text: str) -> float:
 
 def _object(reading: Reading, element: Element, place: int) -> Object:
     x, y = placed(element)
-    order = element.get("executionOrderId")
+    order = element.get("executionOrderId") or element.get("executionId")  # the name in TC6 1.x
     made = Object(element.name, element.get("localId"), place, x, y, whole_number(order) if order.isdecimal() else 0,
                   _text(element), element, element.get("instanceName").strip(), _true(element, "negated"), _word(element, "edge"),
                   _word(element, "storage"))
@@ -279,7 +280,8 @@ def _text(element: Element) -> str:
         return element.get(attribute[element.name]).strip()
     inner = element.one({"contact": "variable", "coil": "variable", "comment": "content", "vendorElement": "alternativeText",
                          "error": "content"}.get(element.name, "expression"))
-    return inner.text.strip() if inner else ""
+    text = inner.text.strip() if inner else ""
+    return text.rstrip("; \t\r\n") if element.name in ("inVariable", "contact") else text  # CODESYS lets a condition end so
 
 
 def _merge_in_outs(made: Object) -> None:

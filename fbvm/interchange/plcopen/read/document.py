@@ -11,6 +11,7 @@ from functools import cached_property
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.plcopen.read.producer import NETWORK, Producer
 
 
 @dataclass
@@ -18,6 +19,7 @@ class Reading:
     """The import of one document: its source, and the diagnostics so far; `where` names the POU at work."""
 
     source: Source
+    producer: Producer = field(default=Producer("", NETWORK, ""))
     diagnostics: list[Diagnostic] = field(default_factory=list)
     where: str = ""
     counted: dict[str, tuple[Element, int]] = field(default_factory=dict)

@@ -1,23 +1,32 @@
 """The networks of a diagram, and the order in which their objects are evaluated.
 
-A network is a set of objects that wires connect, rails not counted.  Networks are in the order of executionOrderId if all
-have one, else from top to bottom; without positions, as written.  In a network an object follows all objects that feed it;
-objects that could be next go by executionOrderId, then from top to bottom and from left to right.  A loop is cut at the wire
-that leaves a variable, if the loop contains one, else at a wire into the block that comes first; a cut wire carries the value
-of the pass before.
+A network is a set of objects that wires connect, rails not counted.  Where Beremiz and OpenPLC Editor say the order
+(`sequence.py`), networks whose sinks stand among one another are one network, if they touch the same variables.
+
+Else networks are in the order of executionOrderId if all have one, else from top to bottom; without positions, as written.
+In a network an object follows all objects that feed it; objects that could be next go by executionOrderId, then from top to
+bottom and from left to right.  A loop is cut at the wire that leaves a variable, if the loop contains one, else at a wire into
+the block that comes first; a cut wire carries the value of the pass before.
 """
 
 from __future__ import annotations
 
 import heapq
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
 
+from fbvm.interchange.plcopen.read.accesses import Access, accesses
 from fbvm.interchange.plcopen.read.diagram import Diagram, Object, Wire
+from fbvm.interchange.plcopen.read.producer import NETWORK
+from fbvm.interchange.plcopen.read.scope import Scope
+from fbvm.interchange.plcopen.read.sequence import sequence
 
 LARGEST, MOST_LOOPS = 5_000, 200
 """Most objects and most loops of a network that is taken over; drawings of people have far fewer."""
+MIXED = 40
+"""Most networks standing among one another of which each pair is compared; more become one network."""
 RAILS = ("leftPowerRail", "rightPowerRail")
 SINKS = ("coil", "outVariable", "inOutVariable", "block", "jump", "return", "label")
 """Kinds of objects that have an effect."""
@@ -34,6 +43,8 @@ class Network:
     number: int = 0
     refused: str = ""
     """Why the network is not taken over; "" if it is."""
+    rereads: bool = False
+    """Whether contacts and variables are read again for each sink, and that makes a difference."""
 
     @property
     def broken(self) -> bool:
@@ -41,18 +52,20 @@ class Network:
         return any(item.broken for item in self.objects)
 
 
-def networks(diagram: Diagram) -> list[Network]:
-    """The networks of a diagram in their order."""
+def networks(diagram: Diagram, scope: Scope, order: str = NETWORK) -> list[Network]:
+    """The networks of a diagram in their order, which is one of `producer.ORDERS`."""
     free = [item for item in diagram.objects if item.kind not in RAILS]
     flat = len({(item.x, item.y) for item in diagram.objects}) <= 1
     groups: dict[Object, list[Object]] = {}
     root = _Joined(free)
     for item in free:
         groups.setdefault(root(item), []).append(item)
-    made = [_network(group, flat) for group in groups.values()]
-    made.sort(key=lambda network: min(_place(item, flat) for item in network.objects))
-    if ordered := _by_number(made):
-        made = ordered
+    if order == NETWORK:
+        made = [_network(group, flat) for group in groups.values()]
+        made.sort(key=lambda network: min(_place(item, flat) for item in network.objects))
+        made = _by_number(made) or made
+    else:
+        made = _generated(free, list(groups.values()), scope, order)
     for number, network in enumerate(made, 1):
         network.number = number
     _comment(made, diagram.comments, flat)
@@ -85,6 +98,93 @@ def _comment(made: list[Network], comments: list[Object], flat: bool) -> None:
         at = next((at for at, end in enumerate(ends) if end >= here), len(made) - 1)
         if comment.text and made:
             made[at].comments.append(comment.text)
+
+
+# --- networks in the sequence of a generator --------------------------------------------------------------------------
+
+
+def _generated(free: list[Object], groups: list[list[Object]], scope: Scope, order: str) -> list[Network]:
+    """The networks, in the sequence in which a generator evaluates their objects."""
+    made, cut = sequence(free, order)
+    place = {item: at for at, item in enumerate(made)}
+    known = accesses(free, scope)
+    for group in groups:
+        group.sort(key=place.__getitem__)
+    groups.sort(key=lambda group: place[group[0]])
+    found = []
+    for group in (one for mixed in _mixed(groups, place) for one in _parted(mixed, place, known)):
+        loops = {(item, wire) for item, wire in cut if item in set(group)}
+        if len(group) > LARGEST or len(loops) > MOST_LOOPS:
+            found.append(_refused(group))
+        else:
+            found.append(Network(group, loops, rereads=_rereads(group, known)))
+    return found
+
+
+def _mixed(groups: list[list[Object]], place: dict[Object, int]) -> Iterator[list[list[Object]]]:
+    """Groups whose objects stand among one another in the sequence, together."""
+    together: list[list[Object]] = []
+    end = -1
+    for group in groups:
+        if together and place[group[0]] > end:
+            yield together
+            together = []
+        together.append(group)
+        end = max(end, place[group[-1]])
+    if together:
+        yield together
+
+
+def _parted(mixed: list[list[Object]], place: dict[Object, int], known: dict[Object, Access]) -> list[list[Object]]:
+    """Groups that stand among one another as networks one behind the other, those together for which that would matter."""
+    if len(mixed) > MIXED:
+        return [sorted((item for group in mixed for item in group), key=place.__getitem__)]
+    left = list(mixed)
+    at = 0
+    while at < len(left):
+        joined = next((other for other in left[at + 1:] if _interfere(left[at], other, place, known)), None)
+        if joined is None:
+            at += 1
+        else:
+            left.remove(joined)
+            left[at] = sorted([*left[at], *joined], key=place.__getitem__)
+            at = 0
+    return left
+
+
+def _interfere(first: list[Object], second: list[Object], place: dict[Object, int], known: dict[Object, Access]) -> bool:
+    """Whether it matters that all of `first` is evaluated in front of all of `second`."""
+    return any(place[early] > place[late] and known[early].conflicts(known[late]) for early in first for late in second)
+
+
+def _rereads(group: list[Object], known: dict[Object, Access]) -> bool:
+    """Whether it matters that what several sinks have in common is read anew for each: something is written in between."""
+    first: dict[Object, int] = {}
+    written: dict[str, int] = {}
+    for at, item in enumerate(group):
+        if item.kind not in SINKS:
+            continue
+        for leaf in _leaves(item):
+            since = first.setdefault(leaf, at)
+            names = known[leaf].reads if leaf in known else frozenset()
+            if any(since <= written.get(name, -1) < at for name in names):
+                return True
+        written.update(dict.fromkeys(known[item].writes, at))
+        first.setdefault(item, at + 1)
+    return False
+
+
+def _leaves(sink: Object) -> list[Object]:
+    """Contacts, variables and blocks that the value of a sink is made of, up to the next blocks."""
+    found: dict[Object, None] = {}
+    todo = [wire.source for pin in sink.pins for wire in pin.wires]
+    while todo:
+        item = todo.pop()
+        if item not in found and item.kind not in RAILS:
+            found[item] = None
+            if item.kind == "contact":
+                todo += [wire.source for wire in item.inputs[0].wires]
+    return list(found)
 
 
 # --- one network ------------------------------------------------------------------------------------------------------

@@ -32,7 +32,8 @@ IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
 OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "itf", "namespace"}
 """Last words of the names of `addData` with object-oriented parts of programs (CODESYS)."""
-READ = {"pou", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location", "action"}
+READ = {"pou", "element", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location",
+        "action"}
 """Last words of the names of `addData` whose contents are taken over."""
 SETTINGS = {"objectid", "tasksettings", "projectinformation", "projectstructure", "fbdcalltype", "fbdelementtype",
             "interfaceasplaintext", "buildproperties"}
@@ -94,7 +95,7 @@ def _data_type(reading: Reading, element: Element) -> Iterator[DataType]:
     name = identifier(reading, element)
     kind = type_text(reading, element.one("baseType"), element)
     if name and kind:
-        yield DataType(name, kind, value_text(element.one("initialValue")), note(element))
+        yield DataType(name, kind, value_text(element.one("initialValue"), kind), note(element))
 
 
 # --- variables --------------------------------------------------------------------------------------------------------
@@ -116,14 +117,14 @@ def _variable(reading: Reading, element: Element) -> Iterator[Variable]:
     name = identifier(reading, element)
     kind = type_text(reading, element.one("type"), element)
     if name and kind:
-        yield Variable(name, kind, value_text(element.one("initialValue")), location(element), note(element))
+        yield Variable(name, kind, value_text(element.one("initialValue"), kind), location(element), note(element))
 
 
 # --- POUs -------------------------------------------------------------------------------------------------------------
 
 
 def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
-    name, kind = identifier(reading, element), KINDS.get(element.get("pouType"))
+    name, kind = identifier(reading, element), _kind(element.get("pouType"))
     if kind is None:
         reading.report("X0105", element, f"pouType is {element.get('pouType')!r}", f"it is one of {', '.join(KINDS)}")
     if not name or kind is None:
@@ -145,6 +146,11 @@ def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
     yield Pou(kind, name, result, lists, body, _named_bodies(reading, element, "action"),
               _named_bodies(reading, element, "transition"), note(element) or (note(interface) if interface else ""), element)
     reading.where = ""
+
+
+def _kind(text: str) -> str | None:
+    """The kind of a POU that `pouType` names, in whatever case and with or without an underscore; None if it names none."""
+    return next((kind for word, kind in KINDS.items() if word.casefold() == text.replace("_", "").strip().casefold()), None)
 
 
 def _named_bodies(reading: Reading, pou: Element, what: str) -> tuple[tuple[str, Body], ...]:
@@ -206,7 +212,8 @@ def _instances(reading: Reading, holder: Element, task: str) -> list[Instance]:
     for element in holder.all("pouInstance"):
         name = identifier(reading, element)
         if name:
-            found.append(Instance(name, element.get("typeName").strip() or name, task))
+            kind = element.get("typeName") or element.get("type")  # TC6 1.x calls it `type`
+            found.append(Instance(name, kind.strip() or name, task))
     return found
 
 

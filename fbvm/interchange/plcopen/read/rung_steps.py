@@ -59,7 +59,7 @@ class _Rung:
         """Number of branch points so far: each has a TR bit of its own."""
 
     def lines(self) -> list[str]:
-        if len(self.network.objects) > LONGEST or self.network.cut or not self.parts.outputs:
+        if len(self.network.objects) > LONGEST or self.network.cut or self.network.rereads or not self.parts.outputs:
             raise Inexact
         first = self.parts.outputs[0]
         powers = self.parts.powers(first)

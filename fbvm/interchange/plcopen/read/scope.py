@@ -75,6 +75,40 @@ class Scope:
                 found.add(self.root(word))
         return frozenset(found)
 
+    def key(self, name: str) -> str:
+        """What variable a name stands for: its folded name, or its address, so that two names of one place are one."""
+        match = _ROOT.match(name)
+        if not match:
+            return name.upper()
+        word = match[0].upper()
+        _, variable = self.own.get(word, ("", None))
+        variable = variable or self.document.globals_by_name.get(word)
+        return variable.address.upper() if variable and variable.address else word
+
+    def keys(self, expression: str) -> frozenset[str]:
+        """The variables that an expression of Structured Text reads (`key`)."""
+        words = (match[0] for match in _WORDS.finditer(expression))
+        return frozenset(self.key(word) for word in words
+                         if word[0] == "%" or word[0] not in "'\"" and "#" not in word and word.upper() not in _OPERATORS)
+
+    def shared(self, block: str) -> frozenset[str]:
+        """The variables outside of it that a block of the document may read and write: globals and addresses."""
+        found: set[str] = set()
+        seen: set[str] = set()
+        todo = [block.upper()]
+        while todo:
+            pou = self.pous.get(todo.pop())
+            if pou is None or pou.name.upper() in seen:
+                continue
+            seen.add(pou.name.upper())
+            for listed in pou.lists:
+                for variable in listed.variables:
+                    if listed.kind == "VAR_EXTERNAL" or variable.address:
+                        known = self.document.globals_by_name.get(variable.name.upper(), variable)
+                        found.add((known.address or known.name).upper())
+                    todo.append(variable.type.upper())
+        return frozenset(found)
+
     def bit(self, text: str) -> str:
         """The bit that an operand of a rung names, in Structured Text: an address such as W0.00 gets a `%`."""
         if self.declares(text):
@@ -84,6 +118,15 @@ class Scope:
         except OperandError:
             return text
         return meant.text if isinstance(meant, tree.Direct) else text
+
+    def names_action(self, text: str) -> bool:
+        """Whether a dotted name ends in an action of a block, as far as the document shows; True if it does not show that."""
+        *path, last = text.split(".")
+        kind = self.type_of(path[0]) if path else ""
+        for part in path[1:]:
+            kind = self.output_type(kind, part)
+        pou = self.pous.get(kind.upper())
+        return pou is None or pou.variable(last) is None
 
     def declares(self, expression: str) -> bool:
         """Whether the name with which a text begins is declared."""

@@ -68,7 +68,7 @@ def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
     lines += main
     for name, inner in actions:
         lines += ["", f"ACTION {name}:", *inner, "END_ACTION"]
-    return [*lines, f"END_{pou.kind}"]
+    return [*lines, *bodies.actions, f"END_{pou.kind}"]
 
 
 def _gathered(lists: list[VarList]) -> Iterator[VarList]:

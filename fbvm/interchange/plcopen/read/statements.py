@@ -18,6 +18,13 @@ class Statements:
         self.context = NetworkContext(reading, scope)
         self.calls = Calls(self.context)
 
+    def conditions(self, network: Network, apart: bool) -> tuple[list[str], dict[Object, str]]:
+        """The statements of a network with conditions of transitions, and the expression of each condition.  With `apart` the
+        statements are executed elsewhere: what they leave to conditions lasts.  Raises Unexecutable."""
+        self.context.apart = apart
+        lines = self.write(network)
+        return lines, self.context.conditions
+
     def write(self, network: Network) -> list[str]:
         """The statements of a network.  Raises Unexecutable."""
         if network.refused:
@@ -59,7 +66,10 @@ class Statements:
         target, writes = context.target(item)
         guard = self.calls.guard(pin)
         value = context.modified(item, context.value_at(item, pin), item.negated, item.edge)
-        if item.storage in ("set", "reset"):
+        if item.storage and item.negated and context.generates:
+            context.warn(item, f"negated and {item.storage}: Beremiz and OpenPLC Editor assign the inverse in every scan")
+            context.write(f"{target} := {value.text};", writes)
+        elif item.storage in ("set", "reset"):
             context.write(when(value, f"{target} := {'TRUE' if item.storage == 'set' else 'FALSE'};"), writes)
         elif item.storage:
             raise Unexecutable(item, f"there is no storage {item.storage!r}", "")
@@ -69,10 +79,9 @@ class Statements:
             context.write(f"{target} := {value.text};", writes)
 
     def _condition(self, item: Object) -> None:
-        """Assign the condition of a transition to the name in the text of the object."""
-        context = self.context
-        value = context.value_at(item, item.inputs[0])
-        context.lines.append(f"{item.text} := {(negation(value) if item.negated else value).text};")
+        """Note the expression of the condition of a transition."""
+        value = self.context.value_at(item, item.inputs[0])
+        self.context.conditions[item] = (negation(value) if item.negated else value).text
 
     def _in_out_variable(self, item: Object) -> None:
         context = self.context

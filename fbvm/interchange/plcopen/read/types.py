@@ -10,7 +10,10 @@ from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION
 
 _LATER = frozenset(("LTIME", "LDATE", "LDT", "LTOD", "CHAR", "WCHAR"))
 """Types of edition 3, which some documents have in the same way; they are read and not written."""
+_CONSTANT = re.compile(r"[^\W\d]\w*|W?STRING#.*")
+"""What a text may begin with that is no literal: the name of a constant; or a literal that names its type."""
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
+_TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})(\.\d{1,9})?")
 _DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
 
 
@@ -56,7 +59,7 @@ def _struct(reading: Reading, element: Element) -> str:
     members = []
     for variable in element.all("variable"):
         kind = type_text(reading, variable.one("type"), variable)
-        initial = value_text(variable.one("initialValue"))
+        initial = value_text(variable.one("initialValue"), kind)
         address = f" AT {place}" if (place := location(variable)) else ""
         members.append(f"    {variable.get('name')}{address} : {kind}{initial and f' := {initial}'};{remark(note(variable))}\n")
     return f"STRUCT\n{''.join(members)}END_STRUCT"
@@ -75,8 +78,9 @@ _WRITERS = {"array": _array, "derived": _derived, "enum": _enum, "struct": _stru
             "subrangeUnsigned": _subrange, "pointer": _pointer}
 
 
-def value_text(holder: Element | None) -> str:
-    """The value in `initialValue` and its like; "" if there is none."""
+def value_text(holder: Element | None, kind: str = "") -> str:
+    """The value in `initialValue` and its like; "" if there is none.  What a STRING begins with gets the quotes that it lacks:
+    some tools leave them out, or write those of a WSTRING."""
     inner = next((part for part in holder.children if part.name.endswith("Value")), None) if holder else None
     if inner is None:
         return ""
@@ -89,7 +93,11 @@ def value_text(holder: Element | None) -> str:
     if inner.name == "structValue":
         fields = [f"{v.get('member')} := {value_text(v)}" for v in inner.all("value")]
         return f"({', '.join(fields)})" if fields else ""
-    return inner.get("value").strip()
+    text = inner.get("value").strip()
+    if not re.fullmatch(r"STRING(\[.*\])?", kind) or not text or text[0] == "'" or _CONSTANT.fullmatch(text):
+        return text
+    text = text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
+    return "'" + text.replace("'", "$'") + "'"
 
 
 def location(element: Element) -> str:
@@ -104,16 +112,20 @@ def own_text(element: Element, name: str) -> str:
 
 
 def duration(text: str) -> str:
-    """A duration as a literal, from `T#20ms`, `PT0.02S` (CODESYS) or `20ms` (OpenPLC); "" for another text, such as a name.
+    """A duration as a literal, from `T#20ms`, `PT0.02S` (CODESYS), `20ms` (OpenPLC) or `00:00:00.02` (TC6 1.x); "" for another
+    text, such as a name.
 
-    >>> duration("PT0.02S")
-    'T#20ms'
+    >>> duration("PT0.02S"), duration("00:00:00.100000")
+    ('T#20ms', 'T#100ms')
     """
     text = text.strip()
+    if clock := _TIME_OF_DAY.fullmatch(text):
+        hours, minutes, seconds, rest = clock.groups()
+        text = f"PT{hours}H{minutes}M{seconds}{rest or ''}S"
     iso = _DURATION.fullmatch(text)
     if iso and any(iso.groups()):
         days, hours, minutes, seconds = iso.groups()
-        parts = [f"{number}{unit}" for number, unit in ((days, "d"), (hours, "h"), (minutes, "m")) if number]
+        parts = [f"{number}{unit}" for number, unit in ((days, "d"), (hours, "h"), (minutes, "m")) if number and int(number)]
         if seconds:
             micros = round(float(seconds) * 1_000_000)
             whole, rest = divmod(micros, 1_000_000)

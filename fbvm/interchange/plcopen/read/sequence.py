@@ -1,0 +1,96 @@
+"""The sequence in which the generator of Beremiz and OpenPLC Editor evaluates the objects of a diagram.
+
+The generator goes through the sinks of a body, and through its blocks, and writes what each needs in front of it, a block once.
+A block counts as written before its inputs are looked at: so a wire that comes back to it carries the value of the pass before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cmp_to_key
+
+from fbvm.interchange.plcopen.read.diagram import Object, Wire
+from fbvm.interchange.plcopen.read.producer import ALL_BY_POSITION, IDS, SINKS_BY_POSITION
+
+ROW = 10
+"""Objects whose y differ by less stand in one row (Beremiz, `SortInstances`)."""
+OUTPUTS = ("outVariable", "inOutVariable", "coil", "condition")
+Cut = set[tuple[Object, Wire]]
+
+
+def sequence(objects: Iterable[Object], order: str) -> tuple[list[Object], Cut]:
+    """The objects in the order of their evaluation, and the wires, each with its consumer, that carry the value of the pass
+    before.  Objects that feed nothing with an effect come last."""
+    items = list(objects)
+    run = _Generation(frozenset(items))
+    for candidate in _candidates(items, order):
+        run.add(candidate)
+    for item in items:
+        run.add(item)
+    return run.made, run.cut
+
+
+def _candidates(items: list[Object], order: str) -> list[Object]:
+    """Sinks and blocks, in the order in which the generator begins with them."""
+    numbered = sorted((item for item in items if item.order and item.kind in ("outVariable", "inOutVariable", "block")),
+                      key=lambda item: item.order)
+    plain = [item for item in items if item not in set(numbered)]
+    outputs = [item for item in plain if item.kind in OUTPUTS]
+    blocks = [item for item in plain if item.kind == "block"]
+    by_position = cmp_to_key(_by_position)
+    if order == IDS:
+        return [*numbered, *(item for item in plain if item.kind in (*OUTPUTS, "block"))]
+    if order == SINKS_BY_POSITION:
+        return [*numbered, *sorted(outputs, key=by_position), *sorted(blocks, key=by_position)]
+    if order == ALL_BY_POSITION:
+        return [*numbered, *sorted((item for item in plain if item.kind in (*OUTPUTS, "block")), key=by_position)]
+    return [*numbered, *outputs, *blocks]
+
+
+def _by_position(first: Object, second: Object) -> int:
+    apart = first.x - second.x if abs(first.y - second.y) < ROW else first.y - second.y
+    return (apart > 0) - (apart < 0)
+
+
+class _Generation:
+    """One pass of the generator over a body."""
+
+    def __init__(self, inside: frozenset[Object]) -> None:
+        self.inside = inside
+        self.made: list[Object] = []
+        self.cut: Cut = set()
+        self.begun: set[Object] = set()
+        self.done: set[Object] = set()
+
+    def add(self, start: Object) -> None:
+        """Add an object behind all that it needs, unless it is there already."""
+        if start in self.begun:
+            return
+        self.begun.add(start)
+        todo = [(start, self._numbered(start), self._wires(start))]
+        while todo:
+            item, waits, wires = todo[-1]
+            wire = next(wires, None)
+            if wire is None:
+                todo.pop()
+                self.done.add(item)
+                self.made.append(item)
+                continue
+            source = wire.source
+            if source not in self.inside or source in self.done:
+                continue
+            if source in self.begun or (waits and source.kind == "block"):
+                self.cut.add((item, wire))
+                continue
+            self.begun.add(source)
+            passes = source.kind in ("contact", "inOutVariable")
+            todo.append((source, waits if passes else self._numbered(source), self._wires(source)))
+
+    @staticmethod
+    def _numbered(item: Object) -> bool:
+        """Whether an object reads blocks that are still to come as they are: a block with an executionOrderId does."""
+        return item.kind == "block" and item.order > 0
+
+    @staticmethod
+    def _wires(item: Object) -> Iterator[Wire]:
+        return iter([wire for pin in item.pins for wire in pin.wires])

@@ -1,0 +1,150 @@
+"""The order in which drawings are evaluated, as each generation of the generator of Beremiz and OpenPLC Editor has it."""
+
+from __future__ import annotations
+
+import re
+
+from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, result, value, variable
+from rows import each_of
+
+from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.plcopen.read.producer import ORDERS
+
+UNKNOWN = '<fileHeader companyName="Unknown" productName="Unnamed" productVersion="1"/>'
+
+
+def headed(data: bytes, header: str = UNKNOWN, date: str = "2023-05-01T10:00:00", scaling: int = 10) -> bytes:
+    """A document with a header and the date of its last change, as Beremiz and OpenPLC Editor write them."""
+    scalings = "".join(f'<{kind}><scaling x="{scaling}" y="{scaling}"/></{kind}>' for kind in ("fbd", "ld", "sfc"))
+    content = f'<contentHeader name="n" modificationDateTime="{date}"><coordinateInfo>{scalings}</coordinateInfo></contentHeader>'
+    return data.replace(b"<types>", f"{header}{content}<types>".encode())
+
+
+def statements(made: Imported) -> list[str]:
+    """The assignments and calls of Main, one a line; rungs as `coil := contact`."""
+    text = made.files["Main.st"].partition("END_VAR\n")[2].rpartition("END_VAR\n")[2]
+    text = re.sub(r"LD\s+(\w+)\s+OUT\s+(\w+)", r"\2 := \1;", text)
+    return [line.strip() for line in text.splitlines() if ":=" in line]
+
+
+CROSSED = pou(RAIL + contact(2, "1", "c", at="50,200") + coil(3, "2", "b", at="90,200")
+              + contact(4, "1", "go", at="50,20") + coil(5, "4", "c", at="90,20"), "go b c")
+DOWN, UP = ["c := go;", "b := c;"], ["b := c;", "c := go;"]
+
+
+@each_of(("order", "expected"), [("network", DOWN), ("beremiz1", DOWN), ("document", UP), ("position", DOWN), ("ids", UP)])
+def test_two_rungs_that_stand_crosswise(order: str, expected: list[str]) -> None:
+    assert statements(import_xml(document(CROSSED), order=order)) == expected
+
+
+SINK_BELOW = pou(value(1, "a", at="10,20") + block(2, "CTU", "CU=1", "Q,CV", "k", at="80,20") + value(3, "k.CV", at="10,300")
+                 + result(4, "3", "n", at="200,300"), variable("a") + variable("n", "INT") + variable("k", "CTU"), language="FBD")
+"""A block above, and far below it a variable that reads the block without a wire."""
+
+
+@each_of(("order", "first"), [("network", "k(CU := a);"), ("beremiz1", "n := k.CV;"), ("document", "n := k.CV;"),
+                              ("position", "k(CU := a);"), ("ids", "k(CU := a);")])
+def test_a_block_above_and_a_sink_below(order: str, first: str) -> None:
+    assert statements(import_xml(document(SINK_BELOW), order=order))[0] == first
+
+
+@each_of(("header", "date", "scaling", "order"), [
+    (UNKNOWN, "2023-05-01", 10, UP), (UNKNOWN, "2019-05-01", 0, DOWN),
+    ('<fileHeader companyName="Beremiz" productName="Beremiz" productVersion="1"/>', "2024-01-01", 0, UP),
+    ('<fileHeader companyName="Desconocido" productName="Sin nombre" productVersion="1"/>', "2024-01-01", 10, UP),
+    ('<fileHeader companyName="" productName="CODESYS" productVersion="CODESYS V3.5"/>', "2024-01-01", 1, DOWN),
+    ('<fileHeader companyName="me" productName="mine" productVersion="2"/>', "2024-01-01", 10, DOWN),
+])
+def test_the_header_tells_the_order(header: str, date: str, scaling: int, order: list[str]) -> None:
+    assert statements(import_xml(headed(document(CROSSED), header, date, scaling))) == order
+
+
+@each_of(("date", "order"), [("2025-11-01T00:00:00", DOWN), ("2025-01-01T00:00:00", UP)])
+def test_the_newer_editor_of_openplc_declares_its_namespace_twice(date: str, order: list[str]) -> None:
+    data = headed(document(CROSSED), date=date, scaling=16).replace(
+        f'<project xmlns="{NAMESPACE}"'.encode(), f'<project xmlns="{NAMESPACE}" xmlns:ns1="{NAMESPACE}"'.encode())
+    assert statements(import_xml(data)) == order
+
+
+def test_orders_that_would_differ_are_told_with_the_elements_that_swap() -> None:
+    made = import_xml(headed(document(CROSSED)))
+    [told] = [d for d in made.diagnostics if d.code == "X0292"]
+    assert "contact c (2) is evaluated before coil c (5)" in told.message
+    assert "'document'" in told.message
+    assert "--order beremiz1" in told.hint
+    assert not [d for d in import_xml(headed(document(CROSSED)), order="document").diagnostics if d.code == "X0292"]
+
+
+def test_orders_that_have_the_same_effect_are_not_mentioned() -> None:
+    apart = pou(RAIL + contact(2, "1", "a", at="50,200") + coil(3, "2", "b", at="90,200")
+                + contact(4, "1", "c", at="50,20") + coil(5, "4", "d", at="90,20"), "a b c d")
+    assert "X0292" not in [d.code for d in import_xml(headed(document(apart))).diagnostics]
+
+
+SHARED = pou(RAIL + contact(2, "1", "a", 'negated="true"') + coil(3, "2", "a") + coil(4, "2", "b"), "a b")
+
+
+@each_of(("order", "seen"), [("network", ["1 1", "0 0", "1 1"]), ("document", ["1 0", "0 1", "1 0"])])
+def test_a_contact_in_front_of_two_coils_is_read_once_or_for_each(order: str, seen: list[str]) -> None:
+    machine = plc(import_xml(document(SHARED), order=order))
+    found = []
+    for _ in seen:
+        machine.scan()
+        found.append(f"{int(machine.read('Main.a'))} {int(machine.read('Main.b'))}")
+    assert found == seen
+
+
+def flashing(sink: str) -> bytes:
+    """TON -> NOT -> TON, with an output variable behind one of them, or none."""
+    parts = [value(1, "T#20ms"), block(2, "TON", "IN=3 PT=1", "Q,ET", "t"), block(3, "NOT", "IN=2.Q", "OUT")]
+    if sink:
+        parts.append(result(4, sink, "x"))
+    return document(pou("".join(parts), variable("x") + variable("t", "TON"), language="FBD"))
+
+
+@each_of(("sink", "first", "expected"), [
+    ("3", False, ["t(IN := Before_3, PT := T#20ms);", "Before_3 := NOT t.Q;", "x := Before_3;"]),
+    ("2.Q", True, ["Before_3 := NOT t.Q;", "t(IN := Before_3, PT := T#20ms);", "x := t.Q;"]),
+])
+def test_a_loop_is_cut_where_the_generator_comes_back_to_the_block_it_met_first(sink: str, first: bool,
+                                                                               expected: list[str]) -> None:
+    made = import_xml(flashing(sink), order="document")
+    machine = plc(made)
+    machine.scan()
+    assert machine.read("Main.t.IN") is first
+    assert [d.code for d in made.diagnostics if d.code.startswith("X02")] == ["X0290"]
+
+
+def test_a_function_that_feeds_itself_counts() -> None:
+    body = value(1, "INT#1") + block(2, "ADD", "IN1=1 IN2=2", "OUT") + result(3, "2", "n")
+    machine = plc(import_xml(document(pou(body, variable("n", "INT"), language="FBD")), order="document"))
+    for _ in range(5):
+        machine.scan()
+    assert machine.read("Main.n") == 5
+
+
+def test_by_number_a_block_reads_what_comes_behind_it_as_the_pass_before_left_it() -> None:
+    body = (block(1, "CTU", "CU=2.Q", "Q,CV", "k", marks='executionOrderId="1"') + value(3, "a")
+            + block(2, "R_TRIG", "CLK=3", "Q", "edge", marks='executionOrderId="2"'))
+    made = import_xml(document(pou(body, variable("a") + variable("k", "CTU") + variable("edge", "R_TRIG"), language="FBD")),
+                      order="document")
+    assert statements(made) == ["k(CU := edge.Q);", "edge(CLK := a);"]
+
+
+def test_a_negated_set_coil_assigns_the_inverse_and_is_told() -> None:
+    body = RAIL + contact(2, "1", "a") + coil(3, "2", "b", 'negated="true" storage="set"')
+    made = import_xml(headed(document(pou(body, "a b"))))
+    assert statements(made) == ["b := NOT a;"]
+    assert "assign the inverse in every scan" in " ".join(d.message for d in made.diagnostics)
+
+
+def test_jumps_are_not_executed_where_the_tool_executes_none() -> None:
+    body = RAIL + contact(2, "1", "a") + '<jump localId="3" label="end"><position x="0" y="0"/><connectionPointIn>' \
+        '<connection refLocalId="2"/></connectionPointIn></jump><label localId="4" label="end"/>' + coil(5, "2", "b")
+    data = document(pou(body, "a b"))
+    assert "JMP" not in import_xml(headed(data)).files["Main.st"]
+    assert "JMP" in import_xml(data).files["Main.st"]
+
+
+def test_every_order_says_what_it_is() -> None:
+    assert all(len(text) > 30 for text in ORDERS.values())
