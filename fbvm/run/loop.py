@@ -67,9 +67,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
     if networks:
-        for unit in (attached.own for run in runs for attached in run.plc.units):
-            if unit is not None:  # what takes long once is done before time begins
-                unit.prepare()
+        _prepare(runs)
         watchdogs = [Watchdog(run.plc) for run in runs]
         clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
@@ -99,6 +97,13 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         clock.stop()
         for watchdog in watchdogs:
             watchdog.stop()
+
+
+def _prepare(runs: Sequence[Running]) -> None:
+    """Does what takes long once, before time begins."""
+    for unit in (attached.own for run in runs for attached in run.plc.units):
+        if unit is not None:
+            unit.prepare()
 
 
 def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog]) -> None:

@@ -6,7 +6,7 @@ that may repeat, `!` behind one that must be there.  Elements that are not liste
 
 from __future__ import annotations
 
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 
 _OBJECT = "localId | height width executionOrderId negated edge storage"
 _TYPE = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD string wstring ANY "

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic
-from fbvm.interchange.plcopen.markup import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, parse_markup
+from fbvm.interchange.markup import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, parse_markup
 from fbvm.interchange.plcopen.read.importing import Imported, import_xml
 
 BOMB = b'<?xml version="1.0"?>\n<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>\n<project>&b;</project>'
@@ -69,7 +69,7 @@ def test_deep_nesting_ends_at_the_limit() -> None:
 
 
 def test_too_many_elements_end_at_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fbvm.interchange.plcopen.markup.MAX_ELEMENTS", 1_000)
+    monkeypatch.setattr("fbvm.interchange.markup.MAX_ELEMENTS", 1_000)
     assert MAX_ELEMENTS >= 1_000
     assert only(b"<a>" + b"<b/>" * 1_001 + b"</a>").code == "X0103"
 

@@ -51,7 +51,8 @@ _LIBRARIES = (
     (r"TcUnit|FB_TestSuite|TEST|TEST_FINISHED|AssertEquals\w*|AssertTrue|AssertFalse", "TcUnit"),
     (r"Sys(?:Time|File|Mem|Sock|Com|Task|Target|Process|Cpu|Dir|Event|Lib)\w+|RTS_IEC_\w+|CmpErrors2?|TimerSwitch",
      "CODESYS's system libraries"),
-    (r"(?:GEN|GEN_MODE|PD|PID|PID_FIXCYCLE|DERIVATIVE|BASE64|\w+_TO_GRAY|GRAY_TO_\w+|\w+HEXinASCII\w*|WORD_AS_STRING)", "CODESYS's Util"),
+    (r"GEN|GEN_MODE|PD|PID|PID_FIXCYCLE|DERIVATIVE|BASE64|\w+_TO_GRAY|GRAY_TO_\w+|\w+HEXinASCII\w*|WORD_AS_STRING",
+     "CODESYS's Util"),
 )
 """Patterns of names, and the library that they come from."""
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from fbvm.base.digits import whole_number
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.conditions import Conditions, NotImportable, feeding
 from fbvm.interchange.plcopen.read.diagram import Diagram, placed, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Pou, Reading

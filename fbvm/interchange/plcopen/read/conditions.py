@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.diagram import Diagram, Object, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Reading
 from fbvm.interchange.plcopen.read.networks import Network, networks

@@ -11,7 +11,7 @@ from math import inf, isfinite
 from typing import NamedTuple
 
 from fbvm.base.digits import whole_number
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.document import Reading
 from fbvm.interchange.plcopen.read.types import own_text
 from fbvm.interchange.plcopen.schema import MNEMONIC

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.producer import NETWORK, Producer
 
 

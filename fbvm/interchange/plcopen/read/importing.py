@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, errors
-from fbvm.interchange.plcopen.markup import parse_markup, read_markup
+from fbvm.interchange.markup import parse_markup, read_markup
 from fbvm.interchange.plcopen.read.document import Reading
 from fbvm.interchange.plcopen.read.producer import producer
 from fbvm.interchange.plcopen.read.project import read_project

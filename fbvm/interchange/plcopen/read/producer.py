@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 
 NETWORK, IDS = "network", "ids"
 SINKS_BY_POSITION, SINKS_AS_WRITTEN, ALL_BY_POSITION = "beremiz1", "document", "position"

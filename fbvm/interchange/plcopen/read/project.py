@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.document import (
     Body,
     Configuration,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fbvm.interchange.plcopen.markup import Element
+from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.document import Reading
 from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION
 

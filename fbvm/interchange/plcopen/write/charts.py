@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.write.layout import End, wired
 from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree

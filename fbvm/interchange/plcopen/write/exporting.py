@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
-from fbvm.interchange.plcopen.markup import Element, element, written
+from fbvm.interchange.markup import Element, element, written
 from fbvm.interchange.plcopen.write.pous import pou
 from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree

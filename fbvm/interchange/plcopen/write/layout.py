@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.schema import MNEMONIC
 
 LEFT, COLUMN, ROW, GAP = 20, 110, 60, 40

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.schema import KINDS
 from fbvm.interchange.plcopen.write.charts import ChartWriter
 from fbvm.interchange.plcopen.write.layout import Drawing

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from fbvm.base.areas import parse_address
-from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.schema import LOCATION
 from fbvm.interchange.plcopen.write.layout import Drawing, End, Ends, own_data
 from fbvm.interchange.plcopen.write.types import NotExportable, Types

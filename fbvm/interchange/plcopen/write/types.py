@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.digits import whole_number
-from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
 from fbvm.interchange.plcopen.write.layout import own_data
 from fbvm.syntax import tree
