@@ -98,6 +98,7 @@ CODES: dict[str, Code] = {
         "X0301": "cannot be said in PLCopen XML",
         "X0401": "no project of CX-Programmer",
         "X0402": "cannot be written into a project of CX-Programmer",
+        "X0501": "no object or project of TwinCAT",
     }),
     **_table("warning", {
         "S0190": "pragma is not known and has no effect",

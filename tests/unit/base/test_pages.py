@@ -20,6 +20,7 @@ from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.cx.write.exporting import export_into
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.write.exporting import export_xml
+from fbvm.interchange.twincat.objects import read_object
 from fbvm.machine.plc import Plc
 from fbvm.run.project import Project, read_project
 from fbvm.syntax.text import decode
@@ -174,7 +175,10 @@ def test_the_wrong_library_gives_this_diagnostic_and_the_right_one_none(code: st
 
 
 def found_in(text: str) -> list[Diagnostic]:
-    """The diagnostics of a document: XML, a project of CX-Programmer, sources, or sources that are written into a project."""
+    """The diagnostics of a document: XML of PLCopen or TwinCAT, a project of CX-Programmer, sources, or sources that are written
+    into a project."""
+    if text.startswith("<TcPlcObject"):
+        return read_object(text.encode(), "page.TcPOU").diagnostics
     if text.startswith("<"):
         return import_xml(text.encode()).diagnostics
     if not text.startswith("CX"):

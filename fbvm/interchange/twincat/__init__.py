@@ -1,0 +1,1 @@
+"""TwinCAT's files: objects (`.TcPOU`, `.TcDUT`, `.TcGVL`, `.TcIO`, `.TcTTO`) and projects (`.plcproj`), read as sources."""

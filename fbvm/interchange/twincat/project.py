@@ -1,0 +1,103 @@
+"""A project of TwinCAT (`.plcproj`): the objects that it lists as sources, and its tasks as a CONFIGURATION."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path, PureWindowsPath
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.files import SOURCE_BYTES, read_file, reason
+from fbvm.interchange.markup import Element, parse_markup
+from fbvm.interchange.twincat.objects import SUFFIXES, ImportedObject, read_object
+
+PROJECT_SUFFIX = ".plcproj"
+TASK_SUFFIX = ".tctto"
+TASKS = "Tasks.st"
+"""What the source is called that says which programs run when."""
+_IDENTIFIER = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+
+
+@dataclass
+class ImportedProject:
+    """The sources of a project, in the order in which it lists them, and what could not be taken over."""
+
+    sources: list[Source] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """Diagnostics about parts that were not taken over."""
+        return errors(self.diagnostics)
+
+
+def read_project(path: Path) -> ImportedProject:
+    """Reads a project and the objects that it lists, which lie in its folder or below.
+
+    Raises OSError if the file of the project cannot be read; what is wrong with an object is a diagnostic."""
+    made = ImportedProject()
+    parsed = parse_markup(read_file(path, SOURCE_BYTES), str(path))
+    if isinstance(parsed, Diagnostic):
+        made.diagnostics.append(parsed)
+        return made
+    xml, root = parsed
+    if root.name != "Project":
+        made.diagnostics.append(Diagnostic("X0501", xml, root.at, root.at + 1, "the file is no project of TwinCAT",
+                                           "a .plcproj has a <Project> with <Compile Include=...> for each object"))
+        return made
+    tasks: list[Element] = []
+    for item in (item for group in root.all("ItemGroup") for item in group.all("Compile")):
+        if _is_excluded(item):
+            continue
+        found = _object(path, xml, item)
+        made.diagnostics += found.diagnostics
+        made.sources += [found.source] if found.source else []
+        tasks += [found.task] if found.task else []
+    if tasks:
+        made.sources.append(Source(f"{path}/{TASKS}", configuration(tasks)))
+    return made
+
+
+def _is_excluded(item: Element) -> bool:
+    excluded = item.one("ExcludeFromBuild")
+    return excluded is not None and excluded.text.strip().lower() == "true"
+
+
+def _object(project: Path, xml: Source, item: Element) -> ImportedObject:
+    """The object that an entry of a project names."""
+    written = item.get("Include")
+    inside = PureWindowsPath(written)
+    suffix = inside.suffix.lower()
+
+    def refused(code: str, message: str, hint: str = "") -> ImportedObject:
+        return ImportedObject(diagnostics=[Diagnostic(code, xml, item.at, item.at + len("<Compile"), message, hint)])
+
+    if inside.anchor or ".." in inside.parts:
+        return refused("X0501", f"{written} lies outside of the project", "copy it into the project's folder")
+    if suffix not in (*SUFFIXES, TASK_SUFFIX):
+        return refused("X0190", f"{written} holds no program, and is left out")
+    file = project.parent.joinpath(*inside.parts)
+    try:
+        return read_object(read_file(file, SOURCE_BYTES), str(file))
+    except OSError as error:
+        return refused("X0501", f"{written} cannot be read: {reason(error)}")
+
+
+def configuration(tasks: list[Element]) -> str:
+    """The text of a CONFIGURATION with these tasks (`Task` of a `.TcTTO`): CycleTime is in microseconds, the smallest Priority
+    comes first, PouCall names the programs in their order."""
+    lines = ["CONFIGURATION TwinCAT", "RESOURCE PLC ON fbvm"]
+    programs: list[str] = []
+    for number, task in enumerate(tasks):
+        name = task.get("Name") if _IDENTIFIER.fullmatch(task.get("Name")) else f"Task_{number + 1}"
+        cycle_us, priority = _number(task, "CycleTime", 10_000), _number(task, "Priority", 20)
+        lines.append(f"    TASK {name}(INTERVAL := T#{cycle_us}us, PRIORITY := {priority});")
+        calls = [named.text.strip() for call in task.all("PouCall") for named in call.all("Name")]
+        programs += [f"    PROGRAM {call} WITH {name} : {call};" for call in calls if _IDENTIFIER.fullmatch(call)]
+    return "\n".join([*lines, *programs, "END_RESOURCE", "END_CONFIGURATION", ""])
+
+
+def _number(task: Element, name: str, default: int) -> int:
+    found = task.one(name)
+    text = found.text.strip() if found else ""
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 16 else default
