@@ -34,8 +34,8 @@ def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False
 
     One of `never`, `always` (conditions, as `until` takes them) and `no_trap` says which.  Inputs of a block or of a program
     are free in each scan; `free` names others.  `assume` are conditions that all runs keep.  `scans` is how far to look
-    where there is no proof, `seconds` how long.  Stubs and units have no part in it.  A proof is kept on disk until the program or
-    the property changes.
+    where there is no proof, `seconds` how long.  Stubs and units have no part in it.  A proof is kept on disk until the program
+    or the property changes.
 
     Raises NotProved, and ValueError for a program that cannot be followed, for names that it does not have, or without exactly
     one property."""
