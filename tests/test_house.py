@@ -61,6 +61,7 @@ ORDERS = {
     "units": ("", "etn21/fins", "etn21", "port"),
     "machine": ("scan", "servicing", "fast", ""),
     "prove": ("encoding", ""),
+    "testing": ("", "course"),
     "record": ("trace", "recording", "draw", "export", "page"),
     "cli": ("shared", "shared/debug", "programs", "running", "recordings", "projects", "editors", ""),
 }
@@ -308,7 +309,7 @@ def written_in_place(path: Path) -> list[str]:
 
 
 def test_files_are_written_beside_and_put_in_place_whole() -> None:
-    assert wrong(written_in_place) == {"testing/lessons.py": ["write_text"]}, "write_file of base/files.py does it"
+    assert wrong(written_in_place) == {"testing/course/lessons.py": ["write_text"]}, "write_file of base/files.py does it"
 
 
 def vendors(path: Path) -> list[str]:

@@ -36,7 +36,7 @@ from fbvm.prove.unreached import unreached
 from fbvm.watch.names import Names as PlaceNames
 from fbvm.watch.paths import Place
 
-SIMULATED_SCANS = 4_000
+SIMULATED_SCANS = 2_000
 """Scans of each random run before the solver is asked."""
 SAMPLED_SCANS = 200
 DEPTHS = (16, 64)

@@ -24,11 +24,10 @@ from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, Prover, SpuriousRun
 from fbvm.prove.pytest_text import pytest_text
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Run, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Verdict
+from fbvm.prove.report import details, headline
 from fbvm.prove.runs import repeated
 from fbvm.prove.solver import SolverMissing
-from fbvm.record.draw.chart import draw
-from fbvm.record.trace.recorder import Recorder
 from fbvm.run.time_limit import time_limit
 from fbvm.watch.paths import UnknownPlace
 from fbvm.watch.scanner import ConditionError
@@ -117,26 +116,10 @@ def _told(text: str) -> Iterator[Callable[[str], None]]:
 
 
 def _print(image: Image, verdict: Verdict) -> None:
-    """What a person reads: the verdict, the run as a chart, what limits the answer."""
-    say(f"{verdict.question}: {verdict.word.upper()} {verdict.how}", fg=_COLOURS.get(verdict.word, "red"), bold=True)
-    for note in verdict.notes:
-        say(f"  {note}")
-    if verdict.run is not None:
-        say(_chart(image, verdict, verdict.run), nl=False)
-        if verdict.run.trap is not None:
-            say(f"  {verdict.run.trap}")
-
-
-def _chart(image: Image, verdict: Verdict, run: Run) -> str:
-    """The chart of a run: the inputs that change, then what the property names."""
-    plc = Plc(image, run.cycle_ns)
-    inputs = dict.fromkeys(place.name for writes in run.writes for place in writes)
-    names = dict.fromkeys([*inputs, *(place.name for place in verdict.places)])
-    if not names:
-        return ""
-    recorder = Recorder(plc, names)
-    repeated(plc, run)
-    return str(draw(recorder, width=chart_width(), ruler=True, compress=True))
+    """What a person reads: the verdict, what limits the answer, the run as a chart."""
+    say(headline(verdict), fg=_COLOURS.get(verdict.word, "red"), bold=True)
+    for line in details(image, verdict, chart_width()):
+        say(line)
 
 
 def _as_dict(verdict: Verdict) -> dict[str, object]:

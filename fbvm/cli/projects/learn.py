@@ -32,7 +32,7 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
 
     Without LESSON, lists them.  `fbvm learn 1` shows the first one and makes a folder for it; there, write your prediction into
     answers.toml and change program.st, then `fbvm learn 1 --check`.  Status 1 if something is not right yet."""
-    from fbvm.testing.lessons import check, lessons, prediction_mistake
+    from fbvm.testing.course.lessons import check, lessons, prediction_mistake
 
     if (checked or learners) and find_spec("pytest") is None:
         raise click.UsageError("checks need pytest: pip install pytest")
@@ -67,7 +67,7 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
 
 
 def _list(folder: Path) -> None:
-    from fbvm.testing.lessons import is_done, lessons
+    from fbvm.testing.course.lessons import is_done, lessons
 
     for lesson in lessons():
         mark = "done" if is_done(lesson, folder) else "begun" if (folder / lesson.slug).is_dir() else ""
@@ -76,8 +76,8 @@ def _list(folder: Path) -> None:
 
 
 def _class(learners: Path, out: Path) -> None:
-    from fbvm.testing.class_report import report, summary
-    from fbvm.testing.lessons import check_class, lessons
+    from fbvm.testing.course.class_report import report, summary
+    from fbvm.testing.course.lessons import check_class, lessons
 
     if out.resolve().is_relative_to(learners.resolve()):
         raise click.UsageError(f"{named(out)} lies among the learners of {named(learners)}; choose another --report")

@@ -15,9 +15,9 @@ from rows import each_of
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
 from fbvm.record.trace.reader import Trace
-from fbvm.testing.class_report import report, summary
+from fbvm.testing.course.class_report import report, summary
+from fbvm.testing.course.lessons import ANSWERS, GIVEN, PROGRAM, Lesson, check_class, lessons, run_pytest
 from fbvm.testing.lesson import predicted
-from fbvm.testing.lessons import ANSWERS, GIVEN, PROGRAM, Lesson, check_class, lessons, run_pytest
 
 HOUSE = Path(__file__).resolve().parents[3]
 LINES, COLUMNS = 25, 79

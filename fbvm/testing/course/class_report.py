@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
-from fbvm.testing.lessons import OF_THE_LEARNER, Lesson, Result
+from fbvm.testing.course.lessons import OF_THE_LEARNER, Lesson, Result
 from fbvm.testing.pages import page_path
 
 _PAGE = """<!doctype html>
