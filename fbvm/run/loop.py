@@ -74,7 +74,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
             servicing = run.plc.servicing
-            if servicing.is_needed and not servicing.clock_ns:
+            if not servicing.clock_ns:
                 servicing.clock_ns = local_date_ns() - start_ns
             run.begin(start_ns + run.phase_ns, real.behind)
     else:  # nothing happens between two periods of virtual time
