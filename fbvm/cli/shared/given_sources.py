@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 
 import click
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.files import SOURCE_BYTES, read_file, reason
-from fbvm.interchange.cx.markup import is_project
-from fbvm.interchange.cx.read.importing import ImportedProject, import_project
+from fbvm.base.files import reason
+from fbvm.interchange.cx.read import given
+from fbvm.interchange.cx.read.importing import ImportedProject
 from fbvm.syntax.text import read
-
-SUFFIXES = (".cxp", ".cxt")
 
 
 def imported(path: Path) -> ImportedProject | None:
@@ -22,39 +19,29 @@ def imported(path: Path) -> ImportedProject | None:
 
     The option --resource of the present command chooses a PLC where the project has several.  Ends the verb with status 2 if the
     file cannot be read."""
-    resource = click.get_current_context().meta.get("fbvm.resource") if click.get_current_context(silent=True) else None
     try:
-        data = read_file(path, SOURCE_BYTES) if path.is_file() else b""
+        return given.imported(path, _resource())
     except OSError as error:
-        if path.suffix.lower() in SUFFIXES:
-            raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
-        return None
-    if path.suffix.lower() not in SUFFIXES and not is_project(data):
-        return None
-    return _imported(data, str(path), resource)
+        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
 
 
-@lru_cache(maxsize=4)
-def _imported(data: bytes, name: str, resource: str | None) -> ImportedProject:
-    return import_project(data, name, resource)
+def _resource() -> str | None:
+    context = click.get_current_context(silent=True)
+    return context.meta.get("fbvm.resource") if context else None
 
 
 def given_sources(paths: Sequence[Path]) -> dict[str, Path | str]:
     """By the name that messages use, each source of these files: its path, or its text if it stands within a project."""
-    found: dict[str, Path | str] = {}
     for path in paths:
-        made = imported(path)
-        if made is None:
-            found[str(path)] = path
-        else:
-            found.update((f"{path}/{name}", text) for name, text in made.files.items())
-    return found
+        imported(path)
+    return given.given_sources(paths, _resource())
 
 
 def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]]:
     """What the compiler takes for these files, and what is said about projects among them."""
-    diagnostics = [diagnostic for path in paths if (made := imported(path)) is not None for diagnostic in made.diagnostics]
-    return [Source(name, one) if isinstance(one, str) else one for name, one in given_sources(paths).items()], diagnostics
+    for path in paths:
+        imported(path)
+    return given.inputs(paths, _resource())
 
 
 def sources_of(paths: Sequence[Path]) -> list[Source]:
