@@ -67,15 +67,10 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
     if networks:
-        for unit in (attached.own for run in runs for attached in run.plc.units):
-            if unit is not None:  # what takes long once is done before time begins
-                unit.prepare()
+        _prepare(runs, start_ns)
         watchdogs = [Watchdog(run.plc) for run in runs]
         clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
-            servicing = run.plc.servicing
-            if not servicing.clock_ns:
-                servicing.clock_ns = local_date_ns() - start_ns
             run.begin(start_ns + run.phase_ns, real.behind)
     else:  # nothing happens between two periods of virtual time
         for run in runs:
@@ -99,6 +94,16 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         clock.stop()
         for watchdog in watchdogs:
             watchdog.stop()
+
+
+def _prepare(runs: Sequence[Running], start_ns: int) -> None:
+    """Does what comes before real time begins: what takes long once for units, and the date for PLCs without one."""
+    for run in runs:
+        for unit in (attached.own for attached in run.plc.units):
+            if unit is not None:
+                unit.prepare()
+        if not run.plc.servicing.clock_ns:
+            run.plc.servicing.clock_ns = local_date_ns() - start_ns
 
 
 def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog]) -> None:
