@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import heapq
 import time
-from calendar import timegm
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, cast
 
@@ -16,6 +15,7 @@ from fbvm.base.host import monotonic_clock
 from fbvm.engine.clock import Clock
 from fbvm.machine.plc import Plc
 from fbvm.run.host_clock import function_at
+from fbvm.run.host_date import local_date_ns
 from fbvm.run.interrupts import Interrupts
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.run.watchdog import Watchdog
@@ -25,8 +25,6 @@ RunNumbers = dict[int, None]
 """An ordered set of run numbers."""
 PROGRESS_NS = 100_000_000
 """The shortest time between two calls of `progress`."""
-YEAR_2000_S = 946_684_800
-"""2000-01-01 in seconds since 1970."""
 PAUSE_NS = 1_000_000
 """How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
@@ -280,12 +278,6 @@ class _RealClock:
     def stop(self) -> None:
         for network in self._networks:
             network.driven = False
-
-
-def local_date_ns() -> int:
-    """The host's date and local time in nanoseconds since 2000-01-01 00:00, as the clock of a PLC has it."""
-    now_ns = time.time_ns()
-    return (timegm(time.localtime(now_ns // 1_000_000_000)) - YEAR_2000_S) * 1_000_000_000 + now_ns % 1_000_000_000
 
 
 def epoch_ns() -> int:
