@@ -136,6 +136,8 @@ ACCESS_RIGHT = 48
 """Who has the access right by FINS: bit 24 is ON if anybody has; then unit, node and network, a byte each."""
 CYCLE_TIMES = 64
 """Cycle times for FINS, 64-bit each: how many were measured, least and longest, then the last eight in ns."""
+DATE_SECOND = 152
+"""The second of the clock that A351 to A354 show, counted from 2000-01-01 00:00:00 on as 1; 0 before the first scan."""
 NEVER = (1 << 63) - 1
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import heapq
 import time
-from calendar import timegm
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, cast
 
@@ -16,6 +15,7 @@ from fbvm.base.host import monotonic_clock
 from fbvm.engine.clock import Clock
 from fbvm.machine.plc import Plc
 from fbvm.run.host_clock import function_at
+from fbvm.run.host_date import local_date_ns
 from fbvm.run.interrupts import Interrupts
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.run.watchdog import Watchdog
@@ -25,8 +25,6 @@ RunNumbers = dict[int, None]
 """An ordered set of run numbers."""
 PROGRESS_NS = 100_000_000
 """The shortest time between two calls of `progress`."""
-YEAR_2000_S = 946_684_800
-"""2000-01-01 in seconds since 1970."""
 PAUSE_NS = 1_000_000
 """How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
@@ -67,13 +65,10 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
     if networks:
-        _prepare(runs)
+        _prepare(runs, start_ns)
         watchdogs = [Watchdog(run.plc) for run in runs]
         clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
-            servicing = run.plc.servicing
-            if servicing.is_needed and not servicing.clock_ns:
-                servicing.clock_ns = local_date_ns() - start_ns
             run.begin(start_ns + run.phase_ns, real.behind)
     else:  # nothing happens between two periods of virtual time
         for run in runs:
@@ -99,11 +94,14 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
             watchdog.stop()
 
 
-def _prepare(runs: Sequence[Running]) -> None:
-    """Does what takes long once, before time begins."""
-    for unit in (attached.own for run in runs for attached in run.plc.units):
-        if unit is not None:
-            unit.prepare()
+def _prepare(runs: Sequence[Running], start_ns: int) -> None:
+    """Does what comes before real time begins: what takes long once for units, and the date for PLCs without one."""
+    for run in runs:
+        for unit in (attached.own for attached in run.plc.units):
+            if unit is not None:
+                unit.prepare()
+        if not run.plc.servicing.clock_ns:
+            run.plc.servicing.clock_ns = local_date_ns() - start_ns
 
 
 def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog]) -> None:
@@ -280,12 +278,6 @@ class _RealClock:
     def stop(self) -> None:
         for network in self._networks:
             network.driven = False
-
-
-def local_date_ns() -> int:
-    """The host's date and local time in nanoseconds since 2000-01-01 00:00, as the clock of a PLC has it."""
-    now_ns = time.time_ns()
-    return (timegm(time.localtime(now_ns // 1_000_000_000)) - YEAR_2000_S) * 1_000_000_000 + now_ns % 1_000_000_000
 
 
 def epoch_ns() -> int:

@@ -9,11 +9,13 @@ from ipaddress import IPv4Address
 
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.base.files import reason
 from fbvm.base.toml import load_toml
 from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
+from fbvm.interchange.formats.given import inputs
 from fbvm.machine.backplane import KINDS, UNIT_OF_AREA, make_unit
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
@@ -115,7 +117,15 @@ class Plant:
             self._report(("plc", row.name, "sources"), f"plc.{row.name}.sources: there is no file {source}", near(source))
         if missing:
             return None
-        compilation = compile_files(row.sources, program=row.program, libraries=row.libraries, runnable=True,
+        try:
+            sources, said = inputs(row.sources, row.resource)
+        except OSError as error:
+            self._report(("plc", row.name, "sources"), f"plc.{row.name}.sources: a project cannot be read: {reason(error)}")
+            return None
+        self.diagnostics += said
+        if errors(said):
+            return None
+        compilation = compile_files(sources, program=row.program, libraries=row.libraries, runnable=True,
                                     resource=row.resource, dialect=row.dialect, no_warn=self._wanted.no_warn,
                                     warnings_as_errors=self._wanted.as_errors)
         self.diagnostics += compilation.diagnostics

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.interchange.formats.given import inputs
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.recording.recording import Recording
 from fbvm.run.plant import Kind, Plant
@@ -47,7 +48,8 @@ class PlantRig:
             self._add(kind)
 
     def _add(self, kind: Kind) -> None:
-        read_again = [read(path, str(path)) for path in kind.row.sources]
+        given, _ = inputs(kind.row.sources, kind.row.resource)
+        read_again = [one if isinstance(one, Source) else read(one, str(one)) for one in given]
         sources = {source.name: source for source in read_again if isinstance(source, Source)}
         for name, run in zip(kind.names, kind.runs, strict=True):
             image = run.plc.image

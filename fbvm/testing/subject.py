@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.files import reason
 from fbvm.base.types import fold
 from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.check.symbols.facts import Report
 from fbvm.check.symbols.library import Libraries
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
+from fbvm.interchange.formats.given import within
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
@@ -95,7 +97,7 @@ def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] =
     the warnings, `dialect` is the dialect of the compiler.  With `alone` the files' other programs are left out.  Raises
     SubjectError, and ValueError for an unknown dialect."""
     __tracebackhide__ = True
-    sources = [_read(path) for path in files] + ([Source("test.st", text)] if text else [])
+    sources = [source for path in files for source in _read(path)] + ([Source("test.st", text)] if text else [])
     if alone and name:
         sources = [_without_other_programs(source, name) for source in sources]
     stubs = stubs or {}
@@ -196,11 +198,21 @@ def _blanked(text: str, nodes: Iterable[tree.Pou]) -> str:
     return text
 
 
-def _read(path: Path) -> Source:
-    source = read(path, os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path))
+def _read(path: Path) -> list[Source]:
+    """The source in a file, or those within a project of another tool."""
+    name = os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path)
+    try:
+        project = within(Path(name))
+    except OSError as error:
+        raise SubjectError(f"{name} cannot be read: {reason(error)}") from None
+    if project is not None:
+        if wrong := project.errors:
+            raise SubjectError("\n".join(message.render() for message in wrong))
+        return [Source(file, text) for file, text in project.texts.items()]
+    source = read(path, name)
     if not isinstance(source, Source):
         raise SubjectError(source.render())
-    return source
+    return [source]
 
 
 def pous(source: Source) -> list[tree.Pou]:

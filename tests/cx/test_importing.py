@@ -234,6 +234,70 @@ END;"""
     assert seen == [(1, 1, 1), (0, 1, 0), (1, 1, 0), (0, 0, 1), (0, 0, 0)]
 
 
+DELAY = """BEGIN
+FBType:="FBLadder";
+FunctionBlock:=
+BEGIN
+IEC1131Type:=3;
+Name:="DELAY";
+POUHeader:=
+BEGIN
+PouVarList:=
+<list>
+1,A,0,,0,FALSE,0,;
+2,Q,0,,0,FALSE,0,;
+0,Pause,13,,0,0,0,between the two;
+0,Parts,14,,0,0,0,;
+</list>
+PouVarCount:=4;
+END;
+POUBody:=
+BEGIN
+FBProgramData:=
+BEGIN
+FBRC:=2;
+FBR[0]:=
+BEGIN
+[0]:="0,0,1,1,1,1,A, 0";
+[1]:="1,0,1,0,3,5,TIM, 0,Pause, 0,#3, 0";
+END;
+FBR[1]:=
+BEGIN
+[0]:="0,0,1,1,1,1,Pause, 0";
+[1]:="1,0,1,0,1,2,Q, 0";
+END;
+END;
+END;
+END;
+END;"""
+
+
+def test_a_timer_of_a_block_is_one_of_each_instance() -> None:
+    def call(name: str, entering: str, leaving: str) -> tuple[str, ...]:
+        return ("0|1|1|1|1|LD|P_On|1", f"1|0|7|1|1|FBCALL|{name}|9", f"0|2|8|1|1|FB_INPUT|{entering}|10",
+                f"3|2|8|1|1|FB_OUTPUT|{leaving}|11")  # fmt: skip
+
+    rungs = (call("D1x", "0.00", "1.00"), call("D2x", "0.01", "1.01"))
+    instances = "D1x,,FUNCTION BLOCK,DELAY,A,", "D2x,,FUNCTION BLOCK,DELAY,A,"
+    made = imported(Cxt(instances, sections=(("Main", rungs),), blocks=(DELAY,)))
+    assert not made.errors, [d.render() for d in made.errors]
+    assert 'Pause,,TIMER,,,,"between the two";' in made.files["DELAY.st"]
+    plc = started(made)
+    seen = []
+    for scan in range(8):
+        plc.write("CIO 0.00", scan < 6)
+        plc.write("CIO 0.01", scan >= 2)
+        plc.scan(scan * 100_000_000)
+        seen.append((plc.read("CIO 1.00"), plc.read("CIO 1.01")))
+    assert [first for first, _ in seen] == [False, False, False, True, True, True, False, False]
+    assert [second for _, second in seen] == [False] * 5 + [True] * 3
+
+
+def test_a_timer_as_a_pin_is_refused_by_name() -> None:
+    made = imported(Cxt(blocks=(DELAY.replace("0,Pause,13", "1,Pause,13"),)))
+    assert "variable Pause is not taken over: a TIMER as a pin is not emulated" in made.errors[0].message
+
+
 def test_elements_that_are_not_known_are_named_with_their_rung() -> None:
     for rung, words in ((("0|1|6|1|1|LD|P_On|1",), "kind 6"), (("broken",), "is not understood"),
                         (("0|1|1|1|1|LD|P_On|1", "1|0|7|1|1|FBCALL|Nobody|9"), "no definition")):  # fmt: skip

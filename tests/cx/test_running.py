@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 from cx_text import SAMPLE
 
 from fbvm.cli.main import main
+from fbvm.cli.shared.debug.launch import open_launch
+from fbvm.dap.target import LaunchError
 from fbvm.interchange.cx.compression import compress
+from fbvm.testing.plant_rig import PlantRig
+from fbvm.testing.rig import Rig
+from fbvm.testing.subject import SubjectError, subject
 
 
 def test_a_project_runs_and_its_recording_has_its_rungs(tmp_path: Path) -> None:
@@ -30,3 +36,52 @@ def test_a_damaged_project_ends_every_verb_with_its_sentence(tmp_path: Path) -> 
         assert done.exit_code == 3, verb
         assert "error X0401" in done.output, verb
         assert "it is cut" in done.output, verb
+
+
+def saved(folder: Path, cut: int | None = None) -> Path:
+    file = folder / "line3.cxp"
+    file.write_bytes(compress(SAMPLE.bytes())[:cut])
+    return file
+
+
+def test_a_plc_of_an_fbvm_toml_runs_a_project(tmp_path: Path) -> None:
+    saved(tmp_path)
+    toml = tmp_path / "fbvm.toml"
+    toml.write_text('[run]\nfor = "50ms"\n[plc.line]\nsources = ["line3.cxp"]\nwatch = ["Pump"]\n'
+                    'set = [{name = "Start_PB", value = true}]\n', encoding="utf-8")  # fmt: skip
+    done = CliRunner().invoke(main, ["run", str(toml)])
+    assert done.exit_code == 0, done.output
+    assert "Pump = TRUE" in done.output
+    plant = PlantRig(toml)
+    plant.run("30ms")
+    assert plant.line["Pump"] is True
+    saved(tmp_path, 300)
+    done = CliRunner().invoke(main, ["run", str(toml)])
+    assert done.exit_code == 3 and "error X0401" in done.output
+    with pytest.raises(SubjectError, match="it is cut"):
+        PlantRig(toml)
+
+
+def test_a_test_takes_a_project_and_each_of_its_programs(tmp_path: Path) -> None:
+    file = saved(tmp_path)
+    for name in (None, "NewProgram1"):
+        rig = Rig(subject([file], name))
+        rig.scan(Start_PB=True)
+        assert rig["Pump"] is True, name
+    saved(tmp_path, 300)
+    with pytest.raises(SubjectError, match="it is cut"):
+        subject([file], None)
+    with pytest.raises(SubjectError, match="cannot be read"):
+        subject([tmp_path / "none.cxp"], None)
+
+
+def test_a_debugger_opens_a_project_with_the_texts_of_its_programs(tmp_path: Path) -> None:
+    file = saved(tmp_path)
+    target = open_launch({"program": str(file)})
+    assert {Path(name).name for name in target.texts} >= {"NewProgram1.st"}
+    assert "LADDER" in target.texts[f"{file}/NewProgram1.st"]
+    target.close()
+    saved(tmp_path, 300)
+    with pytest.raises(LaunchError, match="cannot be taken over") as told:
+        open_launch({"program": str(file)})
+    assert "it is cut" in told.value.output

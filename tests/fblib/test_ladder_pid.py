@@ -1,4 +1,4 @@
-"""PID(190): the nine words of its settings, the sampling period, and loops that come to rest."""
+"""PID(190) and PIDAT(191): the nine words of its settings, the sampling period, and loops that come to rest."""
 
 from __future__ import annotations
 
@@ -103,3 +103,108 @@ def test_a_heater_comes_to_rest_at_the_set_value() -> None:
         power = step(plc, round(warmth))[0]
         warmth += (power - (warmth - 20.0)) * 0.02
     assert warmth == pytest.approx(150, abs=2)
+
+
+def test_settings_are_read_where_the_condition_rises_and_constants_later_only_if_asked() -> None:
+    for settings, expected in ((0, 0x20), (2, 0x40)):
+        plc = loop(settings=settings)
+        plc.write("W0.00", True)
+        assert step(plc, 0x40) == [0x40]
+        plc.write("D11", P_100 // 2)
+        plc.write("D15", settings | 1)
+        assert step(plc, 0x60) == [expected]
+        plc.write("D10", 0x90)
+        assert step(plc, 0x80) == [0x10 if settings == 0 else 0x20], "the set value may change"
+
+
+def test_settings_that_were_wrong_are_read_again_only_behind_off() -> None:
+    plc = loop(band=0)
+    plc.write("W0.00", True)
+    step(plc, 0x40)
+    plc.write("D11", P_100)
+    assert step(plc, 0x40, 2) == [0, 0] and plc.read("CF3") is True
+    plc.write("W0.00", False)
+    step(plc, 0x40)
+    plc.write("W0.00", True)
+    assert step(plc, 0x40) == [0x40] and plc.read("CF3") is False
+
+
+def test_the_integral_that_a_loop_begins_with() -> None:
+    for ranges, settings, before, expected in ((0x2090, 0, 0x55, 0x55), (0x4090, 8, 0x55, 0), (0x0090, 8, 0x55, 0x80)):
+        plc = loop(ti=1000, ranges=ranges, settings=settings)
+        plc.write("D100", before)
+        plc.write("W0.00", True)
+        assert step(plc, 0x80)[0] == expected, hex(ranges)
+
+
+def test_a_process_value_beyond_its_range_counts_as_the_highest() -> None:
+    plc = loop(settings=1)
+    plc.write("W0.00", True)
+    assert step(plc, 0x7FFF) == step(plc, 0xFF)
+
+
+class Heater:
+    """A heater with a delay: the process value in D0, in 8 bits."""
+
+    def __init__(self, plc: Plc) -> None:
+        self.plc, self.warmth, self.powers = plc, 20.0, [0] * 5
+
+    def run(self, scans: int) -> None:
+        for _ in range(scans):
+            self.powers.append(step(self.plc, round(self.warmth))[0])
+            self.warmth += (self.powers[-5] - (self.warmth - 20.0)) * 0.02
+
+
+def tuned(gain: int = 0, hysteresis: int = 0, forward: bool = False) -> Plc:
+    plc = Plc(plc_of("LD W0.00\nPIDAT(191) D0 D10 D100").image, 100 * MS)
+    for at, value in enumerate((150, 5000, 8000, 0, 10, int(forward), SECONDS_TENTHS, 0, 0, 0x8000 | gain, hysteresis)):
+        plc.write(f"D{10 + at}", value)
+    return plc
+
+
+def test_autotuning_finds_constants_with_which_the_loop_comes_to_rest() -> None:
+    plc = tuned()
+    heater = Heater(plc)
+    plc.write("W0.00", True)
+    heater.run(40)
+    assert {0, 255} >= set(heater.powers[6:]) and plc.read("D19") == 0x8000
+    heater.run(1000)
+    found = [int(plc.read(f"D{at}")) for at in (11, 12, 13, 19)]
+    assert found[3] == 0 and found[:3] != [5000, 8000, 0]
+    band, integral, derivative, _ = found
+    assert 10 <= band <= 500 and integral == pytest.approx(4 * derivative, abs=4)
+    heater.run(2000)
+    assert heater.warmth == pytest.approx(150, abs=3)
+
+
+def test_the_gain_of_autotuning_widens_the_band() -> None:
+    bands = []
+    for gain in (100, 200):
+        plc = tuned(gain, 50)
+        plc.write("W0.00", True)
+        Heater(plc).run(1000)
+        bands.append(int(plc.read("D11")))
+    assert bands[1] == pytest.approx(2 * bands[0], abs=2)
+
+
+def test_autotuning_that_is_broken_off_leaves_the_constants() -> None:
+    plc = tuned()
+    heater = Heater(plc)
+    plc.write("W0.00", True)
+    heater.run(40)
+    plc.write("D19", 0)
+    heater.run(200)
+    assert [plc.read(f"D{at}") for at in (11, 12, 13)] == [5000, 8000, 0]
+    assert not {0, 255} >= set(heater.powers[-10:])
+
+
+def test_wrong_settings_of_autotuning_are_an_error() -> None:
+    for gain, hysteresis in ((1001, 0), (0, 1001)):
+        plc = tuned(gain, hysteresis)
+        plc.write("W0.00", True)
+        step(plc, 0)
+        assert plc.read("CF3") is True
+    plc = tuned(0, 0xFFFF)
+    plc.write("W0.00", True)
+    step(plc, 0)
+    assert plc.read("CF3") is False

@@ -12,11 +12,11 @@ import click
 from fbvm.base.files import SOURCE_BYTES, read_file, write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
-from fbvm.cli.shared.given_sources import is_cx_project
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
 from fbvm.interchange.cx.read.importing import ImportedProject, import_project
+from fbvm.interchange.formats.given import is_cx_project
 from fbvm.interchange.plcopen.read.importing import Imported, import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
 

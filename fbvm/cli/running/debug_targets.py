@@ -13,6 +13,7 @@ from fbvm.cli.shared.options import Mapping
 from fbvm.cli.shared.project_arguments import read_given_project
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.code.image import Image
+from fbvm.interchange.formats.given import given_sources
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
@@ -71,7 +72,8 @@ class ProjectTarget(DebugTarget):
             said = f"there is no PLC {name}" if name else "there are several PLCs; say which by --plc NAME"
             raise click.UsageError(f"{said}; there is {', '.join(names)}")
         self._number = names.index(name or names[0])
-        self.files = {str(path): path for kind in plant.kinds for path in kind.row.sources}
+        self.files = {name: one for kind in plant.kinds
+                      for name, one in given_sources(kind.row.sources, kind.row.resource).items()}
         self.libraries = tuple(folder for kind in plant.kinds for folder in kind.row.libraries)
         self.image = plant.runs[self._number].plc.image
 

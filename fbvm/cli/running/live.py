@@ -14,6 +14,7 @@ import click
 from fbvm.base.diagnostics import errors
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
+from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import CYCLE_NS, Door, Mapping, address, door, mapping, time_ns
 from fbvm.cli.shared.paths import SourcePath
@@ -21,6 +22,7 @@ from fbvm.cli.shared.project_arguments import allow_outside_option, project_argu
 from fbvm.cli.shared.run_recording import program_text, record_run
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, report_diagnostics, source_options
 from fbvm.cli.shared.terminal import say
+from fbvm.interchange.formats.given import given_sources as sources_within
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
@@ -110,7 +112,7 @@ def _run_files(
             unusable(error)
         say_doors(found)
         network.notices.tell = notice_teller(HOW_TO_MAP, found)
-    texts = source_texts(image, {str(file): file for file in files} | {file.name: file for file in files}, libraries)
+    texts = source_texts(image, {file.name: file for file in files} | given_sources(files), libraries)
     page.run({files[0].stem: (plc, texts)}, [Running(plc, scans=ENDLESS)], program=program,
              repeated=files if network.virtual_time and not mappings else (), trace=trace,
              text=program_text(files, libraries, program=program, **compile_options()))  # fmt: skip
@@ -142,7 +144,7 @@ class _Page:
         plcs = {}
         for kind in plant.kinds:
             texts = source_texts(kind.runs[0].plc.image, {path.name: path for path in kind.row.sources}
-                                 | {str(path): path for path in kind.row.sources}, kind.row.libraries)  # fmt: skip
+                                 | sources_within(kind.row.sources, kind.row.resource), kind.row.libraries)
             for name, run in zip(kind.names, kind.runs, strict=True):
                 plcs[name] = run.plc, texts
         self.run(plcs, [Running(run.plc, scans=ENDLESS, writes=run.writes) for run in plant.runs])

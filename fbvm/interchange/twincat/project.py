@@ -54,8 +54,13 @@ def read_project(path: Path) -> ImportedProject:
         made.sources += [found.source] if found.source else []
         tasks += [found.task] if found.task else []
     if tasks:
-        made.sources.append(Source(f"{path}/{TASKS}", configuration(tasks)))
+        made.sources.append(task_source(str(path), tasks))
     return made
+
+
+def task_source(name: str, tasks: list[Element]) -> Source:
+    """The source that says when the programs run, for tasks out of a file of this name."""
+    return Source(f"{name}/{TASKS}", configuration(tasks))
 
 
 def _is_excluded(item: Element) -> bool:

@@ -5,7 +5,10 @@ units are from W393 and W394 (auxiliary area, condition flags); what is assumed 
 
 from __future__ import annotations
 
-from fbvm.base.areas import AREAS
+from array import array
+from datetime import datetime, timedelta
+
+from fbvm.base.areas import AREAS, CLOCK, DATE_SECOND
 from fbvm.base.memory import Memory
 from fbvm.engine.native.scans.code import MOST_CYCLE, ClockWordTable
 
@@ -20,6 +23,13 @@ CYCLE_TIME = 264
 TENTH_MS_NS = 100_000
 FREE_COUNTERS = ((0, 10_000_000), (1, 100_000_000))
 """A0 counts 10 ms, A1 100 ms, both modulo 65536 (newer CPU units; assumed for all)."""
+
+DATE = 351
+"""A351 to A354, in BCD: minute and second, day and hour, year and month, day of the week with Sunday as 0 (CP1H operation
+6-8 p385).  They are written when a second has passed."""
+EPOCH = datetime(2000, 1, 1)
+"""From when on the PLC's clock counts."""
+SECOND_NS = 1_000_000_000
 
 ALWAYS_ON = 113
 PERIODS_NS = {100: 100_000_000, 101: 200_000_000, 102: 1_000_000_000, 103: 20_000_000, 104: 60_000_000_000, ALWAYS_ON: 1}
@@ -39,6 +49,7 @@ class ClockWords:
 
     def __init__(self, memory: Memory) -> None:
         self._a = memory.words("A")
+        self._system = memory.views["i64"]
         self._bytes = memory.u8
         self._slot = -1
         self._counters: list[tuple[int, int]] = []
@@ -58,6 +69,10 @@ class ClockWords:
         a[MAX_CYCLE_TIME], a[MAX_CYCLE_TIME + 1] = longest & 0xFFFF, longest >> 16
         if now_ns // SLOT_NS != self._slot:
             self._enter(now_ns)
+        second = max(self._system[CLOCK // 8] + now_ns, 0) // SECOND_NS + 1
+        if second != self._system[DATE_SECOND // 8]:
+            self._system[DATE_SECOND // 8] = second
+            a[DATE:DATE + 4] = _date_words(second - 1)
         for at, count in self._counters:
             a[at] = count
         for at, keep, pulses in self._pulses:
@@ -87,6 +102,18 @@ class ClockWords:
         return bool(self._a[word] >> bit & 1)
 
 
+def _date_words(second: int) -> array[int]:
+    """The four words of a second since 2000-01-01 00:00:00."""
+    now = EPOCH + timedelta(seconds=second)
+    pairs = (now.minute, now.second), (now.day, now.hour), (now.year % 100, now.month), (0, now.isoweekday() % 7)
+    return array("H", (bcd(high) << 8 | bcd(low) for high, low in pairs))
+
+
+def bcd(value: int) -> int:
+    """Two decimal digits in BCD."""
+    return value // 10 << 4 | value % 10
+
+
 def _clock_words() -> ClockWordTable:
     """What `ClockWords.update` writes in a scan that is not the first, as data for machine code."""
     a = AREAS["A"].offset
@@ -97,6 +124,7 @@ def _clock_words() -> ClockWordTable:
         cycle_time=(a + 2 * CYCLE_TIME, a + 2 * MAX_CYCLE_TIME, TENTH_MS_NS),
         counters=tuple((a + 2 * at, unit_ns) for at, unit_ns in FREE_COUNTERS),
         pulses=tuple((at, keep, tuple(periods)) for at, keep, periods in _ROWS),
+        date=a + 2 * DATE,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from fbvm.code.image import Image
 from fbvm.machine.scan.clock_words import CYCLE_TIME, FIRST_CYCLE, TENTH_MS_NS
 from fbvm.machine.scan.refresh import Attached
 from fbvm.machine.servicing import commands
+from fbvm.machine.servicing.clock_setting import clock_setting_of
 from fbvm.machine.servicing.cpu import Machine
 from fbvm.machine.servicing.ports import ports_of
 from fbvm.machine.servicing.registers import Registers
@@ -27,15 +28,17 @@ class PeripheralServicing:
         self._known: list[Attached] = []
         self._units: list[tuple[FinsUnit, Attached]] = []
         self._ports = ports_of(image, machine.memory)
+        self._setting = clock_setting_of(image, machine.memory)
         self._has_changed = False
 
     @property
     def is_needed(self) -> bool:
-        """True if a unit serves FINS, or the program has network instructions, so that each scan has to end with `serve`."""
+        """True if a unit serves FINS, or the program has network instructions or DATE, so that each scan has to end with
+        `serve`."""
         if self._known != self._machine.units:
             self._known = list(self._machine.units)
             self._units = [(row.unit, row) for row in self._known if isinstance(row.unit, FinsUnit) and row.unit.has_fins]
-        return bool(self._units) or self._ports is not None
+        return bool(self._units) or self._ports is not None or self._setting is not None
 
     @property
     def wake_ns(self) -> int:
@@ -44,7 +47,7 @@ class PeripheralServicing:
 
     @property
     def clock_ns(self) -> int:
-        """The PLC's clock at power-on, which FINS reads and sets: ns since 2000-01-01 00:00.  Setting it is an input."""
+        """The PLC's clock at power-on, which FINS and DATE set: ns since 2000-01-01 00:00.  Setting it is an input."""
         return self.registers.clock_ns
 
     @clock_ns.setter
@@ -56,6 +59,8 @@ class PeripheralServicing:
         self._has_changed = False
         self._measure()
         if self._ports and self._ports.serve(now_ns, self._send):
+            self._has_changed = True
+        if self._setting and self._setting.serve(self.registers, now_ns):
             self._has_changed = True
         for unit, attached in self._units:
             if requests := unit.serve(self, now_ns):

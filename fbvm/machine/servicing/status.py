@@ -6,6 +6,7 @@ import struct
 from datetime import datetime, timedelta
 
 from fbvm.base.areas import E_NAMES
+from fbvm.machine.scan.clock_words import EPOCH, bcd
 from fbvm.machine.servicing.cpu import Asked, Refused
 from fbvm.wire.fins.codes import EndCode
 from fbvm.wire.fins.frames import CPU_BUS_UNITS, Address
@@ -15,7 +16,6 @@ MODEL = b"CJ2M-CPU33-FBVM"
 PROGRAM_MODE, MONITOR_MODE, RUN_MODE = 0x00, 0x02, 0x04
 WHOLE_PROGRAM = (0xFFFF, 0x0000)
 """Program numbers that mean the program."""
-EPOCH = datetime(2000, 1, 1)
 TENTH_MS_NS = 100_000
 LOG_RECORDS = 20
 BCD_LAST = 0x99
@@ -120,7 +120,7 @@ def read_clock(asked: Asked) -> bytes:
     """0701: year, month, day, hour, minute, second, day of the week (00 is Sunday), in BCD."""
     now = EPOCH + timedelta(microseconds=(asked.registers.clock_ns + asked.machine.now_ns) // 1000)
     fields = (now.year % 100, now.month, now.day, now.hour, now.minute, now.second, now.isoweekday() % 7)
-    return bytes(value // 10 << 4 | value % 10 for value in fields)
+    return bytes(map(bcd, fields))
 
 
 def set_clock(asked: Asked) -> bytes:

@@ -43,8 +43,9 @@ class LadderBlocks:
             ".address": self.address, ".value_address": self.address,
             ".failure": lambda: self.failure("CX_FAL"), ".fatal_failure": lambda: self.failure("CX_FALS"),
         }  # fmt: skip
-        self._timers: dict[int, Instruction] = {}
-        """By number, the row of the instruction that defines a timer in the LADDER."""
+        self._timers: dict[int | str, Instruction] = {}
+        """By number, or by the name of one that each instance has, the row of the instruction that defines a timer in the
+        LADDER."""
 
     def find_timers(self, texts: list[RungText]) -> None:
         """Note the timers that the rungs define; called before the first rung is lowered."""
@@ -81,7 +82,8 @@ class LadderBlocks:
         off = (context.truth(False),) * row.inputs
         inhibited = context.if_reachable(self._called(instance, [*off, *operands])) if row.kind == "FB" else ()
         passed: tuple[Statement, ...] = ()
-        if first == "t" and row.kind == "FB" and self._number(first) < REFRESHED:
+        number = self._number(first) if numbered else 0
+        if first == "t" and row.kind == "FB" and isinstance(number, int) and number < REFRESHED:
             passed = (self._update(instance, operands[:2]),)
         context.emit(*context.if_reachable(self._called(instance, [*conditions, *operands])), inhibited=inhibited, passed=passed)
 
@@ -94,16 +96,17 @@ class LadderBlocks:
                       for pin, value in zip(("Flag", "PV"), flag_and_value, strict=True)]
         return CallStatement(start, end, Call(start, end, instance, tuple(arguments)))
 
-    def _named(self, row: Instruction, number: int) -> str:
+    def _named(self, row: Instruction, number: int | str) -> str:
         """The name of the instance of a timer or counter; two mnemonics with one number have an instance each."""
-        return f"${row.mnemonic}{number}"
+        return f"${row.mnemonic}{number}" if isinstance(number, int) else f"${row.mnemonic}:{number}"
 
     def _called(self, instance: Expr, arguments: list[Expr]) -> CallStatement:
         context = self.context
         call = Call(context.start, context.end, instance, tuple(Argument(a.start, a.end, "", None, a) for a in arguments))
         return CallStatement(context.start, context.end, call)
 
-    def _number(self, letter: str) -> int:
+    def _number(self, letter: str) -> int | str:
+        """The number of the timer or counter in the first operand, or the name of one that each instance has."""
         text = self.context.line.step.operands[0]
         number = self._timer(text, letter)
         if number is None:
@@ -112,8 +115,12 @@ class LadderBlocks:
                                f"numbers are 0 to {TIMERS - 1}; a symbol is declared AT {letter.upper()}0005 before the rungs")
         return number
 
-    def _timer(self, text: str, letter: str = "t") -> int | None:
-        """The number of a timer or counter, written as a number or as a symbol; None if `text` is neither."""
+    def _timer(self, text: str, letter: str = "t") -> int | str | None:
+        """The number of a timer or counter, written as a number or as a symbol, or the name of one that each instance has;
+        None if `text` is none of these."""
+        own = self.context.operands.own.get(text.upper())
+        if own:
+            return text.upper() if own[0] == letter.upper() else None
         text = self.context.operands.numbered.get(text.upper(), text)
         digits = text[1:] if text[:1].upper() == letter.upper() else text
         return whole_number(digits) if digits.isdecimal() and whole_number(digits) < TIMERS else None
@@ -123,6 +130,9 @@ class LadderBlocks:
         start, end = self.context.line.places[0]
         flag, value = ("TF", "T") if letter == "t" else ("CNF", "C")
         number = self._number(letter)
+        if isinstance(number, str):
+            _, value = self.context.operands.own[number]
+            return [NameRef(start, end, self.context.line.step.operands[0]), NameRef(start, end, value)]
         return [Direct(start, end, f"%{flag}{number}"), Direct(start, end, f"%{value}{number}")]
 
     def reset_timer(self) -> None:

@@ -15,7 +15,7 @@ from fbvm.syntax.ladder.operands import OperandError
 from fbvm.syntax.ladder.sequences import Sequences
 from fbvm.syntax.ladder.spans import Spans
 from fbvm.syntax.ladder.stops import with_one_stop, without_stops
-from fbvm.syntax.ladder.symbols import declaration, number
+from fbvm.syntax.ladder.symbols import declaration, is_own, number, present_value
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree.ladder import Ladder, Rung
@@ -42,6 +42,10 @@ class LadderLowering:
             if timer := number(symbol):
                 self.builder.numbered[symbol.name.upper()] = timer
             elif symbol.name:
+                if is_own(symbol):
+                    value = present_value(symbol)
+                    context.operands.own[symbol.name.upper()] = symbol.type[0], value.names[0].text
+                    context.instances.append(value)
                 context.instances.append(declaration(symbol))
         self.spans.find_jumps(texts)
         self.blocks.find_timers(texts)

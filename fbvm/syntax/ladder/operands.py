@@ -74,6 +74,8 @@ class Operands:
     def __init__(self, reach: Reach = _nowhere, numbered: Mapping[str, str] | None = None) -> None:
         self.reach = reach
         self.numbered = {} if numbered is None else numbered
+        self.own: dict[str, tuple[str, str]] = {}
+        """Symbols of timers and counters of each instance, in capitals: T or C, and the name of the present value."""
         self.role = ""
         self.located: dict[tuple[str, str], tree.VarDecl] = {}
 
@@ -93,6 +95,8 @@ class Operands:
             return self._register(register, wanted, start, end)
         if "," in text and not _REAL.fullmatch(text):
             return self._pointed(text, wanted, start, end)
+        if (own := self.own.get(text.upper())) and wanted not in "bBv":
+            return self._own_value(text, own[1], wanted, start, end)
         if text[:1] in "#&+-":
             return self._constant(text, wanted, start, end)
         if text[:1] in "@*":
@@ -115,6 +119,13 @@ class Operands:
         else:
             place = self.expression(text, wanted, start, end)
         return Contents(start, end, place, "", None)
+
+    def _own_value(self, text: str, name: str, wanted: str, start: int, end: int) -> Expr:
+        """The present value of a timer or counter of the instance."""
+        if wanted not in "wWaA":
+            raise OperandError(f"{text} cannot be {self.role}", "its present value is one word, and it has no number")
+        value = NameRef(start, end, name)
+        return value if wanted in "wW" else Words(start, end, value)
 
     # --- constants ---
 

@@ -3,6 +3,9 @@
     Start_PB,0.00,BOOL,,,,"start button";
     Level,D100,INT,,,,"";
     Delay,T0005,TIMER,,,,"";
+    Pause,,TIMER,,,,"";
+
+The last one has no number: each instance of the POU has a timer of its own by that name.
 """
 
 from __future__ import annotations
@@ -27,11 +30,24 @@ def number(symbol: Symbol) -> str:
     return f"{symbol.type[0]}{whole_number(digits)}" if digits.isdecimal() else ""
 
 
+def is_own(symbol: Symbol) -> bool:
+    """Whether a symbol names a timer or a counter that each instance of the POU has of its own."""
+    return bool(symbol.name) and symbol.type in NUMBERED and not symbol.address
+
+
 def declaration(symbol: Symbol) -> VarDecl:
-    """The variable that a row declares; without an address its place is chosen by the compiler."""
+    """The variable that a row declares; without an address its place is chosen by the compiler.  That of a timer or counter
+    of each instance is its completion flag."""
     start, end = symbol.start, symbol.start + len(symbol.name)
     place = Location(start, end, symbol.address) if symbol.address else None
-    return VarDecl(start, end, (Name(start, end, symbol.name),), place, _spec(symbol.type, start, end), None)
+    kind = "BOOL" if is_own(symbol) else symbol.type
+    return VarDecl(start, end, (Name(start, end, symbol.name),), place, _spec(kind, start, end), None)
+
+
+def present_value(symbol: Symbol) -> VarDecl:
+    """The variable with the present value of a timer or counter of each instance."""
+    start, end = symbol.start, symbol.start + len(symbol.name)
+    return VarDecl(start, end, (Name(start, end, f"${symbol.name}:value"),), None, NamedType(start, end, "WORD"), None)
 
 
 def _spec(kind: str, start: int, end: int) -> TypeSpec:

@@ -25,11 +25,16 @@ def described(frame: Command | Response | Damaged) -> str:
     header = frame.header
     way = f"FINS {header.source.node} -> {header.destination.node}, service {header.service}: {command_name(frame.code)}"
     if isinstance(frame, Command):
-        details = _DETAILS.get(frame.code)
-        more = details(frame.parameters) if details else ""
+        more = told(frame)
         return way + (f", {more}" if more else "") + ("" if header.wants_response else ", no response wanted")
     data = f", {len(frame.data)} bytes" if frame.data else ""
     return f"{way}: {meaning_of(frame.end_code)}{data}"
+
+
+def told(command: Command) -> str:
+    """What the parameters of a command say; "" for a command without any, or with others than expected."""
+    details = _DETAILS.get(command.code)
+    return details(command.parameters) if details else ""
 
 
 def described_message(message: Message) -> str:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from io import BytesIO, StringIO
 
 import pytest
+from depth import times
 from fins_rig import COUNTING, FinsRig, TcpClient, compiled
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from fbvm import Plc, Recording, RecordingFile, RecordingWriter, compile_text
 from fbvm.net.journal import Journal, open_journal
@@ -89,6 +93,66 @@ def test_the_clock_of_a_plc_is_set_from_outside() -> None:
     rig = FinsRig()
     rig.plc.servicing.clock_ns = 86_400_000_000_000 * 31
     assert rig.command(0x0701) == ("0000", "00 02 01 00 00 00 02")
+
+
+def date(plc: Plc) -> str:
+    return " ".join(f"{plc.read(f'A{number}'):04X}" for number in (351, 352, 353, 354))
+
+
+def test_a351_to_a354_show_the_clock_that_fins_sets() -> None:
+    rig = FinsRig()
+    assert date(rig.plc) == "0000 0100 0001 0006", "it begins on a Saturday"
+    rig.command(0x0702, "24 02 28 23 59 58 03")
+    rig.plc.run(scans=1)
+    assert date(rig.plc) == "5958 2823 2402 0003"
+    rig.plc.run(scans=200)
+    assert date(rig.plc) == "0000 2900 2402 0004"
+
+
+PLC_WITH_DATE = """PROGRAM Main
+VAR S AT D0 : ARRAY[0..3] OF WORD := [16#3015, 16#2208, 16#2611, 0]; END_VAR
+LADDER
+    LD W0.00
+    @DATE(735) D0
+END_LADDER
+END_PROGRAM"""
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_the_program_sets_the_clock(engine: str) -> None:
+    plc = Plc(compiled(PLC_WITH_DATE).image, engine=engine)
+    plc.run(scans=3)
+    plc.write("W0.00", True)
+    plc.run(scans=2)
+    assert date(plc) == "3015 2208 2611 0000", "a Sunday"
+    copy = plc.fork()
+    for each in (plc, copy):
+        each.run(scans=500)
+        assert date(each) == "3020 2208 2611 0000"
+    before = plc.snapshot()
+    for place, wrong in {"D3": 7, "D2": 0x2613, "D1": 0x3108, "D0": 0x1A00}.items():
+        plc.restore(before)
+        plc.write(place, wrong)
+        plc.write("W0.00", False)
+        plc.run(scans=1)
+        plc.write("W0.00", True)
+        plc.run(scans=1)
+        assert plc.read("P_ER") and date(plc).endswith("2208 2611 0000"), place
+
+
+COUNTED = "PROGRAM Main VAR n : UINT; END_VAR n := n + 1; END_PROGRAM"
+
+
+@settings(deadline=None, max_examples=times(10))
+@given(st.datetimes(datetime(2000, 1, 1), datetime(2099, 12, 31)))
+def test_both_engines_show_any_date_as_the_calendar_has_it(now: datetime) -> None:
+    now = now.replace(microsecond=0)
+    for engine in ("python", "native"):
+        plc = Plc(compiled(COUNTED).image, engine=engine)
+        plc.run(scans=1)
+        plc.servicing.clock_ns = int((now - datetime(2000, 1, 1)).total_seconds()) * 1_000_000_000 - plc.elapsed_ns
+        plc.run(scans=3)
+        assert date(plc) == now.strftime("%M%S %d%H %y%m 000%w")
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import json
 
 from fbvm.record.trace.requests import RequestLog
 from fbvm.wire import modbus
+from fbvm.wire.fins.tcp import Kind, Message, client_node
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu, exception_reply
 from fbvm.wire.tap import TapEvent, TapKind
@@ -98,3 +99,67 @@ def test_a_reply_that_nobody_asked_for() -> None:
     told = Told()
     told.data(True, adu(b"\3\2\0\0"))
     assert told.rows() == []
+
+
+FINS = Peer("192.168.250.21", 9600)
+
+
+def fins(code: str, service: int = 1, icf: str = "80", node: int = 25) -> bytes:
+    return bytes.fromhex(f"{icf} 00 02 00 01 00 00 {node:02X} 00 {service:02X} {code}")
+
+
+def answer(code: str, service: int = 1, node: int = 25) -> bytes:
+    return bytes.fromhex(f"C0 00 02 00 {node:02X} 00 00 01 00 {service:02X} {code}")
+
+
+def says(told: Told, out: bool, data: bytes, kind: TapKind = TapKind.UDP) -> None:
+    told.log.tap(500_000_000, FINS.host, TapEvent(kind, FINS, CLIENT, out, data))
+
+
+def test_a_fins_command_and_its_response() -> None:
+    told = Told()
+    says(told, False, fins("0101 82 0064 00 0003"))
+    assert told.rows() == [], "until it is answered"
+    says(told, True, answer("0101 0000 0001 0002 0003"))
+    assert told.rows() == [
+        {"time": 1_700_000_000.5, "peer": "127.0.0.1:50001", "command": "0101", "says": "memory area read, D100, 3 elements",
+         "result": "0000", "scan": 7},
+    ]  # fmt: skip
+
+
+def test_fins_responses_belong_to_their_service_numbers_and_nodes() -> None:
+    told = Told()
+    for service, node, code in ((1, 25, "0701"), (1, 26, "0601"), (2, 25, "0402")):
+        says(told, False, fins(code, service, node=node))
+    for service, node, code in ((2, 25, "0402 2102"), (1, 26, "0601 0000"), (1, 25, "0701 0000"), (9, 25, "0701 0000")):
+        says(told, True, answer(code, service, node))
+    assert [(row["command"], row["result"]) for row in told.rows()] == [("0402", "2102"), ("0601", "0000"), ("0701", "0000")]
+
+
+def test_a_fins_command_that_wants_no_response_and_bytes_that_are_none() -> None:
+    told = Told()
+    says(told, False, fins("0402", icf="81"))
+    for wrong in (b"", b"GET / HTTP/1.1", fins("")[:-1]):
+        says(told, False, wrong)
+    assert [(row["command"], row["says"], row["result"]) for row in told.rows()] == [("0402", "stop", None)]
+
+
+def test_fins_over_tcp_in_any_pieces() -> None:
+    told = Told()
+    asked = client_node().to_bytes() + Message(Kind.FRAME, fins("0701", 5)).to_bytes()
+    for start in range(0, len(asked), 7):
+        says(told, False, asked[start : start + 7], TapKind.DATA)
+    says(told, True, Message(Kind.FRAME, answer("0701 0000 26 11 22 13 44 04 00", 5)).to_bytes(), TapKind.DATA)
+    assert [(row["command"], row["result"]) for row in told.rows()] == [("0701", "0000")]
+    says(told, False, b"", TapKind.RST)
+    says(told, False, b"GET / HTTP/1.1", TapKind.DATA)
+    assert len(told.rows()) == 1
+
+
+def test_commands_that_nobody_answers_are_forgotten() -> None:
+    told = Told()
+    for number in range(3000):
+        says(told, False, fins("0701", number % 256, node=1 + number // 256))
+    for number in (0, 2999):
+        says(told, True, answer("0701 0000", number % 256, 1 + number // 256))
+    assert len(told.rows()) == 1

@@ -10,6 +10,7 @@ import click
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
+from fbvm.base.files import reason
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import Mapping as Mapped
@@ -17,6 +18,7 @@ from fbvm.cli.shared.options import mapping
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.dap.target import LaunchError, Target, checked
+from fbvm.interchange.formats.given import given_sources, inputs
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
@@ -119,7 +121,13 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     if given.get("dialect", "standard") not in DIALECTS:
         raise LaunchError(f"there is no dialect {given['dialect']!r}; there are {', '.join(DIALECTS)}")
     files, libraries = _sources(given, folder), [folder / str(path) for path in given.get("libraries", ())]
-    compilation = compile_files(files, program=given.get("main"), libraries=libraries, runnable=True, drawn=True,
+    try:
+        sources, said = inputs(files, given.get("resource"))
+    except OSError as error:
+        raise LaunchError(f"a project of CX-Programmer cannot be read: {reason(error)}") from None
+    if errors(said):
+        raise LaunchError("the project of CX-Programmer cannot be taken over", _said(said))
+    compilation = compile_files(sources, program=given.get("main"), libraries=libraries, runnable=True, drawn=True,
                                 resource=given.get("resource"), dialect=given.get("dialect", "standard"))  # fmt: skip
     image = _image(compilation.image, compilation.diagnostics)
     sets = [_SetRow.of(row) for row in given.get("set", ())]
@@ -139,9 +147,9 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
             plc.attach(unit, network)
         return [Debugged("plc", plc, [row.of_plc(plc) for row in sets])]
 
-    texts = source_texts(image, {str(path): path for path in files}, libraries)
+    texts = source_texts(image, given_sources(files, given.get("resource")), libraries)
     return _target(given, World(make), texts, {str(path): path for path in files}, tapped, cycle_ns,
-                   _said(compilation.diagnostics))  # fmt: skip
+                   _said([*said, *compilation.diagnostics]))  # fmt: skip
 
 
 def _recording(path: Path, libraries: Sequence[Path]) -> Target:
@@ -231,7 +239,7 @@ def _project(given: Mapping[str, Any], path: Path) -> Target:
     world = World(make)
     texts: dict[str, str] = {}
     for kind in first.kinds:
-        files = {str(path): path for path in kind.row.sources}
+        files = given_sources(kind.row.sources, kind.row.resource)
         texts |= source_texts(kind.runs[0].plc.image, files, kind.row.libraries)
     paths = {str(path): path for kind in first.kinds for path in kind.row.sources}
     target = _target(given, world, texts, paths, tapped, world[chosen].cycle_ns, notes)

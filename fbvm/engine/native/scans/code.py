@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
+from fbvm.engine.native.scans.date import date_text
 from fbvm.engine.native.scans.parameters import COUNT, addresses
 from fbvm.engine.native.scans.units import Shape, refresh_text
 
@@ -26,6 +27,8 @@ class ClockWordTable:
     """Words of 16 bits that count, and what they count, in nanoseconds."""
     pulses: tuple[tuple[int, int, tuple[tuple[int, int, int], ...]], ...] = ()
     """Bytes, the bits of them that stay, and the others: mask, period, and from when in it they are ON."""
+    date: int | None = None
+    """Where the four words with the date lie; see `date_text`."""
 
 
 NO_CLOCK_WORDS = ClockWordTable()
@@ -111,6 +114,7 @@ ret i32 0
 $burst
 declare i32 @llvm.umax.i32(i32, i32)
 declare i64 @llvm.umin.i64(i64, i64)
+declare i64 @llvm.smax.i64(i64, i64)
 """)
 _BURST = Template(f"""
 define internal i64 @clock_time(ptr %p) {{
@@ -257,6 +261,8 @@ def _clock_words(row: ClockWordTable) -> Iterator[str]:
                         f"%rc{n}.{k} = select i1 %rb{n}.{k}, i8 {mask}, i8 0",
                         f"%p{n}.{k + 1} = or i8 %p{n}.{k}, %rc{n}.{k}")
         yield f"store i8 %p{n}.{len(bits)}, ptr %pa{n}"
+    if row.date is not None:
+        yield from date_text(row.date)
 
 
 def _rows(count: int) -> Iterator[str]:

@@ -187,7 +187,11 @@ class _Sources:
             raise SymbolError(f"the usage {variable.usage} is not known: it may be an in-out or an external")
         note = f" // {variable.comment}" if variable.comment else ""
         if variable.type in (TIMER, COUNTER):
-            raise SymbolError("timers and counters of an instance are not emulated; each instance has a number of its own")
+            kind = "TIMER" if variable.type == TIMER else "COUNTER"
+            if variable.usage != "0":
+                raise SymbolError(f"a {kind} as a pin is not emulated")
+            comment = variable.comment.replace('"', "'")
+            return [f'{spelling(variable.name)},{variable.address},{kind},,,,"{comment}";']
         if variable.type not in _TYPES:
             raise SymbolError(f"the type number {variable.type} is not known")
         kind = _TYPES[variable.type]

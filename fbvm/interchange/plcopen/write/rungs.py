@@ -20,7 +20,7 @@ from fbvm.syntax.ladder.drawing.diagram import WIRE
 from fbvm.syntax.ladder.instructions.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder.mnemonics import Symbol, read_rungs
 from fbvm.syntax.ladder.operands import SYMBOLS, OperandError, Operands
-from fbvm.syntax.ladder.symbols import number
+from fbvm.syntax.ladder.symbols import is_own, number
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
 
 COILS = {"OUT": {}, "OUTNOT": {"negated": "true"}, "SET": {"storage": "set"}, "RSET": {"storage": "reset"},
@@ -83,6 +83,9 @@ class RungWriter:
         for symbol in self._symbols(ladder):
             if timer := number(symbol):
                 self.numbered[symbol.name.upper()] = timer
+            elif is_own(symbol):
+                raise NotExportable(ladder, f"{symbol.name} is a {symbol.type.lower()} of each instance, for which other tools "
+                                    "have no name", f"give it a number, as in {symbol.name},T0005,TIMER,,,,")
         for instance in ladder.instances:
             name = instance.names[0].text
             if name.upper() not in self.taken and name not in self.declared:

@@ -1,0 +1,95 @@
+"""Source files as somebody names them, with the sources within a project of another tool in place of its file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.files import SOURCE_BYTES, read_file
+from fbvm.interchange.cx.markup import is_project
+from fbvm.interchange.cx.read.importing import import_project
+from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.twincat import objects as twincat
+from fbvm.interchange.twincat.project import PROJECT_SUFFIX, TASK_SUFFIX, read_project, task_source
+
+CX_SUFFIXES = (".cxp", ".cxt")
+TWINCAT_SUFFIXES = (*twincat.SUFFIXES, TASK_SUFFIX)
+SUFFIXES = (*CX_SUFFIXES, PROJECT_SUFFIX, *TWINCAT_SUFFIXES)
+"""Endings, in small letters, of files of other tools; PLCopen XML is known by what it says."""
+DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
+"""What a document in PLCopen XML has among its first bytes."""
+
+
+@dataclass(frozen=True)
+class Within:
+    """The sources within a file of another tool: texts by the names that messages use, and what could not be taken over."""
+
+    texts: Mapping[str, str]
+    diagnostics: Sequence[Diagnostic]
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """Diagnostics about parts that were not taken over."""
+        return errors(self.diagnostics)
+
+
+def is_cx_project(path: Path) -> bool:
+    """Whether a file is a project of CX-Programmer, or is called so.  Raises OSError if it cannot be read."""
+    return path.suffix.lower() in CX_SUFFIXES or is_project(read_file(path, SOURCE_BYTES))
+
+
+def within(path: Path, resource: str | None = None) -> Within | None:
+    """The sources within a file: a project of CX-Programmer or TwinCAT, an object of TwinCAT, a document in PLCopen XML; None for
+    all others.
+
+    `resource` is the name of the PLC where a project has several.  Raises OSError if a file that is called so cannot be read."""
+    suffix = path.suffix.lower()
+    if suffix == PROJECT_SUFFIX:
+        project = read_project(path)
+        return Within({source.name: source.text for source in project.sources}, project.diagnostics)
+    try:
+        data = read_file(path, SOURCE_BYTES) if path.is_file() or suffix in SUFFIXES else b""
+    except OSError:
+        if suffix in SUFFIXES:
+            raise
+        return None
+    return _within(data, str(path), suffix, resource)
+
+
+@lru_cache(maxsize=4)
+def _within(data: bytes, name: str, suffix: str, resource: str | None) -> Within | None:
+    if suffix in TWINCAT_SUFFIXES:
+        made = twincat.read_object(data, name)
+        source = task_source(name, [made.task]) if made.task else made.source
+        return Within({source.name: source.text} if source else {}, made.diagnostics)
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and DOCUMENT in data[:HEAD_BYTES]:
+        document = import_xml(data, name)
+        return Within({f"{name}/{file}": text for file, text in document.files.items()}, document.diagnostics)
+    if suffix in CX_SUFFIXES or is_project(data):
+        project = import_project(data, name, resource)
+        return Within({f"{name}/{file}": text for file, text in project.files.items()}, project.diagnostics)
+    return None
+
+
+def given_sources(paths: Sequence[Path], resource: str | None = None) -> dict[str, Path | str]:
+    """By the name that messages use, each source of these files: its path, or its text if it stands within another file.
+    Raises OSError if a project cannot be read."""
+    found: dict[str, Path | str] = {}
+    for path in paths:
+        made = within(path, resource)
+        if made is None:
+            found[str(path)] = path
+        else:
+            found.update(made.texts)
+    return found
+
+
+def inputs(paths: Sequence[Path], resource: str | None = None) -> tuple[list[Path | Source], list[Diagnostic]]:
+    """What the compiler takes for these files, and what is said about projects among them.  Raises OSError if a project
+    cannot be read."""
+    diagnostics = [one for path in paths if (made := within(path, resource)) is not None for one in made.diagnostics]
+    given = given_sources(paths, resource)
+    return [Source(name, one) if isinstance(one, str) else one for name, one in given.items()], diagnostics
