@@ -22,8 +22,9 @@ RING_BYTES = 64 << 20
 """How much memory a recording takes before its oldest scans give way."""
 AGAIN_NS = 25_000_000
 """About how long it may take to execute again what lies between two keyframes."""
-CALL_NS, SCAN_NS = 20_000, 300
-"""About what a call of `Plc.scan` takes beside its statements, and each scan of one that does many."""
+CALL_NS, SCAN_NS = 45_000, 300
+"""About what a call of `Plc.scan` takes beside its statements, with reading its inputs from a file; and each scan of a call that
+does many."""
 STATEMENT_NS = {True: 2, False: 190}
 """About what a statement takes in machine code, and in Python."""
 BASE_KEYFRAMES = 64
