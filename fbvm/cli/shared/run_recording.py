@@ -49,6 +49,14 @@ def recording_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      help="What a page of the recording carries along: scan ends, also writes, also statements."),
         click.option("--html", type=_FILE, metavar="FILE",
                      help="Write the run as one page for a browser, with every statement."),
+    ):
+        function = decorate(function)
+    return recording_file_options(function)
+
+
+def recording_file_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--trace, --journal and --verify."""
+    for decorate in (
         click.option("--verify", is_flag=True, help="Record a fingerprint of the memory at every scan."),
         click.option("--journal", type=_FILE, metavar="FILE", help="The same as --trace."),
         click.option("--trace", type=_FILE, metavar="FILE",

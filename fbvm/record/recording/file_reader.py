@@ -168,7 +168,7 @@ class FileRecordedPlc(RecordedPlc):
     @property
     def texts(self) -> dict[str, str]:
         """The sources of the program as they were when it was recorded, by name."""
-        return dict(self._text.sources)
+        return self._text.texts
 
     @cached_property
     def is_same(self) -> bool:

@@ -48,6 +48,12 @@ class ProgramText:
                    None if resource is None else str(resource), str(data["dialect"]), bool(data["drawn"]),
                    tuple(map(str, data["e_banks"])))  # fmt: skip
 
+    @property
+    def texts(self) -> dict[str, str]:
+        """The sources of the program and of its own libraries, by the names that sites have."""
+        held = {path if "/" in path else f"{library.name}/{path}": text for library in self.held for path, text in library.files}
+        return held | dict(self.sources)
+
     def compiled(self, libraries: Sequence[Path] = ()) -> Image | str:
         """The program, or why there is none.  `libraries` take the place of its own folders."""
         if not self.sources:

@@ -52,6 +52,7 @@ def test_a_recording_opens_where_the_libraries_are_not(own: Path) -> None:
         source = FileScans(RecordingFile(io.BytesIO(written))["pump"])
         assert [source.at(scan).read("Main.n") for scan in (0, 1, 9)] == [3, 9, 3069]
         assert source.warning == ""
+        assert source.texts["acme/sums/Doubled.st"] == DOUBLED
 
 
 def test_what_has_been_changed_since_is_not_looked_at(own: Path) -> None:
