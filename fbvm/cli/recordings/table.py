@@ -15,7 +15,7 @@ from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.recorder import signals_at
 from fbvm.record.trace.writer import Depth
 
-MOST_SCANS = 20_000
+MOST_SCANS = 10_000
 """Without --scans so many are looked at, the last ones: some seconds."""
 
 
@@ -28,7 +28,7 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool
             libraries: tuple[Path, ...]) -> None:  # fmt: skip
     """Show which statement changed variables of a TRACE, and in which phase of the scan.
 
-    Without --scans, of a longer trace only the last 20,000 scans are looked at.  Status 1 if nothing changed."""
+    Without --scans, of a longer trace only the last 10,000 scans are looked at.  Status 1 if nothing changed."""
     with open_trace(path, plc, libraries, Depth.STATEMENTS) as trace:
         if trace.depth is Depth.SCANS:
             raise click.UsageError(f"{named(path)} holds values at scan ends only, not what statements did")
@@ -37,7 +37,8 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool
         table = ScanTable(trace.sites, trace.names, signals, every)
         if scans is None and len(trace.scans) > MOST_SCANS:
             scans = trace.scans[-MOST_SCANS:]
-            say(f"only scans {scans[0]} to {scans[-1]} were looked at; --scans FIRST..LAST looks at others", fg="yellow", err=True)
+            say(f"only scans {scans[0]} to {scans[-1]} were looked at; --scans FIRST..LAST looks at others", fg="yellow",
+                err=True)
         trace.follow(table, scans)
     bands = [band for band in table.bands if every or band.has_changes]
     if not bands:

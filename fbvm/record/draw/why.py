@@ -24,9 +24,9 @@ from fbvm.watch.values import Value, show_time
 
 DEEPEST = 6
 """The default depth of causes of causes."""
-WINDOWS = (100, 500)
+WINDOWS = (100, 1000)
 """Scans that are searched at once, backwards: first, and then."""
-MOST_SCANS = 20_000
+MOST_SCANS = 10_000
 """Scans that are searched: some seconds."""
 ORDER_BITS = 32
 """The number of an event is that of its window's first scan, shifted by so many bits, and its number in the window."""
