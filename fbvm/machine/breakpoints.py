@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, cast
 
 from fbvm.base.memory import Memory
@@ -110,7 +111,10 @@ class BreakpointRows:
         self._inspected, self._image = plc, image
         self._rows: dict[Breakpoint, LineStop | Watchpoint] = {}
         self._stops = StopTable(plc.memory, len(image.sites))
-        self._names = Names.of(image, image.layout.areas)
+
+    @cached_property
+    def _names(self) -> Names:
+        return Names.of(self._image, self._image.layout.areas)
 
     def __iter__(self) -> Iterator[Breakpoint]:
         return iter(self._rows)

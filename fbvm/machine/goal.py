@@ -63,6 +63,8 @@ class Goal(Generic[P]):
         self._for_ns = NEVER if for_ns is None else plc.elapsed_ns + for_ns
         self._end_ns = self._for_ns if max_ns is None else min(self._for_ns, plc.elapsed_ns + max_ns)
         self._until = self._condition(until)
+        self.calls_out = callable(until)
+        """True if a function is called after each scan, which may do anything."""
         self._started = plc.scans
         self._halted = plc.halted
 

@@ -276,9 +276,16 @@ class Plc(NamedValues):
         `max_ns` bounds the time.  Returns what ended it: "scans", "time", "until", "max", "trap", or "break" for a scan
         that stands at a breakpoint; the next run goes on there."""
         goal = Goal(self, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
-        while not (reason := goal.reached()):
-            if (left := goal.cycles_left) < 2 or not self.scan_many(left):
-                self.scan()
+        recorder = None if goal.calls_out or self.watchers else self._recorder
+        if recorder:
+            recorder.run_begins()
+        try:
+            while not (reason := goal.reached()):
+                if (left := goal.cycles_left) < 2 or not self.scan_many(left):
+                    self.scan()
+        finally:
+            if recorder:
+                recorder.run_ends()
         return reason
 
     def scan_many(self, most: int) -> bool:

@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from operator import attrgetter
 from typing import Any, Protocol, TextIO
 
 from fbvm.base.areas import PAGE_BYTES
@@ -290,11 +291,17 @@ def _watch(steps: int, watch_ns: int) -> tuple[int, int]:
 def from_event(event: Event) -> list[Any]:
     """An event as plain data, `["Received", 1, "0A0B", "192.168.250.1:502"]`: the class, then its fields in order."""
     kind = type(event)
-    return [kind.__name__, *[_plain(getattr(event, name)) for name in _NAMES[kind]]]
+    return [kind.__name__, *map(_plain, _VALUES[kind](event))]
 
 
-_NAMES = {kind: tuple(row.name for row in fields(kind)) for kind in EVENTS.values()}
-"""The names of an event's fields, in order."""
+def _values(kind: type[Event]) -> Callable[[Event], Iterable[Any]]:
+    """A function that gives the values of the fields of such an event, in order."""
+    names = [row.name for row in fields(kind)]
+    get = attrgetter(*names)
+    return get if len(names) > 1 else lambda event: (get(event),)
+
+
+_VALUES = {kind: _values(kind) for kind in EVENTS.values()}
 
 
 def _plain(value: int | str | bytes | Peer) -> int | str:

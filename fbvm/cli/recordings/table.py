@@ -15,6 +15,9 @@ from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.recorder import signals_at
 from fbvm.record.trace.writer import Depth
 
+MOST_SCANS = 10_000
+"""Without --scans so many are looked at, the last ones: some seconds."""
+
 
 @click.command("table")
 @trace_argument
@@ -25,13 +28,17 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool
             libraries: tuple[Path, ...]) -> None:  # fmt: skip
     """Show which statement changed variables of a TRACE, and in which phase of the scan.
 
-    Status 1 if nothing changed."""
+    Without --scans, of a longer trace only the last 10,000 scans are looked at.  Status 1 if nothing changed."""
     with open_trace(path, plc, libraries, Depth.STATEMENTS) as trace:
         if trace.depth is Depth.SCANS:
             raise click.UsageError(f"{named(path)} holds values at scan ends only, not what statements did")
         signals = [signal for text in names for name in split_names(text)
                    for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
         table = ScanTable(trace.sites, trace.names, signals, every)
+        if scans is None and len(trace.scans) > MOST_SCANS:
+            scans = trace.scans[-MOST_SCANS:]
+            say(f"only scans {scans[0]} to {scans[-1]} were looked at; --scans FIRST..LAST looks at others", fg="yellow",
+                err=True)
         trace.follow(table, scans)
     bands = [band for band in table.bands if every or band.has_changes]
     if not bands:

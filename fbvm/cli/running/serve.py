@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
-from typing import IO
+from typing import IO, Any
 
 import click
 from click.core import ParameterSource
@@ -23,7 +23,8 @@ from fbvm.cli.shared.files import OutputError, growing_file, writing
 from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, say_fins, try_fins
 from fbvm.cli.shared.networks import mailbox_names
 from fbvm.cli.shared.options import address, bind_option, time_ns, watch_cycle_option
-from fbvm.cli.shared.sources import compile_or_exit, source_options
+from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, recording_file_options
+from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_options
 from fbvm.cli.shared.terminal import named, say
 from fbvm.code.compiler import compile_files
 from fbvm.machine.backplane import usual_units
@@ -32,12 +33,14 @@ from fbvm.net.notices import Notice, NoticeKind
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.trace import memory_images
 from fbvm.record.trace.requests import RequestLog
+from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT
 from fbvm.wire.link import Peer
 
 CYCLE_NS = 10_000_000
 START_LIMIT_NS = 5_000_000_000
+SHIPPED = data_folder("examples") / "server.st"
 SERVED = {"CIO": 5801, "D": 32768}
 """Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
 
@@ -63,6 +66,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 @click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent so long (60s).")
 @fins_options
 @watch_cycle_option
+@recording_file_options
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.  Words that it does not "
                    "have begin with 0; words of units are not set.")
@@ -71,10 +75,12 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], bind: str, port: int, image: Path | None,
     log: Path | None, watch_ns: int, backlog: bool, fins: bool, fins_bind: str, fins_port: int, fins_node: int | None,
-    fins_control: bool, **settings: int | None,
+    fins_control: bool, trace: Path | None, journal: Path | None, verify: bool, **settings: int | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
     reach the first port at which it waits.  With --fins, SCADA software and libraries that speak FINS reach it, too.
+
+    With --trace all that clients do is recorded; `fbvm chart`, `table`, `why` and `step` look at it, also meanwhile.
 
     Status 5 if the port cannot be used, 4 if a trap stopped the program, 2 if the memory could not be saved, else 0."""
     signals = Signals()
@@ -94,10 +100,12 @@ def command(
             plc.attach(unit, network)
         if door:
             try_fins(network, door)
+        recorded = _recording(stack, plc, files, libraries, program, {"trace": trace, "journal": journal, "verify": verify})
         reason, saved = _start(plc, network, signals, door), True
         while reason != "trap" and not signals.end:
             try:
-                reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)
+                reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT,
+                                  progress=lambda _: recorded.tick())
             except OutputError:  # the log; the memory is saved nevertheless
                 _save(plc, image)
                 raise
@@ -110,7 +118,7 @@ def command(
 
 def _shipped(settings: dict[str, int | None]) -> Plc:
     """A PLC with the server program, its settings written."""
-    program = compile_files([data_folder("examples") / "server.st"], runnable=True, lint=False).image
+    program = compile_files([SHIPPED], runnable=True, lint=False).image
     assert program is not None, "the server's own program compiles"
     plc = Plc(program, CYCLE_NS)
     for name, value in settings.items():
@@ -151,6 +159,18 @@ def _opened(stack: ExitStack, log: Path) -> IO[str]:
         if str(log) == "-":
             return sys.stdout
         return stack.enter_context(TextIOWrapper(growing_file(log, "ab"), encoding="utf-8"))
+
+
+def _recording(stack: ExitStack, plc: Plc, files: tuple[Path, ...], libraries: tuple[Path, ...], program: str | None,
+               paths: Mapping[str, Any]) -> RunRecording:  # fmt: skip
+    """Records the PLC until `stack` is closed, if --trace or --journal asks for it."""
+    options = {**paths, "selected": (), "depth": Depth.SCANS.value}
+    recorded = stack.enter_context(record_run(options, {}))
+    if recorded.recording:
+        sources = files or (SHIPPED,)
+        text = program_text(sources, libraries, program=program, **compile_options())
+        recorded.add(sources[0].stem, plc, described(plc, text, options, sources, libraries))
+    return recorded
 
 
 def _network(bind: str, port: int, backlog: bool, fins: FinsDoor | None) -> TcpNetwork:

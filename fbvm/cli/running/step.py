@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from fbvm.cli.running.debug_targets import DebugTarget, ProjectTarget
 from fbvm.cli.shared import status
@@ -16,19 +19,40 @@ from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
 from fbvm.cli.shared.prompt import prompt_lines
 from fbvm.cli.shared.sources import compile_or_exit, source_options
-from fbvm.cli.shared.terminal import say
+from fbvm.cli.shared.terminal import named, say
+from fbvm.cli.shared.traces import is_recording, open_trace
+from fbvm.record.recording.file_scans import FileScans
+from fbvm.record.trace.packets import Packet
+from fbvm.record.trace.signals import packets
 from fbvm.record.trace.source_texts import source_texts
+from fbvm.record.trace.writer import Depth
 from fbvm.step.commands import CommandError, Commands, ExpectationError
+from fbvm.step.past_session import PastSession
 from fbvm.step.session import Session
 from fbvm.step.stop_report import StopReport
 from fbvm.watch.places import parse_for
+
+PACKET_SCANS = 1000
+"""Scans of a recording up to the present one whose packets `net` knows."""
+
+PAST_PARAMETERS = "files", "name", "libraries", "watched"
+"""What can be given with a recording."""
+
+
+class SourceOrRecording(SourcePath):
+    """A source, a folder, or the file of a recording."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path.  Raises BadParameter."""
+        path = Path(value)
+        return path if path.is_file() and is_recording(path) else super().convert(value, param, ctx)
 
 
 @click.command("step", epilog="At the prompt, `help` lists the commands.  A script: printf 'run Main.Done\\nprint D200\\n' | "
                "fbvm step FILE")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
-@click.option("--plc", "name", metavar="NAME", help="Which PLC of a project; the others scan along.")
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | TRACE]", type=SourceOrRecording())
+@click.option("--plc", "name", metavar="NAME", help="Which PLC of a project, where the others scan along; or of a trace.")
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")
 @allow_outside_option
@@ -47,7 +71,12 @@ def command(
     """Step through a program statement by statement and scan by scan, forth and back, in virtual time.
 
     Going back is real: memory, unit and network are as they were, and what is written there leads to another future.
-    From a pipe, each line is a command; the first that fails ends it with status 1 (`expect`) or 2."""
+    From a pipe, each line is a command; the first that fails ends it with status 1 (`expect`) or 2.
+
+    Of a TRACE, which `fbvm run --trace` wrote, every scan can be stepped through, and nothing can be changed."""
+    if len(files) == 1 and files[0].is_file() and is_recording(files[0]):
+        _past(files[0], name, libraries, watched)
+        return
     for row in mappings:
         if row.host is not None:
             raise click.UsageError(f"stepping stays in memory: --map {row.endpoint}=peer")
@@ -69,6 +98,38 @@ def command(
             list(commands.run(f"watch {text}"))
     except (CommandError, LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
+    _prompt(commands)
+
+
+def _past(path: Path, name: str | None, libraries: Sequence[Path], watched: Sequence[str]) -> None:
+    """Steps through the scans of a recording, from the end of the last one."""
+    context = click.get_current_context()
+    wrong = [parameter.opts[0] for parameter in context.command.params if parameter.name not in PAST_PARAMETERS
+             and context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE]  # fmt: skip
+    if wrong:
+        raise click.UsageError(f"{', '.join(wrong)}: a trace has happened already; beside it there are --plc, --library, --watch")
+    with open_trace(path, name, libraries, Depth.STATEMENTS) as source:
+        assert isinstance(source, FileScans)
+        if not source.scans:
+            raise click.UsageError(f"{named(path)} has no scans yet")
+        session = PastSession(source)
+        texts = source_texts(session.source_plc.image, source.texts, libraries)
+
+        def latest() -> list[Packet]:
+            here = session.here.scan
+            return [packet for _, packet in packets(source, range(here - PACKET_SCANS, here + 1))]
+
+        commands = Commands(session, StopReport(session, texts), latest)
+        try:
+            for text in watched:
+                list(commands.run(f"watch {text}"))
+        except CommandError as error:
+            raise click.UsageError(str(error)) from None
+        _prompt(commands)
+
+
+def _prompt(commands: Commands) -> None:
+    """Says where the session stands, and executes what is typed, or comes from a pipe."""
     for line in commands.stop():
         _print(line)
     if sys.stdin.isatty():

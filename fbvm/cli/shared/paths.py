@@ -13,7 +13,7 @@ _HEAD_BYTES = 4_000
 _DOCUMENT = b"plcopen.org/xml/tc6"
 """What a document in PLCopen XML has among its first bytes: it is taken as the sources within it."""
 _FORMS = (
-    ((b"fbvmrec",), "a recording", "`fbvm chart`, `fbvm table` and `fbvm why` look at it, `fbvm replay` does its run again"),
+    ((b"fbvmrec",), "a recording", "`fbvm chart`, `table`, `why` and `step` look at it, `fbvm replay` does its run again"),
     ((b"fbvmtrc",), "a trace", "`fbvm chart`, `fbvm table` and `fbvm why` look at it"),
     ((b'{"journal"',), "a journal", "`fbvm replay` does its run again"),
     ((b"<!doctype html", b"<html"), "a page", "open it in a browser"),

@@ -22,6 +22,7 @@ from fbvm.machine.plc import Plc
 from fbvm.record.page.data import page_data
 from fbvm.record.page.page import page
 from fbvm.record.recording.file_writer import Described, RecordingWriter
+from fbvm.record.recording.library_texts import library_texts
 from fbvm.record.recording.program_text import ProgramText
 from fbvm.record.recording.recording import RING_BYTES, Recording
 from fbvm.record.recording.scans import RecordedScans
@@ -48,6 +49,14 @@ def recording_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      help="What a page of the recording carries along: scan ends, also writes, also statements."),
         click.option("--html", type=_FILE, metavar="FILE",
                      help="Write the run as one page for a browser, with every statement."),
+    ):
+        function = decorate(function)
+    return recording_file_options(function)
+
+
+def recording_file_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--trace, --journal and --verify."""
+    for decorate in (
         click.option("--verify", is_flag=True, help="Record a fingerprint of the memory at every scan."),
         click.option("--journal", type=_FILE, metavar="FILE", help="The same as --trace."),
         click.option("--trace", type=_FILE, metavar="FILE",
@@ -137,7 +146,7 @@ def described(plc: Plc, program: ProgramText, options: Mapping[str, Any], files:
 def program_text(files: Sequence[Path], libraries: Sequence[Path], **choices: Any) -> ProgramText:
     """The text of a program in these files."""
     texts = tuple((source.name, source.text) for source in sources_of(files))
-    return ProgramText(texts, tuple(str(folder) for folder in libraries), **choices)
+    return ProgramText(texts, tuple(str(folder) for folder in libraries), library_texts(libraries), **choices)
 
 
 def write_page(recorded: RunRecording, path: Path, lines: Mapping[str, Mapping[int, str]]) -> None:

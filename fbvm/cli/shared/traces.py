@@ -64,7 +64,7 @@ def trace_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """--plc and --library, about the file of a recording."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR", type=ExistingPath(file_okay=False),
-                     help="Where folders of libraries are now, if those of the recording are gone; may be repeated."),
+                     help="A folder of libraries to use in place of those that the recording holds; may be repeated."),
         click.option("--plc", metavar="NAME", help="Which PLC of a recording that has several."),
     ):
         function = decorate(function)

@@ -32,6 +32,12 @@ class InputRecorder(Protocol):
     def after(self, scans: int, now_ns: int, step_ns: int = 0) -> None:
         """Called after so many scans, 0 if there was none.  The first was at `now_ns`, each other one `step_ns` later."""
 
+    def run_begins(self) -> None:
+        """Called before scans between which nobody outside has a turn, so that nothing is changed from outside there."""
+
+    def run_ends(self) -> None:
+        """Called when these scans are over."""
+
     def changed(self) -> None:
         """Called when the state of the PLC was changed in a way that is no input: a start, another mode, a new unit, a scan that
         stood at a breakpoint."""

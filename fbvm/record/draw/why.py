@@ -24,8 +24,12 @@ from fbvm.watch.values import Value, show_time
 
 DEEPEST = 6
 """The default depth of causes of causes."""
-WINDOWS = (100, 2000)
-"""Scans that are searched first, and then, before all scans are."""
+WINDOWS = (100, 1000)
+"""Scans that are searched at once, backwards: first, and then."""
+MOST_SCANS = 10_000
+"""Scans that are searched: some seconds."""
+ORDER_BITS = 32
+"""The number of an event is that of its window's first scan, shifted by so many bits, and its number in the window."""
 MOST_FACTS = 32
 """Operands that are kept of a value without a name, and of a condition around a statement."""
 LARGEST_BYTES = 4096
@@ -102,7 +106,7 @@ class Change:
 class Cause:
     """A value, the change that led to it and its causes.
 
-    `change` is None if the scans that were searched have none."""
+    `change` is None if the scans that were searched, from number `first` on, have none."""
 
     place: Place
     value: str
@@ -111,6 +115,7 @@ class Cause:
     repeated: bool = False
     """True if its causes are listed at another place of the tree."""
     causes: list[Cause] = field(default_factory=list)
+    first: int = 0
 
 
 class _Changes:
@@ -132,10 +137,14 @@ class _Changes:
         self._known: Snapshot | None = None
         self._cut = False
         """Whether the scan has executed statements that are not recorded."""
-        self.order = 0
-        trace.follow(self, scans)
+        self.order = scans.start << ORDER_BITS
+        self._first = scans.start
+        trace.follow(self, range(max(trace.scans.start, scans.start - 1), scans.stop))
 
     def phase(self, moment: Instant, phase: Phase) -> None:
+        if moment.scans < self._first:  # the scan before shows what is changed from outside behind it
+            self._known = moment.memory.snapshot() if phase is Phase.REFRESH else None
+            return
         self.order += 1
         now = moment.memory.snapshot()
         if (phase is not Phase.PROGRAM or self._cut) and self._known is not None:
@@ -149,6 +158,8 @@ class _Changes:
             self._reads.clear()
 
     def event(self, moment: Instant, event: Event) -> None:
+        if moment.scans < self._first:
+            return
         self.order += 1
         if isinstance(event, Statement):
             self._reads[event.frame, event.site] = {}
@@ -224,14 +235,15 @@ def why(trace: EventSource, place: Place, scan: int, deepest: int = DEEPEST) -> 
     then = trace.at(scan)
     value = Signal(place, place.name).text(trace.names.read(then.read, place))
     place = _dereferenced(trace.names, then.memory, place)
-    start = trace.scans.start
-    for window in (*WINDOWS, scan - start + 1):
-        first = max(start, scan - window + 1)
-        past = _Changes(trace, range(first, scan + 1))
-        cause = _explain(past, place, value, past.order + 1, deepest, set())
-        if first == start or not _open(cause):
-            break
-    return cause
+    start = max(trace.scans.start, scan - MOST_SCANS + 1)
+    search = _Search(trace, start)
+    end, window = scan + 1, WINDOWS[0]
+    while True:
+        search.begin(range(max(start, end - window), end))
+        cause = search.explain(place, value, (scan + 1) << ORDER_BITS, deepest, set())
+        end, window = max(start, end - window), WINDOWS[1]
+        if end == start or not _open(cause):
+            return cause
 
 
 def _dereferenced(names: Names, memory: Memory, place: Place) -> Place:
@@ -243,19 +255,40 @@ def _dereferenced(names: Names, memory: Memory, place: Place) -> Place:
     return replace(found, name=f"{place.name} ({owner.name})") if owner else found
 
 
-def _explain(past: _Changes, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:
-    change = past.last(place, before)
-    cause = Cause(place, value, change)
-    key = place, change.order if change else -1
-    if key in known:
-        cause.repeated = bool(change and change.facts)
+class _Search:
+    """Searches causes in windows, one before the other: what one has not, the one before may have."""
+
+    def __init__(self, trace: EventSource, first: int) -> None:
+        self._trace, self._first = trace, first
+        self._past: _Changes | None = None
+        self._found: dict[tuple[Place, int], Change] = {}
+        """The changes that led to values of places at events, as far as they are known."""
+
+    def begin(self, scans: range) -> None:
+        """Goes on with the scans in front of those before."""
+        self._past = None  # which frees its memory first
+        self._past = _Changes(self._trace, scans)
+
+    def _last(self, place: Place, before: int) -> Change | None:
+        key = place, before
+        if key not in self._found and self._past and (change := self._past.last(place, before)):
+            self._found[key] = change
+        return self._found.get(key)
+
+    def explain(self, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:
+        """The causes of a value at event `before`, as far as they are known."""
+        change = self._last(place, before)
+        cause = Cause(place, value, change, first=self._first)
+        key = place, change.order if change else -1
+        if key in known:
+            cause.repeated = bool(change and change.facts)
+            return cause
+        known.add(key)
+        for fact in _once(change.facts) if change and deepest else ():
+            inner = self.explain(fact.place, fact.value, fact.order, deepest - 1, known)
+            inner.guard = fact.guard
+            cause.causes.append(inner)
         return cause
-    known.add(key)
-    for fact in _once(change.facts) if change and deepest else ():
-        inner = _explain(past, fact.place, fact.value, fact.order, deepest - 1, known)
-        inner.guard = fact.guard
-        cause.causes.append(inner)
-    return cause
 
 
 def _once(facts: Iterable[Fact]) -> Iterator[Fact]:
@@ -290,6 +323,8 @@ def _since(trace: EventSource, cause: Cause) -> str:
     change = cause.change
     if change is None:
         start = trace.scans.start
+        if cause.first > start:
+            return f" since before scan {cause.first}, the first that was looked at"
         return f" since before scan {start}, the first of the trace" if start else " since power-on"
     when = f" since scan {change.scan} ({show_time(change.now_ns).removeprefix('T#')})"
     if change.phase is Phase.REFRESH:

@@ -56,11 +56,18 @@ class ScanInputs:
     @property
     def size_bytes(self) -> int:
         """About how many bytes of memory this takes."""
-        data = sum(len(data) for rows in (self.writes, self.results, self.refreshed) for _, data in rows)
-        events = [event for told in self.events.values() for event in told]
-        data += sum(len(event.data) for event in events if isinstance(event, Received))
-        data += sum(len(event.data) for _, _, event in self.traffic)
-        return SMALL_BYTES * (1 + len(events) + len(self.traffic)) + data
+        parts, data = 1 + len(self.traffic), 0
+        for rows in (self.writes, self.results, self.refreshed):
+            for _, written in rows:
+                data += len(written)
+        for told in self.events.values():
+            parts += len(told)
+            for event in told:
+                if isinstance(event, Received):
+                    data += len(event.data)
+        for _, _, passed in self.traffic:
+            data += len(passed.data)
+        return SMALL_BYTES * parts + data
 
 
 class Times:

@@ -145,6 +145,8 @@ class FileRecordedPlc(RecordedPlc):
             self.memory_size = describe(_Described(), self.head)
         self._given = images.get(self.name)
         self._chunks: dict[int, Chunk] = {}
+        self._latest: tuple[Chunk | None, int] = None, 0
+        """The chunk that was asked for last, and how many there were then."""
         self._differences: dict[tuple[int, int], int | None] = {}
 
     # --- the program --------------------------------------------------------------------------------------------------
@@ -166,7 +168,7 @@ class FileRecordedPlc(RecordedPlc):
     @property
     def texts(self) -> dict[str, str]:
         """The sources of the program as they were when it was recorded, by name."""
-        return dict(self._text.sources)
+        return self._text.texts
 
     @cached_property
     def is_same(self) -> bool:
@@ -231,6 +233,9 @@ class FileRecordedPlc(RecordedPlc):
         return range(self._blocks.chunks[row].first, self._blocks.chunks[row].end)
 
     def chunk(self, scan: int) -> Chunk:
+        chunk, count = self._latest
+        if chunk and chunk.first <= scan < chunk.times.end and count == len(self._blocks.chunks):
+            return chunk
         blocks = self._blocks.chunks[self.keyframe(scan)]
         at = blocks.keyframe.at
         found = self._chunks.get(at)
@@ -238,6 +243,7 @@ class FileRecordedPlc(RecordedPlc):
             while len(self._chunks) >= KEPT_CHUNKS:
                 del self._chunks[next(iter(self._chunks))]
             found = self._chunks[at] = self._read(blocks)
+        self._latest = found, len(self._blocks.chunks)
         return found
 
     def _read(self, blocks: ChunkBlocks) -> Chunk:
@@ -276,14 +282,15 @@ class FileRecordedPlc(RecordedPlc):
         return self._keyframes.base(read_block(self._file, head))
 
     def inputs(self, scan: int) -> ScanInputs | None:
-        found = self.chunk(scan).next_inputs(scan)
-        if found is None and scan == self.scans.stop and self._last:
+        chunk = self.chunk(scan)
+        if scan >= chunk.times.end and self._last:
             return self._last[1]
-        return found
+        return chunk.next_inputs(scan)
 
     def now_ns(self, scan: int) -> int:
-        last = self._last if scan == self.scans.stop else None
-        return last[0] if last else self.chunk(scan).times.at(scan)
+        chunk = self.chunk(scan)
+        last = self._last if scan >= chunk.times.end else None
+        return last[0] if last else chunk.times.at(scan)
 
     @contextmanager
     def applying(self, scan: int) -> Iterator[None]:

@@ -31,6 +31,11 @@ class FileScans(RecordedScans):
         """The first scan, of those that were asked for, from which on values are those of keyframes."""
 
     @property
+    def texts(self) -> dict[str, str]:
+        """The sources of the program as they were when it was recorded, by name."""
+        return self._file.texts
+
+    @property
     def warning(self) -> str:
         """What a reader has to know about the values that were had; "" if they are those of the run."""
         if self.differs is None:

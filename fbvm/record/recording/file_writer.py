@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -30,7 +30,7 @@ PIECE_BYTES = 1 << 18
 """Inputs of this size are written without waiting for the next keyframe."""
 
 
-def fingerprint(memory: bytes | bytearray) -> int:
+def fingerprint(memory: bytes) -> int:
     """A checksum of a memory, without the page of the system."""
     return zlib.crc32(memoryview(memory)[FIRST_BYTE:])
 
@@ -88,8 +88,8 @@ class PlcWriter:
         """Up to which scan, and how many inputs, the last chunk is written."""
         self._bytes = 0
         """Of the inputs that are written."""
-        self._known = bytearray()
-        """The memory behind the last scan."""
+        self._memory: Callable[[], bytes] = bytes
+        """Gives the memory behind the last scan."""
         self._settled: int | None = None
         """Its fingerprint, if that memory is not had any more."""
         self._memories: list[int] = []
@@ -128,13 +128,13 @@ class PlcWriter:
     def settle(self) -> None:
         """Called before the memory that was told last is overwritten."""
         if self._settled is None:
-            self._settled = fingerprint(self._known)
+            self._settled = fingerprint(self._memory())
 
-    def ended(self, known: bytearray) -> None:
-        """Called behind scans, with the memory: inputs that take much room are written."""
-        self._known, self._settled = known, None
+    def ended(self, memory: Callable[[], bytes]) -> None:
+        """Called behind scans; `memory` gives the memory behind the last of them.  Inputs that take much room are written."""
+        self._memory, self._settled = memory, None
         if self._writer.verify:
-            self._memories.append(fingerprint(known))
+            self._memories.append(fingerprint(memory()))
         if self._chunk and self._chunk.inputs_bytes - self._bytes > PIECE_BYTES:
             self.flush()
 
@@ -145,7 +145,7 @@ class PlcWriter:
             return
         if len(self._memories) != scans:
             self._memories.clear()  # not asked for, or scans were broken off
-        settled = fingerprint(self._known) if self._settled is None else self._settled
+        settled = fingerprint(self._memory()) if self._settled is None else self._settled
         payload = encode_scans(chunk.times.rows(first), chunk.inputs[self._inputs :], chunk.machine,
                                settled, self._memories)  # fmt: skip
         self._writer.put(SCANS, payload, self._number, first, scans)

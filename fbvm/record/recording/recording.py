@@ -22,8 +22,9 @@ RING_BYTES = 64 << 20
 """How much memory a recording takes before its oldest scans give way."""
 AGAIN_NS = 25_000_000
 """About how long it may take to execute again what lies between two keyframes."""
-CALL_NS, SCAN_NS = 20_000, 300
-"""About what a call of `Plc.scan` takes beside its statements, and each scan of one that does many."""
+CALL_NS, SCAN_NS = 45_000, 300
+"""About what a call of `Plc.scan` takes beside its statements, with reading its inputs from a file; and each scan of a call that
+does many."""
 STATEMENT_NS = {True: 2, False: 190}
 """About what a statement takes in machine code, and in Python."""
 BASE_KEYFRAMES = 64
@@ -111,9 +112,11 @@ class PlcRecording(RecordedPlc):
         """True between `before` and `after`."""
         self._has_changed = True
         """True if the state was changed by something that is no input."""
-        self._known = bytearray(plc.memory.size)
-        """The memory at the end of the last scan."""
-        self._known_view = memoryview(self._known)
+        self._known = bytes(plc.memory.size)
+        """The memory at the end of the last scan, unless that `is_uncopied`."""
+        self._is_alone = self._is_uncopied = False
+        """True while nobody outside has a turn between two scans; true if the memory is as the last scan has left it, without
+        having been copied."""
         self._before_refresh = b""
         self._units: list[ResumableUnit] = []
         """Those whose settings are inputs, and how often they have been set."""
@@ -203,11 +206,11 @@ class PlcRecording(RecordedPlc):
             self._has_begun = True
             return
         self._has_begun = True
-        if self._known != plc.memory.u8:
+        if not self._is_uncopied and (memory := plc.memory.map[:]) != self._known:
             if self._written:
                 self._written.settle()
-            pending.writes += changes(bytes(self._known), plc.memory.map[:])
-            self._known_view[:] = plc.memory.u8
+            pending.writes += changes(self._known, memory)
+            self._known = memory
         if plc.budget != self._budget:
             pending.budget = self._budget = plc.budget
         if (forces := plc.forces) != self._forces:
@@ -242,7 +245,9 @@ class PlcRecording(RecordedPlc):
         if not pending.is_empty:
             self._put(chunk, pending, scans)
             self._pending = ScanInputs(plc.scans)
-        self._known_view[:] = plc.memory.u8
+        self._is_uncopied = self._is_alone
+        if not self._is_alone:
+            self._known = plc.memory.map[:]
         statements = plc.budget - plc.memory.views["i64"][BUDGET // 8]
         machine = plc.engine.machine is not None
         chunk.machine = chunk.machine or machine
@@ -250,7 +255,19 @@ class PlcRecording(RecordedPlc):
         if chunk.inputs_bytes > MOST_INPUT_BYTES:
             self._cost_ns = AGAIN_NS + 1
         if self._written:
-            self._written.ended(self._known)
+            self._written.ended(self._memory)
+
+    def run_begins(self) -> None:
+        """Until `run_ends`, nobody outside has a turn between two scans: memory need not be compared."""
+        self._is_alone = True
+
+    def run_ends(self) -> None:
+        """From here on the memory may be changed from outside."""
+        self._is_alone, self._known, self._is_uncopied = False, self._memory(), False
+
+    def _memory(self) -> bytes:
+        """The memory at the end of the last scan."""
+        return self._plc.memory.map[:] if self._is_uncopied else self._known
 
     def changed(self) -> None:
         """The next scan begins a chunk."""
@@ -293,7 +310,7 @@ class PlcRecording(RecordedPlc):
         self._times_set = [unit.times_set for unit in self._units]
         chunks.append(Chunk(plc.snapshot(), frames, plc.budget, follows))
         self._pending = ScanInputs(plc.scans, traffic=self._pending.traffic)
-        self._known_view[:] = plc.memory.u8
+        self._known, self._is_uncopied = plc.memory.map[:], False
         self._forces, self._budget = plc.forces, plc.budget
         self._cost_ns, self._has_changed = 0, False
         if self._written:

@@ -157,7 +157,8 @@ class Replay:
         if plc.halted:
             return
         self._results.clear()
-        plc.engine.allowance = WHOLE_BUDGET
+        if plc.engine.allowance is not WHOLE_BUDGET:
+            plc.engine.allowance = WHOLE_BUDGET
 
     def _begin(self, number: int) -> None:
         """Executes a scan with its inputs."""

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 import shlex
+import socket
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -106,6 +109,15 @@ scan 8   80ms
 
 
 @pytest.mark.slow
+def test_a_table_of_a_long_trace_is_of_its_end(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fbvm.cli.recordings.table.MOST_SCANS", 40)
+    record(fbvm)
+    late = fbvm("table", "run.fbtrace", "Main.Start,Main.Pump")
+    assert (late.exit_code, late.output) == (
+        1, "only scans 20 to 59 were looked at; --scans FIRST..LAST looks at others\nnone of these changed\n")
+    assert "scan 3 " in fbvm("table", "run.fbtrace", "Main.Start", "--scans", "..").output
+
+
 def test_every_statement(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "statements")
     assert "pump.st:16" in fbvm("table", "run.fbtrace", "D200", "--scans", "8", "--every").output
@@ -121,6 +133,48 @@ def test_why(fbvm: Fbvm) -> None:
     assert lines[1] == "├ if Main.Pump = TRUE since scan 8 (80ms), by pump.st:17 in Main:  Pump := Delay.Q;"
     assert "by iec/TON.st:28 in Main.Delay:  Q := TRUE;" in lines[2]
     assert fbvm("why", "D200", "run.fbtrace", "--deep", "0").output == lines[0] + "\n"
+
+
+def test_stepping_through_a_trace(fbvm: Fbvm) -> None:
+    record(fbvm)
+    Path("pump.st").unlink()
+    script = "back Main.Pump = FALSE\nexpect Main.Pump = FALSE\ngoto 4\nstep\nwhy Main.Start\nD200 := 3\n"
+    result = CliRunner().invoke(main, ["step", "run.fbtrace", "--watch", "Main.Start"], input=script)
+    assert result.exit_code == 2
+    assert "> back Main.Pump = FALSE\nscan 8, 80ms: pump.st:" in result.output
+    assert "  Main.Pump: TRUE -> FALSE\n" in result.output
+    assert "Main.Start = TRUE since scan 3 (30ms), from outside the program" in result.output
+    assert result.output.endswith("> D200 := 3\nthis is a recording: it can be looked at, not changed\n")
+
+
+@pytest.mark.parametrize("arguments, said", [
+    (["--cycle", "5ms"], "--cycle: a trace has happened already; beside it there are --plc, --library, --watch"),
+    (["--plc", "nobody"], "choose a PLC with --plc NAME; the recording has pump"),
+    (["--watch", "nobody"], "nobody"),
+])  # fmt: skip
+def test_what_stepping_through_a_trace_refuses(fbvm: Fbvm, arguments: list[str], said: str) -> None:
+    record(fbvm)
+    result = fbvm("step", "run.fbtrace", *arguments)
+    assert (result.exit_code, said in result.output) == (2, True), result.output
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM to react to")
+def test_what_clients_of_a_server_did(fbvm: Fbvm) -> None:
+    command = [sys.executable, "-m", "fbvm", "serve", "--port", "0", "--trace", "run.fbtrace"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            port = int(process.stdout.readline().rpartition(":")[2])
+            with socket.create_connection(("127.0.0.1", port), timeout=30) as client:
+                for value in (100, 200):
+                    client.sendall(bytes.fromhex("0001 0000 0006 01 06 000A") + value.to_bytes(2, "big"))
+                    assert len(client.recv(100)) == 12
+        finally:
+            process.terminate()
+        assert process.wait(timeout=60) == 0
+    assert re.search(r"ETN_Modbus_Write.st:18 +>200\n", fbvm("table", "run.fbtrace", "D10").output)
+    assert "D10 = 200 since scan" in fbvm("why", "D10", "run.fbtrace").output
 
 
 def test_out_as_csv_and_in_again(fbvm: Fbvm) -> None:

@@ -84,6 +84,22 @@ def test_memory_that_is_written_by_hand_is_an_input(image: Image) -> None:
     assert (again.read("D77"), again.memory.u8[-1]) == (5, 9)
 
 
+@pytest.mark.parametrize("when", ["until", "watcher"])
+def test_memory_that_is_written_during_a_run_is_an_input(image: Image, when: str) -> None:
+    plc = Plc(image)
+    kept = recorded(plc)
+
+    def write(*_: object) -> bool:
+        if plc.scans == 5 and not plc.read("D77"):
+            plc.memory.words("D")[77] = 5
+        return False
+
+    if when == "watcher":
+        plc.watchers.append(write)
+    plc.run(scans=10, until=write if when == "until" else None)
+    assert [row.read("D77") for row in map(kept.at, range(4, 8))] == [0, 0, 5, 5]
+
+
 def test_what_is_not_recorded_is_said(image: Image) -> None:
     plc = Plc(image)
     kept = recorded(plc)
