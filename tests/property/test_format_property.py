@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import random
 import re
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from depth import times
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from rows import go_through
 
 from fbvm.base.diagnostics import Source, errors
 from fbvm.code.compiler import compile_text
@@ -111,14 +113,27 @@ def check(text: str) -> str:
     return written
 
 
-def each_file(quick: tuple[str, ...]) -> pytest.MarkDecorator:
-    """Every file; those of other folders than the `quick` ones, and long ones, are for the long run."""
-    return pytest.mark.parametrize("path", [
-        pytest.param(path, id=name, marks=[pytest.mark.slow] * (not name.startswith(quick) or path.stat().st_size > LONG))
-        for path in FILES for name in [path.relative_to(ROOT).as_posix()]])
+def each_folder(quick: tuple[str, ...]) -> Callable[[Callable[[Path], None]], Callable[[list[Path]], None]]:
+    """A test of each file, all of a folder together; those of other folders than the `quick` ones, and long files, are for the
+    long run."""
+
+    def decorate(test: Callable[[Path], None]) -> Callable[[list[Path]], None]:
+        @parts
+        def through(files: list[Path]) -> None:
+            go_through((path.name, partial(test, path)) for path in files)
+
+        return through
+
+    groups: dict[tuple[str, bool], list[Path]] = {}
+    for path in FILES:
+        folder = path.parent.relative_to(ROOT).as_posix()
+        groups.setdefault((folder, not folder.startswith(quick) or path.stat().st_size > LONG), []).append(path)
+    parts = pytest.mark.parametrize("files", [
+        pytest.param(files, id=folder, marks=[pytest.mark.slow] * is_slow) for (folder, is_slow), files in groups.items()])
+    return decorate
 
 
-@each_file(("tests/golden", "examples"))
+@each_folder(("tests/golden", "examples/lessons"))
 def test_every_program_keeps_its_meaning(path: Path) -> None:
     for text in programs(path):
         check(text)
@@ -139,7 +154,7 @@ def image(text: str) -> object:
 
 
 @pytest.mark.slow
-@each_file(("tests/golden", "examples/project", "examples/row", "examples/tank"))
+@each_folder(())
 def test_every_program_is_compiled_to_the_same_image(path: Path) -> None:
     for text in programs(path):
         assert image(text) == image(write(text))
