@@ -27,6 +27,9 @@ if sys.dont_write_bytecode:
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     del os.environ["PYTHONDONTWRITEBYTECODE"]
 
+# The cache of the tests is this checkout's: the user's own files and those of other checkouts neither leave it nor fill it.
+os.environ.setdefault("FBVM_CACHE", str(Path(__file__).parents[1] / ".pytest_cache" / "fbvm"))
+
 from hypothesis import settings
 
 

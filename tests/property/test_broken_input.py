@@ -28,5 +28,6 @@ def test_a_damaged_file_gives_diagnostics_in_time(first: int) -> None:
         assert complaint(kind, data) is None, f"seed {seed}, {kind}"
 
 
+@pytest.mark.slow
 def test_damage_is_done_to_files_of_every_kind() -> None:
     assert {broken(Random(seed))[0] for seed in range(100)} == KINDS.keys()
