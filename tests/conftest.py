@@ -27,6 +27,9 @@ if sys.dont_write_bytecode:
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     del os.environ["PYTHONDONTWRITEBYTECODE"]
 
+# The cache of the tests is this checkout's: the user's own files and those of other checkouts neither leave it nor fill it.
+os.environ.setdefault("FBVM_CACHE", str(Path(__file__).parents[1] / ".pytest_cache" / "fbvm"))
+
 from hypothesis import settings
 
 
@@ -43,6 +46,8 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ[SWITCH] = "1"
 
 
+TOP = len(Path(__file__).parts)
+"""Parts of the path of a test file that stands in no folder of the tests."""
 gc.set_threshold(100_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
 
 
@@ -56,9 +61,10 @@ def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, p
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Workers must have the same order."""
+    """Workers must have the same order: the long tests of whole pages and packages, which stand in no folder, come first, so that
+    no worker begins one of them when the others have ended."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        items.sort(key=lambda item: item.path.parts)
+        items.sort(key=lambda item: (len(item.path.parts) > TOP, item.path.parts))
 
 
 def pytest_collection_finish() -> None:

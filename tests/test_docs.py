@@ -13,6 +13,7 @@ import click
 import pytest
 from click.testing import CliRunner
 from docs_pages import HOUSE, NOT_RUN, Reader, blocks, is_made, is_slow, options_of, pages
+from rows import each_of
 
 from fbvm.cli.main import main
 
@@ -35,7 +36,7 @@ def test_few_blocks_are_not_run() -> None:
     assert all(left_out.values())
 
 
-@pytest.mark.parametrize("name", ALL)
+@each_of("name", ALL)
 def test_commands_and_options_exist(name: str) -> None:
     lines = [line for block in blocks(HOUSE / name) if block.language in ("sh", "console")
              for line in block.text.replace("\\\n", "").splitlines() if re.match(r"(\$ )?\S*fbvm ", line)]  # fmt: skip
@@ -43,7 +44,7 @@ def test_commands_and_options_exist(name: str) -> None:
     assert [unknown for line in (*lines, *named) for unknown in options_of(line)] == []
 
 
-@pytest.mark.parametrize("name", ALL)
+@each_of("name", ALL)
 def test_extras_exist(name: str) -> None:
     extras = tomllib.loads((HOUSE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     named = re.findall(r"pip install.*?\[([a-z,]+)\]", ALL[name])
@@ -57,7 +58,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("name", ALL)
+@each_of("name", ALL)
 def test_links_lead_somewhere(name: str) -> None:
     page = HOUSE / name
     text = re.sub(r"^(`{3,}).*?^\1|`[^`\n]*`", "", ALL[name], flags=re.M | re.S)

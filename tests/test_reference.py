@@ -142,8 +142,9 @@ def test_each_assumption_is_listed_with_its_place() -> None:
 
 
 def test_a_file_is_written_only_if_it_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = pages()
     product_pages = importlib.import_module("product_pages")
-    monkeypatch.setattr(product_pages, "pages", pages)
+    monkeypatch.setattr(product_pages, "pages", lambda: made)
     product_pages.write(tmp_path)
     path = tmp_path / "reference" / "memory.md"
     before = path.stat().st_mtime_ns

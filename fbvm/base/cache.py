@@ -11,7 +11,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -82,12 +82,16 @@ class Cache:
     """The files of one kind, in a folder of this name; each begins with the bytes `head`.
 
     Above `limit_bytes` in all, or `limit_files`, the files that were used least recently are removed until a quarter is
-    free.  Each write lists the folder."""
+    free.  A process lists the folder at its first write, and again when what it has written since may have exceeded a limit:
+    to list two thousand files takes longer than to write one.  What other processes write meanwhile is counted at the next
+    listing."""
 
     kind: str
     head: bytes
     limit_bytes: int
     limit_files: int = 2000
+    _held: dict[Path, tuple[int, int]] = field(default_factory=dict, repr=False)
+    """By folder, the number of files and of their bytes at the last listing, with those that this process has added."""
 
     @property
     def folder(self) -> Path:
@@ -130,21 +134,26 @@ class Cache:
                 replace(part, folder / name)
             finally:
                 part.unlink(missing_ok=True)
-            self._make_room(folder)
+            self._make_room(folder, len(body) + _DIGEST_BYTES)
         except OSError:
             return
 
-    def _make_room(self, folder: Path) -> None:
+    def _make_room(self, folder: Path, written_bytes: int) -> None:
+        """Removes files if there are too many, or if they are too large, with one of so many bytes that was just written."""
+        if known := self._held.get(folder):
+            count, total = self._held[folder] = known[0] + 1, known[1] + written_bytes
+            if total <= self.limit_bytes and count <= self.limit_files:
+                return
         files = list(_files(folder))
         count, total = len(files), sum(size for _, size, _ in files)
-        if total <= self.limit_bytes and count <= self.limit_files:
-            return
-        for _, size, path in sorted(files):
-            if total <= self.limit_bytes * 3 // 4 and count <= self.limit_files * 3 // 4:
-                return
-            Path(path).unlink(missing_ok=True)
-            total -= size
-            count -= 1
+        if total > self.limit_bytes or count > self.limit_files:
+            for _, size, path in sorted(files):
+                if total <= self.limit_bytes * 3 // 4 and count <= self.limit_files * 3 // 4:
+                    break
+                Path(path).unlink(missing_ok=True)
+                total -= size
+                count -= 1
+        self._held[folder] = count, total
 
 
 def _is_private(folder: Path) -> bool:

@@ -1,14 +1,29 @@
 """Tests of function blocks with pytest: the fixtures `fb`, `plc` and `network`, and tests written in ST.
 
 The plugin is found by pytest when the package is installed.  `Rig` is what the fixtures give; `ns` turns `"50ms"` into
-nanoseconds, as which TIME values are read; `proved` asserts what holds for all inputs in all scans.
+nanoseconds, as which TIME values are read; `proved` asserts what holds for all inputs in all scans.  A name is imported when it
+is first used: pytest loads this package in every session, also where no PLC code is tested.
 """
 
 from __future__ import annotations
 
-from fbvm.testing.proofs import NotProved, proved
-from fbvm.testing.rig import Rig, Trapped
-from fbvm.testing.value_types import ns
-from fbvm.testing.values import Values
+import importlib
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["NotProved", "Rig", "Trapped", "Values", "ns", "proved"]
+if TYPE_CHECKING:
+    from fbvm.testing.proofs import NotProved as NotProved
+    from fbvm.testing.proofs import proved as proved
+    from fbvm.testing.rig import Rig as Rig
+    from fbvm.testing.rig import Trapped as Trapped
+    from fbvm.testing.value_types import ns as ns
+    from fbvm.testing.values import Values as Values
+
+_HOME_OF = {"NotProved": "proofs", "Rig": "rig", "Trapped": "rig", "Values": "values", "ns": "value_types", "proved": "proofs"}
+"""The public names, each with the module that defines it."""
+__all__ = sorted(_HOME_OF)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'fbvm.testing' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"fbvm.testing.{_HOME_OF[name]}"), name)

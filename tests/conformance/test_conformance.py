@@ -16,23 +16,25 @@ from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Plc
 
+TABLES = {stem: list(inside) for stem, inside in groupby(programs(HERE), lambda program: program.path.stem)}
+"""The programs of each file."""
+RUNNING = {stem: running for stem, inside in TABLES.items() if (running := [program for program in inside if program.runs])}
+
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "table", [pytest.param(list(inside), id=stem) for stem, inside in groupby(programs(HERE), lambda p: p.path.stem)])
+@pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
 def test_features(table: list[Program]) -> None:
     go_through((f"{p.path.stem}:{p.line} {p.title}", partial(check, p, REFERENCE)) for p in table)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.path.stem}:{p.line}") for p in programs(HERE) if p.runs])
-def test_feature_on_every_engine(program: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("table", RUNNING.values(), ids=RUNNING)
+def test_features_on_every_engine(table: list[Program]) -> None:
     def build(image: Image, cycle_ns: int) -> Plc:
         return Plc(image, cycle_ns, budget=BUDGET, engine="native")
 
-    if native.available():
-        monkeypatch.setitem(BUILDS, "native", build)
-    check(program)
+    builds = BUILDS | ({"native": build} if native.available() else {})
+    go_through((f"{p.path.stem}:{p.line} {p.title}", partial(check, p, builds)) for p in table)
 
 
 def test_every_table_is_there() -> None:

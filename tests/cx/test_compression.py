@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from fbvm.interchange.cx.compression import CompressionError, compress, decompress
+from fbvm.interchange.cx.compression import LONGEST, CompressionError, compress, decompress
 
 VECTORS = (("00 06 82 02 FE 01", b"A"), ("01 04 E2 80 7F", b"A"), ("00 06 82 08 D5 83 80 7F", b"ABABABAB"),
            ("01 04 62 D4 7A 04 FC 03", b"ABABABAB"))  # fmt: skip
@@ -43,9 +43,20 @@ def test_damage_is_told_and_a_flood_is_stopped() -> None:
 
 
 def test_any_bytes_are_decompressed_or_refused() -> None:
-    seeded = random.Random(11)
-    for _ in range(300):
+    seeded, most = random.Random(11), 5_000
+    whole = compress("".join(f"LD {n % 7}.{n % 16:02}\nOUT W{n}.00\n" for n in range(20)).encode())
+    sizes, refused = [], []
+    for number in range(300):
+        stream = bytearray(whole)
+        if number % 3:
+            stream[seeded.randrange(2, len(stream))] ^= 1 << seeded.randrange(8)
+        else:
+            stream[2:] = seeded.randbytes(60)
         try:
-            decompress(bytes((seeded.randrange(2), seeded.randrange(4, 7))) + seeded.randbytes(60), 5_000)
-        except CompressionError:
-            continue
+            sizes.append(len(decompress(bytes(stream), most)))
+        except CompressionError as error:
+            refused.append(str(error))
+    assert len(sizes) > 50 and len(refused) > 150 and len(sizes) + len(refused) == 300
+    assert max(sizes) <= most + LONGEST
+    known = ("it is cut", "is damaged", f"longer than {most} bytes")
+    assert [message for message in refused if not any(part in message for part in known)] == []

@@ -108,6 +108,7 @@ def test_symbols_get_comments_addresses_and_rows() -> None:
     assert "VariableCount:=5;" in (made.data or b"").decode("cp1252")
 
 
+@pytest.mark.slow
 def test_what_has_no_place_is_refused_and_nothing_is_written() -> None:
     for old, new, words in (
             ("PROGRAM NewProgram1", "PROGRAM Other", "no program Other"), ("SECTION END", "SECTION Last", "no section Last"),

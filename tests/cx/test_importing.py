@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
+import pytest
 from cx_text import DOUBLE, SAMPLE, Cxt
 
 from fbvm import Plc
@@ -83,6 +84,7 @@ def test_damaged_and_foreign_files_get_a_sentence() -> None:
     assert "cut" in import_project(compress(SAMPLE.bytes())[:500], "a.cxp").diagnostics[0].message
 
 
+@pytest.mark.slow
 def test_no_damage_raises() -> None:
     seeded = random.Random(5)
     data = SAMPLE.bytes()

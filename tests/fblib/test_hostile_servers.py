@@ -10,8 +10,6 @@ from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, RudePeer, by_script, by_seed
 
 every_client = pytest.mark.parametrize("client", KINDS)
 TIMINGS = pytest.mark.parametrize("timing", ["exact", pytest.param("real", marks=pytest.mark.slow)])
-QUICK = ["the next reply, too", "garbage behind", "a byte behind"]
-
 
 def ends_after(client: str, misdeed: str, timing: str) -> list[str]:
     """The ends of four commands, of which the first meets a misdeed."""
@@ -20,7 +18,8 @@ def ends_after(client: str, misdeed: str, timing: str) -> list[str]:
     return [rig.read() for _ in range(4)]
 
 
-@pytest.mark.parametrize("misdeed", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in MISDEEDS])
+@pytest.mark.slow
+@pytest.mark.parametrize("misdeed", MISDEEDS)
 @TIMINGS
 def test_every_later_command_works(misdeed: str, timing: str) -> None:
     for client in KINDS:
@@ -100,4 +99,3 @@ def test_anything_at_any_reply(client: str, seed: int) -> None:
 
 def test_there_are_enough_of_them() -> None:
     assert len(MISDEEDS) + len(RUDE_PEERS) >= 80
-    assert set(QUICK) < set(MISDEEDS)

@@ -95,6 +95,7 @@ def test_settings_out_of_range_are_an_error_and_nothing_is_written() -> None:
         assert plc.read("CF3") is True, wrong
 
 
+@pytest.mark.slow
 def test_a_heater_comes_to_rest_at_the_set_value() -> None:
     plc = loop(wanted=150, band=500, ti=100, td=2)
     plc.write("W0.00", True)

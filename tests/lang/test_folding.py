@@ -14,8 +14,8 @@ INTEGERS = {"SINT": -8, "INT": -16, "DINT": -32, "LINT": -64, "USINT": 8, "UINT"
 """Bits of each integer type, negative for the signed ones."""
 BITS = {"BYTE": 8, "WORD": 16, "DWORD": 32, "LWORD": 64}
 REALS = ("REAL", "LREAL")
-QUICK = ("INT", "WORD", "REAL", "BOOL", "TIME")
-"""One type of each kind is for every run, the others for the long one."""
+QUICK = ("INT", "REAL", "BOOL")
+"""A type of each kind of operators is for every run, the others for the long one."""
 REAL_TEXTS = ("0.0", "1.0", "-1.0", "0.1", "2.5", "-0.5", "1.0E10", "16777217.0", "3.0E38", "-7.25", "1.0E-40")
 TIMES = ("T#0s", "T#1ns", "T#-1ms", "T#1s500ms", "T#25h", "T#106751d", "T#-106751d")
 

@@ -101,7 +101,8 @@ def test_integers(kind: str) -> None:
     check()
 
 
-@pytest.mark.parametrize("kind", first_quick(BITS))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", BITS)
 def test_bit_strings(kind: str) -> None:
     declared = f"a, b, both, one, other, inv, l, r, rl, rr, mx, mn : {kind}; n : INT; lt, le, gt, ge, eq, ne : BOOL;"
     body = f"both := a AND b; one := a OR b; other := a XOR b; inv := NOT a; l := SHL(a, n); r := SHR(a, n); " \

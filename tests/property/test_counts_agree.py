@@ -93,6 +93,7 @@ n := n + 0;
 END_PROGRAM"""
 
 
+@pytest.mark.slow
 @each_of("statements", [
     "IF n = 2 THEN RETURN; END_IF;", "IF n = 1 THEN i := 1; ELSIF n = 3 THEN i := 2; END_IF;",
     "IF n = 2 THEN ; ELSE i := 2; END_IF;",

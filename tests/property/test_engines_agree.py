@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import hand_image
@@ -17,6 +18,7 @@ import pytest
 import test_engine_expressions as expressions
 import test_engine_limits as limits
 import test_engine_statements as statements
+from rows import go_through
 
 from fbvm.base import cache
 from fbvm.code.image import Image
@@ -141,8 +143,11 @@ def build(level: int) -> Any:
     return make
 
 
-@pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.name}:{p.line}") for p in lang_corpus.programs() if p.runs])
-def test_program(program: lang_corpus.Program, monkeypatch: pytest.MonkeyPatch) -> None:
-    for level in LEVELS:
-        monkeypatch.setitem(lang_check.BUILDS, f"native {level}", build(level))
-    lang_check.check(program)
+RUNNING = groupby((program for program in lang_corpus.programs() if program.runs), lambda program: program.name)
+"""The programs of each file that run."""
+
+
+@pytest.mark.parametrize("file", [pytest.param(list(inside), id=name) for name, inside in RUNNING])
+def test_programs(file: list[lang_corpus.Program]) -> None:
+    builds = lang_check.BUILDS | {f"native {level}": build(level) for level in LEVELS}
+    go_through((f"{p.name}:{p.line} {p.title}", partial(lang_check.check, p, builds)) for p in file)

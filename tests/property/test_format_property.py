@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import random
 import re
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from depth import times
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from rows import go_through
 
 from fbvm.base.diagnostics import Source, errors
 from fbvm.code.compiler import compile_text
@@ -21,7 +23,7 @@ from fbvm.syntax.formatter.formatter import REFUSED, formatted
 from fbvm.syntax.formatter.names import Spelling
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.lexer import Lexer, Token, lexis
-from fbvm.syntax.tree import Literal, Node
+from fbvm.syntax.tree import Literal, Node, SourceText
 from fbvm.syntax.tree.node import names_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -42,16 +44,18 @@ def programs(path: Path) -> list[str]:
     """The texts of a file that can be formatted: all but those of tests/golden/errors and those that expect an error."""
     readable = []
     for piece in PROGRAMS.split(path.read_text(encoding="utf-8")):
-        wrong = syntax_errors(piece)
+        wrong = parsed(piece)[1]
         assert not wrong or path.parent == WRONG or EXPECTS_ERROR.search(piece), f"{path.name}: {wrong[0]}"
         if piece.strip() and not wrong:
             readable.append(piece)
     return readable
 
 
-def syntax_errors(text: str) -> list[str]:
-    return [d.render() for d in errors(parse(Source("x.st", text))[1])
-            if d.code not in REFUSED]
+@lru_cache(maxsize=256)
+def parsed(text: str) -> tuple[SourceText, list[str]]:
+    """The tree of a text and its errors of syntax; several tests want those of each program."""
+    tree, diagnostics = parse(Source("x.st", text))
+    return tree, [d.render() for d in errors(diagnostics) if d.code not in REFUSED]
 
 
 FILES = sorted(path for folder in CORPUS for path in ROOT.glob(f"{folder}*.st"))
@@ -102,23 +106,36 @@ def meaning(value: Any) -> Any:
 def check(text: str) -> str:
     """Everything that is always true, for one text; its canonical form."""
     written = write(text)
-    tree, wrong = parse(Source("x", written))
-    assert [d.render() for d in errors(wrong) if d.code not in REFUSED] == []
-    assert meaning(parse(Source("x", text))[0]) == meaning(tree)
-    assert comments(text) == comments(written)
+    tree, wrong = parsed(written)
+    assert wrong == []
+    assert written == text or meaning(parsed(text)[0]) == meaning(tree)
+    assert written == text or comments(text) == comments(written)
     assert write(written) == written
     assert not re.search(r"[ \t]$", written, re.MULTILINE) and written.strip() + "\n" == written
     return written
 
 
-def each_file(quick: tuple[str, ...]) -> pytest.MarkDecorator:
-    """Every file; those of other folders than the `quick` ones, and long ones, are for the long run."""
-    return pytest.mark.parametrize("path", [
-        pytest.param(path, id=name, marks=[pytest.mark.slow] * (not name.startswith(quick) or path.stat().st_size > LONG))
-        for path in FILES for name in [path.relative_to(ROOT).as_posix()]])
+def each_folder(quick: tuple[str, ...]) -> Callable[[Callable[[Path], None]], Callable[[list[Path]], None]]:
+    """A test of each file, all of a folder together; those of other folders than the `quick` ones, and long files, are for the
+    long run."""
+
+    def decorate(test: Callable[[Path], None]) -> Callable[[list[Path]], None]:
+        @parts
+        def through(files: list[Path]) -> None:
+            go_through((path.name, partial(test, path)) for path in files)
+
+        return through
+
+    groups: dict[tuple[str, bool], list[Path]] = {}
+    for path in FILES:
+        folder = path.parent.relative_to(ROOT).as_posix()
+        groups.setdefault((folder, not folder.startswith(quick) or path.stat().st_size > LONG), []).append(path)
+    parts = pytest.mark.parametrize("files", [
+        pytest.param(files, id=folder, marks=[pytest.mark.slow] * is_slow) for (folder, is_slow), files in groups.items()])
+    return decorate
 
 
-@each_file(("tests/golden", "examples"))
+@each_folder(("tests/golden", "examples/lessons"))
 def test_every_program_keeps_its_meaning(path: Path) -> None:
     for text in programs(path):
         check(text)
@@ -139,7 +156,7 @@ def image(text: str) -> object:
 
 
 @pytest.mark.slow
-@each_file(("tests/golden", "examples/project", "examples/row", "examples/tank"))
+@each_folder(())
 def test_every_program_is_compiled_to_the_same_image(path: Path) -> None:
     for text in programs(path):
         assert image(text) == image(write(text))
@@ -169,7 +186,7 @@ WHOLE = {"REFUSED_BLOCK", "REFUSED_SECTION", "TRY", "INSTRUCTION_LIST"}
 
 def renamed(text: str, chance: random.Random) -> str:
     """Names in another case, where something is known about them."""
-    for start, name in Spelling(parse(Source("x", text))[0]).at.items():
+    for start, name in Spelling(parsed(text)[0]).at.items():
         text = text[:start] + chance.choice(CASES)(name) + text[start + len(name):]
     return text
 
@@ -208,7 +225,7 @@ def test_the_name_of_a_transition_is_declared_where_it_stands() -> None:
     ladder = "LADDER\nLD a\nOUT Go\nEND_LADDER"
     chart = f"INITIAL_STEP s: END_STEP\nTRANSITION Go FROM s TO s:\n{ladder}\nEND_TRANSITION"
     text = f"PROGRAM Main\nVAR a : BOOL; END_VAR\n{chart}\nEND_PROGRAM\n"
-    assert text.index("Go") not in Spelling(parse(Source("x", text))[0]).at
+    assert text.index("Go") not in Spelling(parsed(text)[0]).at
 
 
 @pytest.mark.slow
@@ -216,5 +233,5 @@ def test_the_name_of_a_transition_is_declared_where_it_stands() -> None:
 @given(PROGRAM_NUMBERS, st.randoms(use_true_random=False))
 def test_comments_may_stand_anywhere(number: int, chance: random.Random) -> None:
     text = commented(corpus()[number], chance)
-    assume(not syntax_errors(text))
+    assume(not parsed(text)[1])
     check(text)

@@ -143,6 +143,7 @@ def test_lines_meet_and_rails_are_straight(seed: int, width: int) -> None:
                 assert beside is not None and beside[back], f"{x} {y}\n" + "\n".join(rows)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=times(60))
 @given(st.integers(0, 2**32))
 def test_a_diagram_is_what_its_instructions_say(seed: int) -> None:

@@ -87,6 +87,7 @@ def edited(seed: str, edits: list[tuple[int, int, str]]) -> bytes:
     return seed.encode("latin-1")
 
 
+@pytest.mark.slow
 @each_of("data_type", TYPES)
 def test_every_seed_is_read(data_type: str) -> None:
     seen = {seed: read(data_type, seed.encode()) for seed in SEEDS}

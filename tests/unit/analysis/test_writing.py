@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from editing import at_mark
 from rows import each_of
 
@@ -53,6 +54,7 @@ def test_hover_over_a_library_block_shows_its_page() -> None:
     assert shown is not None and "ET" in shown.markdown and "Library iec" in shown.markdown
 
 
+@pytest.mark.slow
 @each_of("line, first, absent", [
     ("P1.‸", ["Level", "Runs"], ["hidden"]),
     ("T1[2].‸", ["Level", "State"], []),

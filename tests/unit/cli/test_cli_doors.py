@@ -67,6 +67,7 @@ def project(*doors: tuple[str, str], key: str = "bind") -> None:
 # --- a port that cannot be had --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_busy_port_is_told_alike_by_every_verb(fbvm: Fbvm, busy: int) -> None:
     project((f"{UNIT[:-1]}:502", f"127.0.0.1:{busy}"))
     said = f"127.0.0.1:{busy} cannot be used: somebody else listens there\n"

@@ -63,7 +63,8 @@ VARIES = 64
 """Bytes by which the file of a run may be shorter than that of another one: it holds when it began, and is compressed."""
 
 
-@pytest.mark.parametrize("option", first_quick(["--trace", "--journal", "--pcap"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("option", ["--trace", "--journal", "--pcap"])
 def test_a_disk_that_is_full_during_a_run(disk: Callable[[int], None], option: str) -> None:
     run = ["run", DEMO, *PEER, "--scans", "900", option, "out.file"]
     assert fbvm(*run).exit_code == 0

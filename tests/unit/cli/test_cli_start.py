@@ -1,4 +1,5 @@
-"""What the command line loads before it does anything: nothing that a verb does not need, since that is most of its time."""
+"""What the command line and the plugin of pytest load before they do anything: nothing that is not needed, since that is
+most of the time of a short run."""
 
 from __future__ import annotations
 
@@ -35,3 +36,18 @@ def test_a_verb_loads_what_it_needs(
     ran = [subprocess.run([sys.executable, "-c", LOADED, *words], cwd=tmp_path, capture_output=True, text=True) for _ in range(2)]
     assert [one.returncode for one in ran] == [0, 0], ran[0].stderr
     assert set(ran[1].stdout.splitlines()[-1].split()) == needed
+
+
+@pytest.mark.slow
+def test_a_session_of_pytest_without_plc_code_loads_no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "test_sum.py").write_text("def test_sum():\n    assert 1 + 1 == 2\n", encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    program = """
+import sys
+import pytest
+status = pytest.main(["-q", "-p", "fbvm.testing.plugin", "-p", "no:cacheprovider"])
+print(status.value, *sorted({"fbvm.testing.plugin", "fbvm.machine.plc", "fbvm.check.checker", "lark"} & set(sys.modules)))
+"""
+    ran = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
+    assert ran.stdout.splitlines()[-1] == "0 fbvm.testing.plugin", ran.stderr

@@ -48,6 +48,7 @@ def test_ordinary_statements_are_steps(body: str, expected: list[int]) -> None:
     assert charged(NUMBERS, body) == expected
 
 
+@pytest.mark.slow
 @each_of(("declarations", "body", "expected"), [
     ("a, b : ARRAY[1..1_000_000] OF DINT;", "a := b;", [2, 3906]),
     ("a, b : ARRAY[1..2000] OF INT;", "a := b;", [4]),

@@ -145,6 +145,7 @@ def test_attach_says_what_to_do() -> None:
 # --- breakpoints --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_lines_with_conditions_counts_and_messages(file: Path) -> None:
     client = Client()
     rows = ({"line": 5, "condition": "A > 4"}, {"line": 22, "hitCondition": "% 2"}, {"line": 19, "logMessage": "n={N}"},
@@ -267,6 +268,7 @@ def test_scans_and_the_end_of_the_program(file: Path) -> None:
     assert client.line == 18 and client.value("N") == "10"
 
 
+@pytest.mark.slow
 def test_reverse_who_wrote_this_and_a_forgotten_future(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))

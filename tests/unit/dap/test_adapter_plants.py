@@ -111,6 +111,7 @@ def past(text: str, scans: int) -> Target:
     return Target({"pump": session}, {"text.st": text})
 
 
+@pytest.mark.slow
 def test_a_recording_opens_at_its_end_and_is_gone_through_backwards() -> None:
     client = Client(lambda how, arguments: past(COUNTER.format(step=1), 3000))
     stop = client.begin()

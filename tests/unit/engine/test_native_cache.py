@@ -83,6 +83,28 @@ def test_small_ones_go_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert sorted(path.name[0] for path in folder.iterdir()) == ["d", "e", "f", "g", "h", "i"]
 
 
+def test_the_folder_is_listed_at_the_first_write_and_when_it_may_be_full(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed: list[int] = []
+
+    def files(where: Path) -> list[tuple[float, int, str]]:
+        found = list(listing(where))
+        listed.append(len(found))
+        return found
+
+    listing = cache._files
+    monkeypatch.setattr(cache, "_files", files)
+    monkeypatch.setattr(native_cache.FILES, "limit_files", 8)
+    native_cache.write("a" * 64, STORED)
+    for number in range(20):  # by another process
+        (folder / f"{number:064}").write_bytes(b"other")
+    for letter in "bcdefgh":
+        native_cache.write(letter * 64, STORED)
+    assert listed == [1]
+    native_cache.write("i" * 64, STORED)
+    assert listed == [1, 29]
+    assert len(list(folder.iterdir())) == 6
+
+
 def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "file"))

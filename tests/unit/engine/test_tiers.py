@@ -32,6 +32,7 @@ def image() -> Image:
     return made
 
 
+@pytest.mark.slow
 @needs_native
 def test_a_run_changes_to_machine_code_and_its_memory_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tiers, "STATEMENTS_TO_PAY", 500)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
@@ -27,6 +29,7 @@ def registers(name: str) -> tuple[str | None, list[int]]:
     return plc.run(until="Main.Done", max_ns=SECOND_NS), list(peer.server.holding_registers[:6000])
 
 
+@pytest.mark.slow
 def test_both_leave_the_same_registers() -> None:
     ended, held = registers("ladder.st")
     assert (ended, held) == registers("demo.st")

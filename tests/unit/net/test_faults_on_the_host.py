@@ -136,6 +136,7 @@ def test_the_loop_is_told_when_something_is_due(host: Host) -> None:
     assert (relays.channels_behind, relays.until_due_s()) == (0, None)
 
 
+@pytest.mark.slow
 def test_a_send_that_waits_when_a_fault_comes_is_answered(host: Host) -> None:
     """The host has not taken all of it yet; the unit is told as soon as it has."""
     device = host.open()

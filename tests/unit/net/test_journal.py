@@ -385,6 +385,7 @@ def test_a_damaged_line(good: str, old: str, new: str, message: str) -> None:
     assert broken(good.replace(old, new, 1)).startswith(message)
 
 
+@pytest.mark.slow
 def test_lines_that_are_missing(good: str) -> None:
     lines = good.splitlines(keepends=True)
     assert broken("".join(lines[:7] + lines[8:])).startswith("line 8: scan 6 where 5 should be")

@@ -77,6 +77,7 @@ def test_the_end_of_each_scan_is_that_of_a_run_that_nobody_looks_at(depth: Depth
     assert bytes(plc.memory.u8) == bytes(plain.memory.u8)
 
 
+@pytest.mark.slow
 def test_an_endless_loop_ends_in_its_trap(monkeypatch: pytest.MonkeyPatch) -> None:
     plc, trace = recorded(ENDLESS, 1, 1000, monkeypatch)
     assert plc.trap and plc.trap.code == "R0104"

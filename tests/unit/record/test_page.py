@@ -53,6 +53,7 @@ def test_every_value_of_every_scan_is_there(depth: Depth) -> None:
             assert read.word("D", address, scan) == trace.at(scan).read(f"D{address}")
 
 
+@pytest.mark.slow
 def test_values_in_blocks_are_those_of_the_trace(monkeypatch: pytest.MonkeyPatch) -> None:
     """Numbers of every size, bits and texts, over several blocks; in some of them nothing changes."""
     monkeypatch.setattr(columns, "BLOCK_SCANS", 7)
@@ -74,6 +75,7 @@ def test_values_in_blocks_are_those_of_the_trace(monkeypatch: pytest.MonkeyPatch
     assert read.word("D", 8, 60) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [Depth.WRITES, Depth.STATEMENTS])
 def test_the_rows_of_a_scan_lead_from_one_end_to_the_next(depth: Depth) -> None:
     trace = traced(20, depth)

@@ -60,6 +60,7 @@ def drawings(source: ScanSource) -> list[object]:
             cause_text(source, why(source, place, 35))]  # type: ignore[arg-type]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_drawings_are_those_of_a_trace() -> None:
     recorded, trace = both(Plc(image()), 40)
     assert drawings(recorded) == drawings(trace)

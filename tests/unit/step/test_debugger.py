@@ -116,6 +116,7 @@ def test_one_instance_stops_and_the_other_does_not() -> None:
     assert where(found) == (1, 4)
 
 
+@pytest.mark.slow
 def test_reverse_goes_to_the_last_change_and_then_to_the_beginning() -> None:
     found = debugger(writes=[("CIO 0.00", True, 70_000_000)])
     done(found.scan(2000))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from test_debugger import done
 
 from fbvm.code.compiler import compile_text
@@ -34,6 +35,7 @@ def demo(has_peer: bool = True) -> Debugger:
     return Debugger({"plc": Session.of(make)})
 
 
+@pytest.mark.slow
 def test_an_exception_reply_stops_the_run_forth_and_back() -> None:
     found = demo()
     found.checks = {"plc": BetweenScans({"modbus": frozenset()})}

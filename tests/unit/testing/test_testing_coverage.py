@@ -88,6 +88,7 @@ def test_ways_that_were_never_taken(file: Path) -> None:
     assert only(counted(file, 1, 2, 3, 4)).partial == {}
 
 
+@pytest.mark.slow
 def test_rungs_that_were_jumped_over_are_missing(tmp_path: Path) -> None:
     """Line 1 is that of the PROGRAM; the guard that a jump is made of is no statement."""
     file = tmp_path / "rungs.st"

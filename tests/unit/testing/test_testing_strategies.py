@@ -84,6 +84,7 @@ def _never(rig: Rig) -> None:
 
 TestGood = block_machine(pump, [_only_with_start], "100ms", Wait=delays("50ms"))
 TestGood.settings = settings(max_examples=15, stateful_step_count=15, deadline=None)  # type: ignore[attr-defined]
+TestGood = pytest.mark.slow(TestGood)
 
 
 @pytest.mark.slow
