@@ -75,6 +75,15 @@ def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]
     return [Source(name, one) if isinstance(one, str) else one for name, one in given_sources(paths).items()], diagnostics
 
 
+def families(paths: Sequence[Path]) -> list[tuple[str, str]]:
+    """The family of tools that wrote each document among some files, with the reason."""
+    found = []
+    for made in map(imported, paths):
+        if isinstance(made, Imported):
+            found.append((made.family, made.because))
+    return found
+
+
 def sources_of(paths: Sequence[Path]) -> list[Source]:
     """The sources of these files that can be read."""
     texts = [one if isinstance(one, Source) else read(one, str(one)) for one in inputs(paths)[0]]
