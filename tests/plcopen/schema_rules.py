@@ -51,7 +51,7 @@ step | localId name | initialStep height width | position! connectionPointIn con
 transition | localId | priority | position! connectionPointIn connectionPointOut condition
 selectionDivergence | localId | | position! connectionPointIn connectionPointOut*
 simultaneousDivergence | localId | | position! connectionPointIn connectionPointOut*
-simultaneousConvergence | localId | | position! connectionPointIn connectionPointOut
+simultaneousConvergence | localId | | position! connectionPointIn* connectionPointOut
 jumpStep | localId targetName | | position! connectionPointIn
 actionBlock | localId | height width | position! connectionPointIn action*
 connectionPointIn | | relPosition connection*
@@ -82,10 +82,16 @@ def _element(element: Element) -> list[str]:
     wrong = [f"{key} is {value!r}, no number" for key, value in element.attributes.items()
              if key in COORDINATES and not value.isdigit()]
     if name in ("type", "baseType", "returnType"):
-        return wrong + [f"holds {child.name}" for child in element.children if child.name not in _TYPE.split()]
+        unnamed = ("enum", "subrangeSigned", "subrangeUnsigned") if name == "type" else ()
+        return wrong + [f"holds {child.name}" for child in element.children
+                        if child.name not in _TYPE.split() or child.name in unnamed]
     if name not in RULES or (name == "transition" and element.one("body")):
         return wrong
     must, may, children = RULES[name]
+    if name == "simultaneousConvergence":
+        wrong += [f"{len(point.all('connection'))} wires reach one point of it" for point in element.all("connectionPointIn")
+                  if len(point.all("connection")) != 1]
+        wrong += ["its connectionPointOut names a pin" for point in element.all("connectionPointOut") if point.attributes]
     wrong += [f"has no {key}" for key in must if key not in element.attributes]
     if may:
         wrong += [f"has {key}" for key in element.attributes if key not in (*must, *may)]

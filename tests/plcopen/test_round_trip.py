@@ -293,3 +293,16 @@ def test_random_ladder_there_and_back_means_the_same(seed: int) -> None:
                 plc.write(f"Main.{name}", bool(bits >> at & 1))
             plc.scan()
         assert same(plcs[0].read("Main"), plcs[1].read("Main")), f"{scan}\n{text}"
+
+
+def test_enumerations_and_subranges_of_variables_have_names_that_other_tools_can_read() -> None:
+    text = ("TYPE Main_level : (a, b); END_TYPE\nPROGRAM Main\nVAR level : (low, high) := high; n : INT (0..9) := 3; "
+            "s : BOOL; END_VAR\n"
+            "s := level = high AND n = 3;\nEND_PROGRAM\n")
+    back = there_and_back(text)
+    names = [line.split()[0] for line in back.files["types.st"].splitlines() if " : " in line]
+    assert names == ["Main_level", "Main_level_2", "Main_n"]
+    program = Program(Path("Main.st"), 1, "", text)
+    plc = machine(back.files, program)
+    plc.scan()
+    assert plc.read("Main.s") is True

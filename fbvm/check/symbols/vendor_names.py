@@ -37,6 +37,9 @@ TYPES = {
     "LONGREAL": "LREAL", "CARDINAL": "UDINT", "QWORD": "LWORD", "TEXT": "STRING",
 }
 """Names of elementary types, and ours."""
+_BY_DIALECT = (r"PID|DERIVATIVE|RAMP|RTC|SEMA|LOGGER|LOGLEVEL|HMI_(?:NODE|BOOL|[US]?INT|U?[DL]INT|REAL|STRING)|"
+               r"python_(?:eval|poll|gear)|csv_read_by_(?:string|int)|csv_reload")
+"""Types and blocks of `fblib/matiec`, which only a dialect brings."""
 _LIBRARIES = (
     (r"MC_\w+|AXIS_REF\w*|_MC_\w+", "PLCopen's motion control (Tc2_MC2, SM3_Basic and their like)"),
     (r"ADS(?:READ|WRITE|RDWRT|RDSTATE|WRTCTL|LOG)\w*|FB_(?:File|EOF|SimpleAdsLogEvent)\w*|T_AmsNetId\w*|T_AmsPort|"
@@ -68,6 +71,8 @@ def duration(name: str) -> str:
 
 def library_of(name: str) -> str:
     """A hint for an unknown name that comes from a library of a vendor; "" for any other."""
+    if re.fullmatch(_BY_DIALECT, name, re.IGNORECASE):
+        return "it is a block of Beremiz and OpenPLC: --dialect matiec brings it"
     for pattern, library in _LIBRARIES:
         if re.fullmatch(pattern, name.rpartition(".")[2] if "." in name else name, re.IGNORECASE):
             return f"it comes from {library}, which fbvm does not bring: give its source, or one of your own, with the files"

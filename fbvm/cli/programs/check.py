@@ -50,7 +50,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         else:
             given, found = inputs(files)
             made = compile_files(given, program=program, libraries=libraries, no_warn=codes,
-                                 warnings_as_errors=warnings_as_errors, progress=progress, **compile_options())
+                                 warnings_as_errors=warnings_as_errors, progress=progress, **compile_options(files))
             diagnostics = found + made.diagnostics
     if diagnostics or as_json:
         report_diagnostics(diagnostics, as_json)

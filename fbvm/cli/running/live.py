@@ -115,7 +115,7 @@ def _run_files(
     texts = source_texts(image, {file.name: file for file in files} | given_sources(files), libraries)
     page.run({files[0].stem: (plc, texts)}, [Running(plc, scans=ENDLESS)], program=program,
              repeated=files if network.virtual_time and not mappings else (), trace=trace,
-             text=program_text(files, libraries, program=program, **compile_options()))  # fmt: skip
+             text=program_text(files, libraries, program=program, **compile_options(files)))  # fmt: skip
 
 
 class _Page:

@@ -137,7 +137,8 @@ def command(
         with record_run(options, said, html is not None) as recorded, \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
             if recorded.recording:
-                text = program_text(files, libraries, program=program, drawn=drawn, e_banks=tuple(banks), **compile_options())
+                text = program_text(files, libraries, program=program, drawn=drawn, e_banks=tuple(banks),
+                                    **compile_options(files))  # fmt: skip
                 recorded.add(files[0].stem if files else "PLC", plc, described(plc, text, options, files, libraries))
             result = _run(plc, as_json, capture, recorded, files=files, libraries=libraries, **options)
             recorded.only_last = result.reason == "interrupted"

@@ -43,6 +43,15 @@ def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]
     return given.inputs(paths, _resource())
 
 
+def families(paths: Sequence[Path]) -> list[tuple[str, str]]:
+    """The family of tools that wrote each document among some files, with the reason."""
+    found = []
+    for made in map(imported, paths):
+        if isinstance(made, Imported):
+            found.append((made.family, made.because))
+    return found
+
+
 def sources_of(paths: Sequence[Path]) -> list[Source]:
     """The sources of these files that can be read."""
     texts = [one if isinstance(one, Source) else read(one, str(one)) for one in inputs(paths)[0]]

@@ -13,11 +13,15 @@ from fbvm.base import cache
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.cli.shared import status
-from fbvm.cli.shared.given_sources import inputs
+from fbvm.cli.shared.given_sources import families, inputs, sources_of
 from fbvm.cli.shared.paths import ExistingPath, SourcePath
 from fbvm.cli.shared.terminal import say, say_json
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
+from fbvm.interchange.dialect_signs import guessed
+
+AUTO = "auto"
+"""The dialect that is chosen by what the files show."""
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -37,10 +41,17 @@ def _keep_in_context(context: click.Context, parameter: click.Parameter, value: 
     context.meta[f"fbvm.{parameter.name}"] = value
 
 
-def compile_options() -> dict[str, Any]:
-    """The options --resource and --dialect of the present command, as keyword arguments of the compiler."""
+def compile_options(files: Sequence[Path]) -> dict[str, Any]:
+    """The options --resource and --dialect of the present command, as keyword arguments of the compiler.
+
+    `--dialect auto` looks at the files, and says on stderr what it chose and why."""
     meta = click.get_current_context().meta
-    return {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
+    given = {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
+    if given.get("dialect") == AUTO:
+        chosen = guessed(families(files), sources_of(files))
+        meta["fbvm.dialect"] = given["dialect"] = chosen.dialect
+        say(f"dialect {chosen.dialect}: {chosen.because}", err=True)
+    return given
 
 
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -53,8 +64,9 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      help="Compile anew, and keep nothing of it on disk."),
         click.option("--resource", metavar="NAME", expose_value=False, callback=_keep_in_context,
                      help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
-        click.option("--dialect", type=click.Choice(list(DIALECTS)), expose_value=False, callback=_keep_in_context,
-                     help="How to answer what compilers disagree about; `fbvm explain dialects` says which answers."),
+        click.option("--dialect", type=click.Choice([*DIALECTS, AUTO]), expose_value=False, callback=_keep_in_context,
+                     help="How to answer what compilers disagree about; `fbvm explain dialects` says which answers, `auto` looks "
+                     "for signs in the files and says which it takes."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
     ):  # fmt: skip
         function = decorate(function)
@@ -76,7 +88,7 @@ def compile_or_exit(
     for diagnostic in found:
         show_diagnostic(diagnostic)
     compilation = compile_files(given, program=program, libraries=libraries, runnable=runnable, lint=False, drawn=drawn,
-                                **compile_options())
+                                **compile_options(files))
     if compilation.image is None:
         report_diagnostics(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)

@@ -21,6 +21,10 @@ class Imported:
     """Source texts by file name, one for each POU, data type and list of globals; what was not understood is a comment."""
     diagnostics: list[Diagnostic]
     """Errors and warnings about the document, in the order of their places in it."""
+    family: str = ""
+    """The family of tools that wrote the document: "beremiz", "codesys", "twincat"; "" if that is not known."""
+    because: str = ""
+    """From what the family and the order of evaluation were concluded."""
 
     @property
     def errors(self) -> list[Diagnostic]:
@@ -48,4 +52,4 @@ def import_xml(document: Path | str | bytes, name: str = "", order: str = "") ->
     project = read_project(reading, root)
     files = sources(reading, project) if project else {}
     reading.close()
-    return Imported(files, sorted(reading.diagnostics, key=Diagnostic.order))
+    return Imported(files, sorted(reading.diagnostics, key=Diagnostic.order), reading.producer.family, reading.producer.because)

@@ -30,15 +30,15 @@ _UNNAMED = frozenset((
     "unknown", "unnamed", "unbekannt", "unbenannt", "desconocido", "sin nombre", "desconhecido", "sem nome", "inconnu", "sansnom",
     "sans nom", "sconosciuto", "senza nome", "неизвестно", "неизвестный", "безымянный", "未知", "未命名", "不明", "名称未設定"))
 """What Beremiz and OpenPLC Editor write as company and product, in the language of the desktop."""
-_CODESYS = ("codesys", "e!cockpit", "machine expert", "somachine", "twincat")
+_CODESYS = ("codesys", "e!cockpit", "machine expert", "somachine")
 _GENERATION_2, _GENERATION_3 = "2022-06", "2025-10-03"
 """Dates from which documents were probably meant for the second and third generation of the generator."""
 
 
 @dataclass(frozen=True)
 class Producer:
-    """The family of tools that wrote a document: "beremiz" (OpenPLC Editor too), "codesys", or "" if that is not known; the
-    order of evaluation that is taken, and from what that was concluded."""
+    """The family of tools that wrote a document: "beremiz" (OpenPLC Editor too), "codesys", "twincat", or "" if that is not
+    known; the order of evaluation that is taken, and from what that was concluded."""
 
     family: str
     order: str
@@ -66,6 +66,8 @@ def _family(root: Element) -> tuple[str, str]:
     header = root.one("fileHeader")
     company, product = ((header.get(name).strip() for name in ("companyName", "productName")) if header else ("", ""))
     said = f"{company} {product}".casefold()
+    if "twincat" in said:
+        return "twincat", f"the header names {product or company}"
     if any(word in said for word in _CODESYS):
         return "codesys", f"the header names {product or company}"
     if "beremiz" in said or "openplc" in said:

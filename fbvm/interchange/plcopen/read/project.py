@@ -95,7 +95,7 @@ def _data_type(reading: Reading, element: Element) -> Iterator[DataType]:
     name = identifier(reading, element)
     kind = type_text(reading, element.one("baseType"), element)
     if name and kind:
-        yield DataType(name, kind, value_text(element.one("initialValue"), kind), note(element))
+        yield DataType(name, kind, value_text(element.one("initialValue"), kind, reading.producer.family), note(element))
 
 
 # --- variables --------------------------------------------------------------------------------------------------------
@@ -117,7 +117,8 @@ def _variable(reading: Reading, element: Element) -> Iterator[Variable]:
     name = identifier(reading, element)
     kind = type_text(reading, element.one("type"), element)
     if name and kind:
-        yield Variable(name, kind, value_text(element.one("initialValue"), kind), location(element), note(element))
+        initial = value_text(element.one("initialValue"), kind, reading.producer.family)
+        yield Variable(name, kind, initial, location(element), note(element))
 
 
 # --- POUs -------------------------------------------------------------------------------------------------------------

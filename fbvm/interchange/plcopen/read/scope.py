@@ -210,10 +210,17 @@ class Scope:
             for wire in data.wires:
                 found = found or self.wire_type(wire, depth + 1)
             if found:
-                return found
+                return "TIME" if name == "SUB" and found in _MOMENTS and self._is_difference(item, found, depth) else found
         return ""
 
+    def _is_difference(self, item: Object, kind: str, depth: int) -> bool:
+        """Whether SUB has two moments of a type as its operands: their difference is a duration."""
+        behind = [pin for pin in item.inputs if pin.name.upper() not in _NO_OPERANDS][1:]
+        return any((self.type_of(pin.expression) if pin.expression else "") == kind
+                   or any(self.wire_type(wire, depth + 1) == kind for wire in pin.wires) for pin in behind)
 
+
+_MOMENTS = ("DT", "DATE_AND_TIME", "DATE", "TOD", "TIME_OF_DAY")
 _NO_OPERANDS = {"EN", "G", "K", "N", "L", "P"}
 """Inputs of standard functions whose type says nothing about that of the result."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from fbvm.interchange.plcopen.read.bodies import Bodies
 from fbvm.interchange.plcopen.read.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
@@ -12,6 +13,10 @@ from fbvm.interchange.source_files import SourceFiles
 GLOBALS = "globals"
 """Name of the file for lists of globals without a name."""
 TYPES = "types"
+OUTSIDE = "extensions"
+"""Name of the file for globals that other files of a project of Beremiz declare."""
+SERVED = ("PYTHON_EVAL", "PYTHON_POLL", "PYTHON_GEAR", "CSV_READ_BY_STRING", "CSV_READ_BY_INT", "CSV_RELOAD")
+"""Blocks that ask a program on the host of the PLC (Beremiz, py_ext)."""
 
 
 def sources(reading: Reading, document: Document) -> dict[str, str]:
@@ -28,11 +33,33 @@ def sources(reading: Reading, document: Document) -> dict[str, str]:
         reading.where = pou.name
         files.add(pou.name, _pou(reading, document, pou))
     reading.where = ""
+    _outside(reading, document, files)
     for configuration in document.configurations:
         lines = _configuration(configuration)
         if lines:
             files.add(configuration.name, lines)
     return files.texts()
+
+
+def _outside(reading: Reading, document: Document, files: SourceFiles) -> None:
+    """Declare what POUs expect of other files of a project, and say so; name the blocks that other programs serve."""
+    missing: dict[str, Variable] = {}
+    for pou in document.pous:
+        for variable in (variable for listed in pou.lists for variable in listed.variables):
+            if variable.type.upper() in SERVED:
+                reading.where = pou.name
+                reading.report("X0292", pou.element, f"{variable.name} is a {variable.type}, which a program on the host of the "
+                               "PLC serves: here it never acknowledges")
+        for variable in (v for listed in pou.lists if listed.kind == "VAR_EXTERNAL" for v in listed.variables):
+            if variable.name.upper() not in document.globals_by_name:
+                missing.setdefault(variable.name.upper(), variable)
+    reading.where = ""
+    if missing and reading.producer.family == "beremiz":
+        names = ", ".join(variable.name for variable in missing.values())
+        reading.report("X0292", document.pous[0].element, f"no global list has {names}: another file of the project declares "
+                       "them, such as one for Modbus, MQTT or Python; here nothing but the program writes them")
+        outside = tuple(replace(variable, initial="", address="") for variable in missing.values())
+        files.add(OUTSIDE, _section(VarList("VAR_GLOBAL", (), outside)))
 
 
 def _data_type(data_type: DataType) -> list[str]:

@@ -59,7 +59,7 @@ def _struct(reading: Reading, element: Element) -> str:
     members = []
     for variable in element.all("variable"):
         kind = type_text(reading, variable.one("type"), variable)
-        initial = value_text(variable.one("initialValue"), kind)
+        initial = value_text(variable.one("initialValue"), kind, reading.producer.family)
         address = f" AT {place}" if (place := location(variable)) else ""
         members.append(f"    {variable.get('name')}{address} : {kind}{initial and f' := {initial}'};{remark(note(variable))}\n")
     return f"STRUCT\n{''.join(members)}END_STRUCT"
@@ -78,9 +78,9 @@ _WRITERS = {"array": _array, "derived": _derived, "enum": _enum, "struct": _stru
             "subrangeUnsigned": _subrange, "pointer": _pointer}
 
 
-def value_text(holder: Element | None, kind: str = "") -> str:
+def value_text(holder: Element | None, kind: str = "", family: str = "") -> str:
     """The value in `initialValue` and its like; "" if there is none.  What a STRING begins with gets the quotes that it lacks:
-    some tools leave them out, or write those of a WSTRING."""
+    some tools leave them out, or write those of a WSTRING; Beremiz knows no names of constants there."""
     inner = next((part for part in holder.children if part.name.endswith("Value")), None) if holder else None
     if inner is None:
         return ""
@@ -94,7 +94,8 @@ def value_text(holder: Element | None, kind: str = "") -> str:
         fields = [f"{v.get('member')} := {value_text(v)}" for v in inner.all("value")]
         return f"({', '.join(fields)})" if fields else ""
     text = inner.get("value").strip()
-    if not re.fullmatch(r"STRING(\[.*\])?", kind) or not text or text[0] == "'" or _CONSTANT.fullmatch(text):
+    if not re.fullmatch(r"(HMI_)?STRING(\[.*\])?", kind) or not text or text[0] == "'" or (
+            family != "beremiz" and _CONSTANT.fullmatch(text)):
         return text
     text = text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
     return "'" + text.replace("'", "$'") + "'"

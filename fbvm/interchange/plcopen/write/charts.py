@@ -73,11 +73,13 @@ class ChartWriter:
     # --- elements ---
 
     def _put(self, kind: str, number: int, sources: list[int], x: int, y: int, *content: Element, **marks: str) -> None:
-        """An element with wires into it."""
-        into = _points(sources, x, y) if sources else None
-        out = element("connectionPointOut", **({} if kind == "transition" else {"formalParameter": ""}))
+        """An element with wires into it.  Each way into a convergence ends at a point of its own: Beremiz passes over others."""
+        groups = [[source] for source in sources] if kind == "simultaneousConvergence" else [sources]
+        into = [_points(group, x, y) for group in groups if group]
+        unnamed = kind in ("transition", "simultaneousConvergence")
+        out = element("connectionPointOut", **({} if unnamed else {"formalParameter": ""}))
         has_out = kind not in ("jumpStep", "actionBlock")
-        self.elements.append(element(kind, element("position", x=x, y=y), into, out if has_out else None, *content,
+        self.elements.append(element(kind, element("position", x=x, y=y), *into, out if has_out else None, *content,
                                      localId=number, **marks))
 
     def _step(self, step: Step, source: int | None, x: int, y: int) -> None:

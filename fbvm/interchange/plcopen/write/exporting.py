@@ -71,16 +71,18 @@ def _source(parts: _Parts, source: Source) -> None:
     parts.diagnostics += wrong
     if wrong:
         return  # there will be no document, and a damaged tree has no drawing
-    types = Types(source)
+    types = Types(source, (each.name.text for each in text.declarations if isinstance(each, tree.Pou | tree.TypeDecl)))
     types.note(declared.section for declared in text.declarations if isinstance(declared, tree.GlobalVars))
     named = Path(source.name).stem
     for declared in text.declarations:
+        types.owner = declared.name.text if isinstance(declared, tree.Pou | tree.TypeDecl) else ""
         try:
             _declaration(parts, types, declared, named if _NAME.fullmatch(named) else "")
         except NotExportable as unexportable:
             node, message, hint = unexportable.args
             what = f"{declared.name.text}: " if isinstance(declared, tree.Pou | tree.TypeDecl | tree.Configuration) else ""
             parts.diagnostics.append(Diagnostic("X0301", source, node.start, node.end, f"{what}{message}", hint))
+    parts.types += types.made.values()
     for pragma in text.pragmas:
         if any(start <= pragma.start < end for start, end in types.kept):
             continue

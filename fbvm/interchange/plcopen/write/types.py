@@ -30,8 +30,10 @@ class NotExportable(Exception):
 class Types:
     """Writes types, values and sections of one source; `foreign` grows by (node, message) for what only fbvm understands."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, taken: Iterable[str] = ()) -> None:
+        """`taken` are the names of types and POUs that there are."""
         self.source = source
+        self.taken = {name.upper() for name in taken}
         self.foreign: list[tuple[tree.Node, str]] = []
         self.kept: list[tuple[int, int]] = []
         """Parts of the text that are exported as they are."""
@@ -39,6 +41,11 @@ class Types:
         """Variable in capitals -> the timer or counter that it is declared AT."""
         self.instances: dict[str, str] = {}
         """Variable of the POU at work, in capitals -> the name of its type."""
+        self.owner = ""
+        """The declaration at work, whose name those of its own types begin with."""
+        self.made: dict[str, Element] = {}
+        """By name, the data types that were made of enumerations and subranges in declarations of variables: other tools read
+        these only by name."""
 
     def text(self, node: tree.Node) -> str:
         """The text of a node, with the brackets around parts of it, which the tree does not have."""
@@ -114,8 +121,9 @@ class Types:
         """One element for each name of a declaration."""
         if declared.edge:
             raise NotExportable(declared, "the format has no R_EDGE and F_EDGE", "use R_TRIG or F_TRIG")
+        kind = self._kind(declared)
         for name in declared.names:
-            made = element("variable", element("type", self.spec(declared.spec)), name=name.text)
+            made = element("variable", element("type", kind), name=name.text)
             if declared.location is not None:
                 self._location(made, declared.location)
             if declared.initial is not None:
@@ -123,6 +131,19 @@ class Types:
             if remark := _REMARK.match(self.source.text, declared.end):
                 made.content.append(documentation(remark[1].strip()))
             yield made
+
+    def _kind(self, declared: tree.VarDecl) -> Element:
+        """The element of a variable's type; an enumeration or subrange without a name gets one."""
+        if not isinstance(declared.spec, tree.EnumSpec | tree.SubrangeSpec):
+            return self.spec(declared.spec)
+        name = stem = f"{self.owner}_{declared.names[0].text}" if self.owner else f"{declared.names[0].text}_type"
+        number = 1
+        while name.upper() in self.taken:
+            number += 1
+            name = f"{stem}_{number}"
+        self.taken.add(name.upper())
+        self.made[name] = element("dataType", element("baseType", self.spec(declared.spec)), name=name)
+        return element("derived", name=name)
 
     def _location(self, made: Element, location: tree.Location) -> None:
         text = location.text.strip()

@@ -1,0 +1,82 @@
+"""The additional blocks of matiec beside a straight model of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
+
+
+def scans(declared: str, call: str, count: int, dialect: str = "matiec") -> Iterator[Any]:
+    """The block `b` after each scan; `n` counts the scans from 1."""
+    made = compile_text(f"PROGRAM Main VAR b : {declared}; n : INT; END_VAR n := n + 1; b({call}); END_PROGRAM", dialect=dialect)
+    assert made.image is not None, [d.render() for d in made.errors]
+    plc = Plc(made.image, 100_000_000)
+    for _ in range(count):
+        plc.scan()
+        yield plc.read("Main.b")
+
+
+@pytest.mark.parametrize("dialect", ["matiec", "strucpp"])
+def test_pid_against_a_model_in_seconds(dialect: str) -> None:
+    call = "AUTO := n > 2, PV := INT_TO_REAL(n) * 0.5, SP := 3.0, X0 := 0.25, KP := 2.0, TR := 4.0, TD := 0.5, CYCLE := T#100ms"
+    integral, past = 0.0, [0.0, 0.0, 0.0]
+    for n, block in enumerate(scans("PID", call, 20, dialect), 1):
+        error, slope = n * 0.5 - 3.0, 0.0
+        if n > 2:
+            integral += error * 0.1
+            slope = (3 * (error - past[2]) + past[0] - past[1]) / (10 * 0.1)
+            past = [error, *past[:2]]
+        else:
+            integral, past = 4.0 * (0.25 - error), [error] * 3
+        assert block["XOUT"] == pytest.approx(2.0 * (error + integral / 4.0 + slope * 0.5), abs=1e-4), n
+
+
+def test_ramp_up_and_back() -> None:
+    seen = [(block["XOUT"], block["BUSY"]) for block in scans(
+        "RAMP", "RUN := n > 1 AND n < 7, X0 := 2.0, X1 := 10.0, TR := T#400ms, CYCLE := T#100ms", 8)]
+    assert seen == [(2.0, False), (2.0, True), (4.0, True), (6.0, True), (8.0, True), (10.0, False), (2.0, False), (2.0, False)]
+
+
+def test_integral_begins_where_it_is_set() -> None:
+    seen = [(block["XOUT"], block["Q"]) for block in scans(
+        "INTEGRAL", "RUN := n <> 4, R1 := n = 2, XIN := 5.0, X0 := 100.0, CYCLE := T#200ms", 5)]
+    assert seen == [(1.0, True), (100.0, False), (101.0, True), (101.0, True), (102.0, True)]
+
+
+def test_derivative_of_a_straight_line_is_its_slope() -> None:
+    seen = [block["XOUT"] for block in scans("DERIVATIVE", "RUN := n > 1, XIN := INT_TO_REAL(n) * 3.0, CYCLE := T#1s", 8)]
+    assert seen[0] == 0.0
+    assert seen[5:] == pytest.approx([3.0, 3.0, 3.0])
+
+
+def test_hysteresis_keeps_its_output_between_its_limits() -> None:
+    seen = [block["Q"] for block in scans("HYSTERESIS", "XIN1 := INT_TO_REAL(ABS(6 - n)), XIN2 := 3.0, EPS := 1.0", 11)]
+    assert seen == [n <= 4 or n == 11 for n in range(1, 12)]
+
+
+def test_a_clock_is_set_and_goes_on() -> None:
+    seen = [str(block["CDT"]) for block in scans("RTC", "IN := n > 2, PDT := DT#2024-02-28-23:59:59", 4)]
+    moments = [int(text) for text in seen]
+    assert moments[1] - moments[0] == 100_000_000
+    assert moments[3] - moments[2] == 100_000_000
+    assert moments[2] == 1_709_164_799 * 10**9
+
+
+def test_a_claim_wins_over_a_release() -> None:
+    seen = [block["BUSY"] for block in scans("SEMA", "CLAIM := n = 2 OR n = 4, RELEASE := n >= 4", 6)]
+    assert seen == [False, True, True, True, False, False]
+
+
+def test_a_message_is_kept_at_each_rise() -> None:
+    *_, block = scans("LOGGER", "TRIG := n = 2 OR n > 3, MSG := CONCAT('message ', INT_TO_STRING(n))", 6)
+    assert (block["Last"], block["Count"]) == ("message 4", 2)
+
+
+def test_where_the_blocks_are_is_told() -> None:
+    [error] = compile_text("PROGRAM Main VAR b : PID; END_VAR END_PROGRAM").errors
+    assert (error.code, error.hint) == ("S0204", "it is a block of Beremiz and OpenPLC: --dialect matiec brings it")

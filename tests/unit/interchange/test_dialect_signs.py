@@ -1,0 +1,43 @@
+"""Signs in sources that tell the dialect for which they were written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from click.testing import CliRunner
+from rows import each_of
+
+from fbvm.base.diagnostics import Source
+from fbvm.cli.main import main
+from fbvm.interchange.dialect_signs import guessed
+
+DOCUMENTS = Path(__file__).parents[2] / "plcopen" / "documents"
+
+
+@each_of(("text", "dialect"), [
+    ("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM", "standard"),
+    ("{attribute 'qualified_only'}\nVAR_GLOBAL n : INT; END_VAR", "codesys"),
+    ("PROGRAM Main VAR p : POINTER TO INT; END_VAR END_PROGRAM", "codesys"),
+    ("PROGRAM Main VAR s : T_MaxString; f : FB_FormatString; END_VAR END_PROGRAM", "twincat"),
+    ("CONFIGURATION Config0 RESOURCE Res0 ON PLC END_RESOURCE END_CONFIGURATION", "matiec"),
+    ("PROGRAM Main VAR c : RTC; END_VAR END_PROGRAM", "matiec"),
+    ("{external} FUNCTION f : INT END_FUNCTION", "rusty"),
+    ("PROGRAM Main // POINTER TO\nVAR s : STRING := '{attribute'; (* RESOURCE Res0 ON PLC *) END_VAR END_PROGRAM", "standard"),
+])
+def test_constructs_tell_the_dialect(text: str, dialect: str) -> None:
+    found = guessed([], [Source("main.st", text)])
+    assert found.dialect == dialect
+    assert ("main.st" in found.because) == (dialect != "standard")
+
+
+def test_the_tool_that_wrote_a_document_counts_more_than_constructs() -> None:
+    found = guessed([("beremiz", "the header names Beremiz")], [Source("a.st", "VAR p : POINTER TO INT; END_VAR")])
+    assert (found.dialect, found.because) == ("matiec", "the header names Beremiz")
+
+
+@each_of(("name", "dialect", "reason"), [("beremiz.xml", "matiec", "there is `CONFIGURATION Config0`"),
+                                         ("codesys.xml", "codesys", "the header names CODESYS")])
+def test_a_document_is_checked_in_the_dialect_of_its_tool_which_is_said(name: str, dialect: str, reason: str) -> None:
+    done = CliRunner().invoke(main, ["check", str(DOCUMENTS / name), "--dialect", "auto", "--json", "--no-warn", "all"])
+    assert f"dialect {dialect}: {reason}" in done.stderr
+    assert "X0101" not in done.stdout
