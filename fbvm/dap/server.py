@@ -96,15 +96,29 @@ class DebugDoor:
 
 
 def pass_on(read: Callable[[], bytes], write: Callable[[bytes], None], receive: Callable[[], bytes],
-            send: Callable[[bytes], None], close: Callable[[], None]) -> None:  # fmt: skip
-    """Passes bytes from `read` to `send` and from `receive` to `write` until one of them ends.  Raises OSError."""
+            send: Callable[[bytes], None], end: Callable[[], None]) -> None:  # fmt: skip
+    """Passes bytes from `read` to `send` and from `receive` to `write` until one of them ends.
+
+    `end` ends the connection when `read` has ended; what `receive` raises from then on is its end.  Raises OSError."""
+    has_ended = threading.Event()
 
     def there() -> None:
         with suppress(OSError, ValueError):
             while data := read():
                 send(data)
-        close()
+        has_ended.set()
+        end()
 
     threading.Thread(target=there, daemon=True).start()
-    while data := receive():
+    while data := _received(receive, has_ended):
         write(data)
+
+
+def _received(receive: Callable[[], bytes], has_ended: threading.Event) -> bytes:
+    """What `receive` returns, b"" if it fails because the connection has been ended here.  Raises OSError."""
+    try:
+        return receive()
+    except OSError:
+        if has_ended.is_set():
+            return b""
+        raise

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,9 +13,9 @@ from typing import Any
 import pytest
 
 from fbvm.dap.framing import Framer, FramingError, encode
-from fbvm.dap.server import serve
+from fbvm.dap.server import pass_on, serve
 from fbvm.dap.target import LaunchError, Target
-from fbvm.net.streams import connect
+from fbvm.net.streams import Listener, connect
 
 Message = dict[str, Any]
 TEXT = "PROGRAM Main\nVAR n : INT; END_VAR\nn := n + 1;\nIF n = 500 THEN n := 0; END_IF\nEND_PROGRAM\n"
@@ -186,3 +188,45 @@ def test_attached_to_a_plc_that_runs(file: Path, net: str) -> None:
         finally:
             process.kill()
         assert "Traceback" not in process.stderr.read()
+
+
+def test_a_bridge_whose_editor_is_gone_ends_though_its_connection_is_ended_first() -> None:
+    ended = threading.Event()
+
+    def receive() -> bytes:
+        assert ended.wait(20)
+        raise OSError(errno.EBADF, "Bad file descriptor")
+
+    written = bytearray()
+    pass_on(lambda: b"", written.extend, receive, written.extend, ended.set)
+    assert written == b""
+
+
+def test_a_bridge_tells_of_a_connection_that_breaks_while_its_editor_is_there() -> None:
+    gone = threading.Event()
+
+    def read() -> bytes:
+        gone.wait(20)
+        return b""
+
+    def receive() -> bytes:
+        raise ConnectionResetError(errno.ECONNRESET, "reset")
+
+    try:
+        with pytest.raises(ConnectionResetError):
+            pass_on(read, bytearray().extend, receive, bytearray().extend, gone.set)
+    finally:
+        gone.set()
+
+
+def test_a_stream_that_is_ended_gives_its_last_bytes_and_then_the_end() -> None:
+    listener = Listener("127.0.0.1", 0)
+    try:
+        with connect("127.0.0.1", listener.port) as stream, listener.accept() as other:
+            other.send(b"last")
+            assert stream.receive() == b"last"
+            stream.end()
+            assert stream.receive() == b"" and other.receive() == b""
+            stream.end()
+    finally:
+        listener.close()
