@@ -8,26 +8,21 @@ from typing import Any
 
 import click
 
-from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.base.diagnostics import Diagnostic
 from fbvm.base.dialects import DIALECTS
+from fbvm.cli.shared.debug.worlds import NetworkPackets, ProgramErrors, ProjectWorld, program_world
 from fbvm.cli.shared.e_banks import e_banks_in
-from fbvm.cli.shared.networks import build_network, mailbox_names
-from fbvm.cli.shared.options import Mapping as Mapped
 from fbvm.cli.shared.options import mapping
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.dap.target import LaunchError, Target, checked
-from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
-from fbvm.net.loop import LoopNetwork
 from fbvm.record.recording.container import RecordingError
 from fbvm.record.recording.file_reader import RecordingFile
 from fbvm.record.recording.file_scans import FileScans
 from fbvm.record.recording.scans import RecordedScans
-from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth
-from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import FILE, Project, project_file, read_project
 from fbvm.run.real_pace import RealPace
 from fbvm.run.running import TimedWrite
@@ -37,7 +32,6 @@ from fbvm.step.session import Session
 from fbvm.step.world import Debugged, World
 from fbvm.watch.places import parse_for
 from fbvm.watch.values import parse_time_ns
-from fbvm.wire.tap import TapEvent
 
 LAUNCH: dict[str, tuple[type, ...]] = {
     "program": (str, list), "project": (str,), "plc": (str,), "main": (str,), "resource": (str,), "libraries": (list,),
@@ -116,6 +110,8 @@ def _sources(given: Mapping[str, Any], folder: Path) -> list[Path]:
 
 def _program(given: Mapping[str, Any], folder: Path) -> Target:
     """A program on a PLC with its units and a network in memory."""
+    if "plc" in given:
+        raise LaunchError("plc: it names one of the PLCs of a project; a program is one PLC")
     if given.get("dialect", "standard") not in DIALECTS:
         raise LaunchError(f"there is no dialect {given['dialect']!r}; there are {', '.join(DIALECTS)}")
     files, libraries = _sources(given, folder), [folder / str(path) for path in given.get("libraries", ())]
@@ -129,19 +125,14 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     timing, seed = given.get("timing", "exact"), given.get("seed", 0)
     if timing not in ("exact", "real"):
         raise LaunchError(f"timing is exact or real, not {timing!r}")
-    tapped = _Tapped()
-
-    def make() -> list[Debugged]:
-        plc = Plc(image, cycle_ns, engine=given.get("engine", "auto"))
-        network = network_in_memory(mappings, seed)
-        tapped.listen(network)
-        for unit in usual_units(mailbox_names(image), timing, seed):
-            plc.attach(unit, network)
-        return [Debugged("plc", plc, [row.of_plc(plc) for row in sets])]
-
-    texts = source_texts(image, {str(path): path for path in files}, libraries)
-    return _target(given, World(make), texts, {str(path): path for path in files}, tapped, cycle_ns,
-                   _said(compilation.diagnostics))  # fmt: skip
+    for row in mappings:
+        if row.host is not None:
+            raise LaunchError(f"the debugger's network stays in memory: map {row.endpoint}=peer")
+    packets = NetworkPackets()
+    world = program_world(image, cycle_ns, mappings, timing, seed, packets, given.get("engine", "auto"),
+                          lambda name, plc: [row.of_plc(plc) for row in sets])  # fmt: skip
+    paths = {str(path): path for path in files}
+    return _target(given, world, "plc", source_texts(image, paths, libraries), paths, packets, _said(compilation.diagnostics))
 
 
 def _recording(path: Path, libraries: Sequence[Path]) -> Target:
@@ -179,70 +170,46 @@ def _test(node: str, folder: Path) -> Target:
     return Target(sessions, item.texts, paths, notes=[item.output], failure=item.reason)
 
 
-def network_in_memory(mappings: Iterable[Mapped], seed: int) -> LoopNetwork:
-    """A network in memory with a Modbus server at each mapped endpoint.  Raises LaunchError for one outside."""
-    rows = tuple(mappings)
-    for row in rows:
-        if row.host is not None:
-            raise LaunchError(f"the debugger's network stays in memory: map {row.endpoint}=peer")
-    network = build_network("loop", rows, seed)
-    assert isinstance(network, LoopNetwork)
-    return network
-
-
 def _project(given: Mapping[str, Any], path: Path) -> Target:
     """The PLCs of a project, which share one time and one network in memory."""
     own = {"main", "resource", "libraries", "dialect", "cycle", "engine", "timing", "map"} & set(given)
     if own:
         raise LaunchError(f"{', '.join(sorted(own))}: with a project its file says that")
+    project = _read_project(path)
+    chosen, sets, packets = given.get("plc"), [_SetRow.of(row) for row in given.get("set", ())], NetworkPackets()
+    names: list[str] = []
+
+    def writes(name: str, plc: Plc) -> list[TimedWrite]:
+        names.append(name)
+        return [row.of_plc(plc) for row in sets] if name == (chosen or names[0]) else []
+
+    try:
+        world = ProjectWorld(project, packets, writes)
+    except ProgramErrors as error:
+        raise LaunchError(str(error), _said(error.diagnostics)) from None
+    chosen = chosen or world.names[0]
+    if chosen not in world.names:
+        raise LaunchError(f"there is no PLC {chosen}; there is {', '.join(world.names)}")
+    return _target(given, world, chosen, world.texts, world.paths, packets, _said(world.diagnostics))
+
+
+def _read_project(path: Path) -> Project:
+    """The project of a file or a folder.  Raises LaunchError."""
     file = project_file(path) if path.is_dir() else path
     if file is None or not file.is_file():
         raise LaunchError(f"there is no {FILE} in {path}" if path.is_dir() else f"there is no file {path}")
     project = read_project(file)
     if not isinstance(project, Project):
         raise LaunchError(f"{file.name} has errors", _said(project))
-    tapped, sets = _Tapped(), [_SetRow.of(row) for row in given.get("set", ())]
-
-    def plant() -> Plant:
-        made = Plant(project, net="loop", for_ns=ENDLESS)
-        if errors(made.diagnostics):
-            raise LaunchError("the program has errors", _said(made.diagnostics))
-        return made
-
-    first = plant()
-    names = [name for kind in first.kinds for name in kind.names]
-    chosen = given.get("plc", names[0])
-    if chosen not in names:
-        raise LaunchError(f"there is no PLC {chosen}; there is {', '.join(names)}")
-    notes = _said(first.diagnostics)
-    first.close()
-
-    def make() -> list[Debugged]:
-        made = plant()
-        assert isinstance(made.network, LoopNetwork)
-        tapped.listen(made.network)
-        rows = [Debugged(name, run.plc, list(run.writes)) for kind in made.kinds
-                for name, run in zip(kind.names, kind.runs, strict=True)]  # fmt: skip
-        for row in rows:
-            if row.name == chosen:
-                row.writes = [*row.writes, *(one.of_plc(row.plc) for one in sets)]
-        return rows
-
-    world = World(make)
-    texts: dict[str, str] = {}
-    for kind in first.kinds:
-        files = {str(path): path for path in kind.row.sources}
-        texts |= source_texts(kind.runs[0].plc.image, files, kind.row.libraries)
-    paths = {str(path): path for kind in first.kinds for path in kind.row.sources}
-    target = _target(given, world, texts, paths, tapped, world[chosen].cycle_ns, notes)
-    target.sessions = {name: target.sessions[name] for name in [chosen, *(name for name in names if name != chosen)]}
-    return target
+    return project
 
 
-def _target(given: Mapping[str, Any], world: World, texts: Mapping[str, str], paths: Mapping[str, Path], tapped: _Tapped,
-            cycle_ns: int, notes: str) -> Target:  # fmt: skip
-    sessions = {name: Session(world, name) for name in world.names}
-    first = next(iter(sessions.values())) if "plc" not in given else sessions[given["plc"]]
+def _target(given: Mapping[str, Any], world: World, chosen: str, texts: Mapping[str, str], paths: Mapping[str, Path],
+            packets: NetworkPackets, notes: str) -> Target:  # fmt: skip
+    """The PLCs of a world, the chosen one first, with the forces and the end that are given."""
+    names = [chosen, *(name for name in world.names if name != chosen)]
+    sessions = {name: Session(world, name) for name in names}
+    first = sessions[chosen]
     for name, value in given.get("force", {}).items():
         place = first.find(name)
         parsed = parse_for(place, _text(value))
@@ -250,25 +217,10 @@ def _target(given: Mapping[str, Any], world: World, texts: Mapping[str, str], pa
     until = None
     if "for" in given or "scans" in given:
         bounds = [given["scans"]] if "scans" in given else []
+        cycle_ns = world[chosen].cycle_ns
         until = min([*bounds, *([-(-_time_ns(given["for"]) // cycle_ns)] if "for" in given else [])])
     assert first.here == Position()
-    return Target(sessions, texts, paths, lambda: tapped.packets, until, given.get("stopOnEntry"), [notes] if notes else [])
-
-
-class _Tapped:
-    """The packets of the network that was made last."""
-
-    def __init__(self) -> None:
-        self.packets: list[Packet] = []
-
-    def listen(self, network: LoopNetwork) -> None:
-        """Dissects what passes a network from now on."""
-        self.packets, dissector = [], Dissector(once=True)
-
-        def tap(now_ns: int, unit: str, event: TapEvent) -> None:
-            self.packets.extend(dissector.dissect(now_ns, event))
-
-        network.tap = tap
+    return Target(sessions, texts, paths, lambda: packets.packets, until, given.get("stopOnEntry"), [notes] if notes else [])
 
 
 class _SetRow:
