@@ -56,11 +56,13 @@ def run(
     return running.reason
 
 
-def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None) -> None:
+def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None, until: Callable[[], bool] | None = None, *,
+            resumed: bool = False) -> None:  # fmt: skip
     """Runs several PLCs side by side, each until its own end, which its `reason` says then.
 
     All have the same time, real if a network of any of them is real, so that PLCs may share a network.  `progress` is called
-    at most every 100 ms."""
+    at most every 100 ms.  When `until` returns True between two scans, the loop is left; the runs go on with `resumed`, after
+    `Running.resume` of each."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
     interrupts = Interrupts()
@@ -77,8 +79,8 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
             run.begin(start_ns + run.phase_ns, real.behind)
     else:  # nothing happens between two periods of virtual time
         for run in runs:
-            run.begin(start_ns)
-            run.pace, run.alone = CYCLIC, len(runs) == 1
+            run.begin(run.plc.elapsed_ns if resumed else start_ns)
+            run.pace, run.alone = CYCLIC, len(runs) == 1 and until is None
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
@@ -87,6 +89,8 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
                 now_ns, woken = clock.reach(due_ns)
                 _scan_all(queue, now_ns, woken, watchdogs)
                 interrupts.check()
+                if until and until():
+                    break
                 if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                     told_ns = time.monotonic_ns()
                     progress()

@@ -12,7 +12,8 @@ from click.core import ParameterSource
 
 from fbvm.cli.running.project import run_project
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
-from fbvm.cli.shared.debug.door import NEVER_WITH, run_with_door
+from fbvm.cli.shared.debug.door import DebugPort, debug_option, run_with_port
+from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in
@@ -48,10 +49,14 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.trace.recorder import Recorder
+from fbvm.record.trace.source_texts import source_texts
 from fbvm.run import loop
-from fbvm.run.running import EVENT, PACES, TimedWrite
+from fbvm.run.running import EVENT, PACES, Running, TimedWrite
 from fbvm.watch.places import parse_for
 
+NEVER_WITH_DEBUG = {"journal": "--journal", "trace": "--trace", "html": "--html", "rungs": "--ladder", "charts": "--sfc",
+                    "charted": "--chart", "lines": "--break", "watched": "--watch", "conditions": "--break-if"}  # fmt: skip
+"""Options that look into scans themselves, by the names of their parameters."""
 HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 
 
@@ -92,8 +97,7 @@ HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 @click.option("--engine", type=click.Choice(CHOICES), default="auto", show_default=True,
               help="auto: Python first, machine code when that pays.")
 @click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
-@click.option("--debug", "debug_port", type=click.IntRange(0, 65535), metavar="PORT",
-              help="Let an editor's debugger attach at this port; 0 is one that the system picks.")
+@debug_option
 @click.option("--scan-time", is_flag=True,
               help="Say how long scans took and how late they began; a run over tcp on a terminal does so by itself.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -184,8 +188,12 @@ def _run(
                     capture.flush()
 
             if debug_port is not None:
-                reason = run_with_door(plc, debug_port, files, libraries, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns,
-                                       writes=writes, pace=pace, progress=progress)  # fmt: skip
+                running = Running(plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns,
+                                  writes=writes, pace=pace)  # fmt: skip
+                paths = {str(path): path for path in files}
+                sources = DebugSources(paths, source_texts(plc.image, paths, libraries))
+                run_with_port({"plc": running}, DebugPort(debug_port, sources), lambda: progress(plc))
+                reason = running.reason
             else:
                 reason = loop.run(
                     plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes,
@@ -245,7 +253,7 @@ def _check_usage(
     *, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
     max_ns: int | None, debug_port: int | None, **others: Any,
 ) -> None:  # fmt: skip
-    if debug_port is not None and (both := [said for name, said in NEVER_WITH.items() if others.get(name)]):
+    if debug_port is not None and (both := [said for name, said in NEVER_WITH_DEBUG.items() if others.get(name)]):
         raise click.UsageError(f"--debug looks into scans itself: leave out {', '.join(both)}")
     ends = sum(bound is not None for bound in (scans, for_ns, until))
     if ends > 1 or not (ends or doors or debug_port is not None):

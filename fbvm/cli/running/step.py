@@ -57,7 +57,7 @@ def command(
     packets = NetworkPackets()
     if project := project_argument(files):
         world = _project_world(project, packets)
-        session, texts = Session(world, _chosen(world.names, name)), world.texts
+        session, texts = Session(world, _chosen(world.names, name)), world.sources.texts
     else:
         image = compile_or_exit(files, program, libraries, runnable=True, drawn=True)
         image = image.with_e_banks(e_banks_in([*watched, *(given.name for given in settings)]))

@@ -10,6 +10,7 @@ import click
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.base.dialects import DIALECTS
+from fbvm.cli.shared.debug.attach import literal
 from fbvm.cli.shared.debug.worlds import NetworkPackets, ProgramErrors, ProjectWorld, program_world
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.options import mapping
@@ -24,12 +25,11 @@ from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth
 from fbvm.run.project import FILE, Project, project_file, read_project
-from fbvm.run.real_pace import RealPace
 from fbvm.run.running import TimedWrite
 from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position
 from fbvm.step.session import Session
-from fbvm.step.world import Debugged, World
+from fbvm.step.world import World
 from fbvm.watch.places import parse_for
 from fbvm.watch.values import parse_time_ns
 
@@ -60,34 +60,6 @@ def open_launch(arguments: Mapping[str, Any]) -> Target:
     except (click.ClickException, LookupError, TypeError, ValueError, OSError) as error:
         said = error.format_message() if isinstance(error, click.ClickException) else str(error)
         raise LaunchError(said) from None
-
-
-ATTACH: dict[str, tuple[type, ...]] = {"stopOnEntry": (bool,), "force": (dict,), "keepForces": (bool,), "cwd": (str,),
-                                       "connect": (str, int)}  # fmt: skip
-"""The keys of an attach configuration; `connect` is for the extension that starts `fbvm dap --connect`."""
-
-
-def open_attached(plc: Plc, paths: Mapping[str, Path], libraries: Sequence[Path], arguments: Mapping[str, Any]) -> Target:
-    """A PLC that runs, from now on.  `paths` are its sources by name.  Raises LaunchError."""
-    given = checked(arguments, ATTACH, "attach")
-    pace = RealPace(plc)
-    try:
-        world = World(lambda: [Debugged("plc", plc)], is_fixed=True, pace=pace if pace.is_real else None)
-        forced = set(plc.forces)
-        for name, value in given.get("force", {}).items():
-            place = plc.find(name)
-            plc.force(name, parse_for(place, _text(value)))
-    except (LookupError, TypeError, ValueError) as error:
-        raise LaunchError(str(error)) from None
-
-    def close() -> None:
-        world.leave()
-        for name in () if given.get("keepForces") else set(plc.forces) - forced:
-            plc.unforce(name)
-
-    notes = ["going back shows what was recorded since now, read-only: real connections do not travel in time"]
-    return Target({"plc": Session(world, "plc")}, source_texts(plc.image, paths, libraries), paths, stop_on_entry=given.get(
-        "stopOnEntry"), notes=notes, close=close)  # fmt: skip
 
 
 def _is_project(path: Path) -> bool:
@@ -190,7 +162,7 @@ def _project(given: Mapping[str, Any], path: Path) -> Target:
     chosen = chosen or world.names[0]
     if chosen not in world.names:
         raise LaunchError(f"there is no PLC {chosen}; there is {', '.join(world.names)}")
-    return _target(given, world, chosen, world.texts, world.paths, packets, _said(world.diagnostics))
+    return _target(given, world, chosen, world.sources.texts, world.sources.paths, packets, _said(world.diagnostics))
 
 
 def _read_project(path: Path) -> Project:
@@ -212,7 +184,7 @@ def _target(given: Mapping[str, Any], world: World, chosen: str, texts: Mapping[
     first = sessions[chosen]
     for name, value in given.get("force", {}).items():
         place = first.find(name)
-        parsed = parse_for(place, _text(value))
+        parsed = parse_for(place, literal(value))
         first.act(lambda plc, name=name, parsed=parsed: plc.force(name, parsed))  # type: ignore[misc]
     until = None
     if "for" in given or "scans" in given:
@@ -234,17 +206,12 @@ class _SetRow:
         """The row of an object.  Raises LaunchError."""
         if not isinstance(row, dict) or not {"name", "value"} <= set(row) <= {"name", "value", "at"}:
             raise LaunchError(f'a row of set is {{"name": ..., "value": ..., "at": "50ms"}}, not {row!r}')
-        return cls(str(row["name"]), _text(row["value"]), _time_ns(row["at"]) if "at" in row else 0)
+        return cls(str(row["name"]), literal(row["value"]), _time_ns(row["at"]) if "at" in row else 0)
 
     def of_plc(self, plc: Plc) -> TimedWrite:
         """What is written into a PLC."""
         place = plc.find(self.name)
         return TimedWrite(place, parse_for(place, self.value), self.at_ns)
-
-
-def _text(value: object) -> str:
-    """A JSON value as a literal of a program."""
-    return str(value).upper() if isinstance(value, bool) else str(value)
 
 
 def _time_ns(text: object) -> int:

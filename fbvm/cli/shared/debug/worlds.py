@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared.networks import build_network, mailbox_names
-from fbvm.cli.shared.options import Mapping
+from fbvm.cli.shared.options import Mapping as Mapped
 from fbvm.code.image import Image
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
@@ -37,6 +38,25 @@ class ProgramErrors(Exception):
         self.diagnostics = diagnostics
 
 
+@dataclass(frozen=True)
+class DebugSources:
+    """What a debugger shows of PLCs: the files of their sources by name, and all texts by name, those of libraries too."""
+
+    paths: Mapping[str, Path]
+    texts: Mapping[str, str]
+
+
+def plant_sources(plant: Plant) -> DebugSources:
+    """The sources of all PLCs of a project."""
+    paths: dict[str, Path] = {}
+    texts: dict[str, str] = {}
+    for kind in plant.kinds:
+        files = {str(path): path for path in kind.row.sources}
+        paths |= files
+        texts |= source_texts(kind.runs[0].plc.image, files, kind.row.libraries)
+    return DebugSources(paths, texts)
+
+
 class NetworkPackets:
     """The packets of the network that was made last."""
 
@@ -53,7 +73,7 @@ class NetworkPackets:
         network.tap = tap
 
 
-def program_world(image: Image, cycle_ns: int, mappings: Sequence[Mapping], timing: str, seed: int, packets: NetworkPackets,
+def program_world(image: Image, cycle_ns: int, mappings: Sequence[Mapped], timing: str, seed: int, packets: NetworkPackets,
                   engine: str = "auto", writes: Writes = no_writes) -> World:  # fmt: skip
     """A world with one PLC, "plc", that has the units which a program needs.
 
@@ -78,10 +98,7 @@ class ProjectWorld(World):
     def __init__(self, project: Project, packets: NetworkPackets, writes: Writes = no_writes) -> None:
         self.diagnostics: Sequence[Diagnostic] = ()
         """What the compiler says of all programs."""
-        self.paths: dict[str, Path] = {}
-        """The source files by name."""
-        self.texts: dict[str, str] = {}
-        """The texts of all sources by name, those of libraries too."""
+        self.sources = DebugSources({}, {})
 
         def make() -> Iterable[Debugged]:
             plant = Plant(project, net="loop", for_ns=ENDLESS)
@@ -89,17 +106,10 @@ class ProjectWorld(World):
                 raise ProgramErrors(plant.diagnostics)
             assert isinstance(plant.network, LoopNetwork)
             packets.listen(plant.network)
-            if not self.texts:
-                self._describe(plant)
-            for kind in plant.kinds:
-                for name, run in zip(kind.names, kind.runs, strict=True):
-                    yield Debugged(name, run.plc, [*run.writes, *writes(name, run.plc)])
+            self.diagnostics = plant.diagnostics
+            if not self.sources.paths:
+                self.sources = plant_sources(plant)
+            for name, run in plant.named_runs.items():
+                yield Debugged(name, run.plc, [*run.writes, *writes(name, run.plc)])
 
         super().__init__(make)
-
-    def _describe(self, plant: Plant) -> None:
-        self.diagnostics = plant.diagnostics
-        for kind in plant.kinds:
-            files = {str(path): path for path in kind.row.sources}
-            self.paths |= files
-            self.texts |= source_texts(kind.runs[0].plc.image, files, kind.row.libraries)
