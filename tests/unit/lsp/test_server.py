@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import subprocess
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -224,3 +226,13 @@ def test_keys_that_come_faster_than_checks_end_in_the_right_diagnostics(folder: 
         await editor.codes("main.st", [])
 
     conversation(folder, talk, "main.st")
+
+
+def test_the_end_of_a_conversation_is_the_end_of_the_process_without_a_word() -> None:
+    said = b""
+    for message in ({"id": 1, "method": "initialize", "params": {"capabilities": {}, "processId": None, "rootUri": None}},
+                    {"method": "initialized", "params": {}}, {"id": 2, "method": "shutdown"}, {"method": "exit"}):  # fmt: skip
+        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
+        said += b"Content-Length: %d\r\n\r\n" % len(body) + body
+    done = subprocess.run([sys.executable, "-m", "fbvm", "lsp"], input=said, capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, b"") and b'"id": 2' in done.stdout
