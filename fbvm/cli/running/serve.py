@@ -18,6 +18,8 @@ from fbvm.base.data import data_folder
 from fbvm.base.files import reason
 from fbvm.base.host import ending_signals, handling, saving_signals
 from fbvm.cli.shared import status
+from fbvm.cli.shared.debug.door import DebugPort, debug_option
+from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
 from fbvm.cli.shared.files import OutputError, growing_file, writing
 from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, say_fins, try_fins
@@ -32,8 +34,10 @@ from fbvm.net.notices import Notice, NoticeKind
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.trace import memory_images
 from fbvm.record.trace.requests import RequestLog
+from fbvm.record.trace.source_texts import source_texts
 from fbvm.run import loop
 from fbvm.run.running import EVENT
+from fbvm.step.world import Debugged
 from fbvm.wire.link import Peer
 
 CYCLE_NS = 10_000_000
@@ -42,6 +46,8 @@ SERVED = {"CIO": 5801, "D": 32768}
 """Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
 
 
+SERVER = "server.st"
+"""The shipped server program, among the examples."""
 OWN_SETTINGS = {"sockets": "Sockets", "read_only": "Read_Only", "fn0f": "Fn0F", "full_dm": "Full_DM", "idle_ns": "Idle_Time"}
 """The options that set inputs of the shipped server program."""
 FINS_SETTINGS = {"read_only"}
@@ -63,6 +69,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 @click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent so long (60s).")
 @fins_options
 @watch_cycle_option
+@debug_option
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.  Words that it does not "
                    "have begin with 0; words of units are not set.")
@@ -71,7 +78,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], bind: str, port: int, image: Path | None,
     log: Path | None, watch_ns: int, backlog: bool, fins: bool, fins_bind: str, fins_port: int, fins_node: int | None,
-    fins_control: bool, **settings: int | None,
+    fins_control: bool, debug_port: int | None, **settings: int | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
     reach the first port at which it waits.  With --fins, SCADA software and libraries that speak FINS reach it, too.
@@ -95,12 +102,18 @@ def command(
         if door:
             try_fins(network, door)
         reason, saved = _start(plc, network, signals, door), True
+        debugging = _debug_port(stack, plc, debug_port, files, libraries) if debug_port is not None else None
         while reason != "trap" and not signals.end:
             try:
-                reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)
+                reason = loop.run(plc, until=lambda _: signals.is_heard or debugging is not None and debugging.is_called,
+                                  pace=EVENT)
+                if debugging and debugging.serve(lambda: [Debugged("plc", plc)], lambda: signals.is_heard):
+                    signals.end = True
             except OutputError:  # the log; the memory is saved nevertheless
                 _save(plc, image)
                 raise
+            if reason == "until" and not signals.is_heard:  # a debugger was there
+                continue
             signals.save = False
             saved = _save(plc, image)
     if plc.trap:
@@ -108,9 +121,18 @@ def command(
     sys.exit(status.STOPPED if reason == "trap" else status.GOOD if saved else status.USAGE)
 
 
+def _debug_port(stack: ExitStack, plc: Plc, number: int, files: tuple[Path, ...], libraries: tuple[Path, ...]) -> DebugPort:
+    """Where debuggers attach; it is closed with the stack."""
+    given = files or (data_folder("examples") / SERVER,)
+    paths = {str(path): path for path in given}
+    port = DebugPort(number, DebugSources(paths, source_texts(plc.image, paths, libraries)))
+    stack.callback(port.close)
+    return port
+
+
 def _shipped(settings: dict[str, int | None]) -> Plc:
     """A PLC with the server program, its settings written."""
-    program = compile_files([data_folder("examples") / "server.st"], runnable=True, lint=False).image
+    program = compile_files([data_folder("examples") / SERVER], runnable=True, lint=False).image
     assert program is not None, "the server's own program compiles"
     plc = Plc(program, CYCLE_NS)
     for name, value in settings.items():
@@ -203,6 +225,11 @@ class Signals:
     def __init__(self) -> None:
         self.end = False
         self.save = False
+
+    @property
+    def is_heard(self) -> bool:
+        """True if one of them has come."""
+        return self.end or self.save
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if number in saving_signals():
