@@ -64,23 +64,15 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
     at most every 100 ms.  When `until` returns True between two scans, the loop is left; the runs go on with `resumed`, after
     `Running.resume` of each."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
-    start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
     interrupts = Interrupts()
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
     if networks:
         _prepare(runs)
         watchdogs = [Watchdog(run.plc) for run in runs]
-        clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
-        for run in runs:
-            servicing = run.plc.servicing
-            if servicing.is_needed and not servicing.clock_ns:
-                servicing.clock_ns = local_date_ns() - start_ns
-            run.begin(start_ns + run.phase_ns, real.behind)
-    else:  # nothing happens between two periods of virtual time
-        for run in runs:
-            run.begin(run.plc.elapsed_ns if resumed else start_ns)
-            run.pace, run.alone = CYCLIC, len(runs) == 1 and until is None
+        clock = _begin_in_real_time(runs, cast(list[RealNetwork], list(networks.values())), interrupts)
+    else:
+        _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
@@ -108,6 +100,30 @@ def _prepare(runs: Sequence[Running]) -> None:
     for unit in (attached.own for run in runs for attached in run.plc.units):
         if unit is not None:
             unit.prepare()
+
+
+def _begin_in_real_time(runs: Sequence[Running], networks: list[RealNetwork], interrupts: Interrupts) -> _RealClock:
+    """Lets PLCs begin at the same moment, but for their phases."""
+    start_ns = _latest_ns(runs)
+    clock = _RealClock(networks, runs, start_ns, interrupts)
+    for run in runs:
+        servicing = run.plc.servicing
+        if servicing.is_needed and not servicing.clock_ns:
+            servicing.clock_ns = local_date_ns() - start_ns
+        run.begin(start_ns + run.phase_ns, clock.behind)
+    return clock
+
+
+def _begin_in_virtual_time(runs: Sequence[Running], resumed: bool, alone: bool) -> None:
+    """Lets PLCs begin at the same moment, or each where it stood; nothing happens between two periods of virtual time."""
+    start_ns = _latest_ns(runs)
+    for run in runs:
+        run.begin(run.plc.elapsed_ns if resumed else start_ns)
+        run.pace, run.alone = CYCLIC, alone
+
+
+def _latest_ns(runs: Sequence[Running]) -> int:
+    return max((run.plc.elapsed_ns for run in runs), default=0)
 
 
 def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog]) -> None:

@@ -73,7 +73,8 @@ def address(code_server: list[str], tmp_path: Path) -> Iterator[str]:
     package = next(tmp_path.glob("*.vsix"))
     subprocess.run([*code_server, *folders, "--install-extension", package], check=True, env=environment, capture_output=True)
     command = [*code_server, *folders, "--auth", "none", "--bind-addr", "127.0.0.1:0", "--disable-telemetry",
-               "--disable-update-check", "--disable-workspace-trust", "--disable-getting-started-override", str(work)]  # fmt: skip
+               "--disable-update-check", "--disable-workspace-trust", "--disable-getting-started-override",
+               str(work)]  # fmt: skip
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
             assert process.stdout is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +44,13 @@ def run_project(file: Path, context: click.Context) -> int:
     net = context.params["net"] if "net" in given else None
     for_ns, scans = context.params["for_ns"], context.params["scans"]
     as_json, debug_port = context.params["as_json"], context.params["debug_port"]
-    if debug_port is not None and (context.params["trace"] or context.params["journal"]):
-        raise click.UsageError("--debug looks into scans itself: leave out --trace and --journal")
     project = read_given_project(file)
     if not isinstance(project, Project):
         return _refuse(project, as_json)
     if debug_port is None:
         _check_end(project, net, for_ns, scans)
+    elif context.params["trace"] or context.params["journal"]:
+        raise click.UsageError("--debug looks into scans itself: leave out --trace and --journal")
     try:
         plant = Plant(project, net=net, for_ns=for_ns, scans=scans)
     except OSError as error:
@@ -75,15 +75,20 @@ def run_project(file: Path, context: click.Context) -> int:
                 progress.update(first)
                 recorded.tick()
 
-            if debug_port is None:
-                run_all(plant.runs, tick)
-            else:
-                run_with_port(plant.named_runs, DebugPort(debug_port, plant_sources(plant)), tick)
+            _execute(plant, debug_port, tick)
     finally:
         plant.close()
     real = not plant.network.virtual_time and not as_json and sys.stderr.isatty()
     _print(plant, as_json, context.params["scan_time"] or real)
     return max(EXIT_STATUS.get(run.reason, status.GOOD) for run in plant.runs)
+
+
+def _execute(plant: Plant, debug_port: int | None, tick: Callable[[], None]) -> None:
+    """Runs all PLCs to their ends; with `debug_port` debuggers may attach meanwhile."""
+    if debug_port is None:
+        run_all(plant.runs, tick)
+    else:
+        run_with_port(plant.named_runs, DebugPort(debug_port, plant_sources(plant)), tick)
 
 
 def _record(plant: Plant, recorded: RunRecording, options: Mapping[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -181,31 +182,33 @@ def _run(
         set_breakpoints(plc, lines, watched, conditions)
         with RunProgress(None if as_json else plc, scans, for_ns or max_ns) as shown_progress:
 
-            def progress(plc: Plc) -> None:
+            def progress() -> None:
                 shown_progress.update(plc)
                 recorded.tick()
                 if capture:  # of a quiet network a buffer would take minutes to fill
                     capture.flush()
 
-            if debug_port is not None:
-                running = Running(plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns,
-                                  writes=writes, pace=pace)  # fmt: skip
-                paths = {str(path): path for path in files}
-                sources = DebugSources(paths, source_texts(plc.image, paths, libraries))
-                run_with_port({"plc": running}, DebugPort(debug_port, sources), lambda: progress(plc))
-                reason = running.reason
-            else:
-                reason = loop.run(
-                    plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes,
-                    pace=pace, progress=progress,
-                )  # fmt: skip
+            running = Running(plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes,
+                              pace=pace)  # fmt: skip
+            _execute(running, debug_port, files, libraries, progress)
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
     for write, given in zip(writes, settings, strict=True):
         if not plc.scans or write.at_ns > plc.now_ns:
             say(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
     wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
-    return RunResult(plc, reason, places, recorder, as_json, until or "", wanted)
+    return RunResult(plc, running.reason, places, recorder, as_json, until or "", wanted)
+
+
+def _execute(running: Running, debug_port: int | None, files: tuple[Path, ...], libraries: tuple[Path, ...],
+             progress: Callable[[], None]) -> None:  # fmt: skip
+    """Runs a PLC to its end; with `debug_port` debuggers may attach meanwhile."""
+    if debug_port is None:
+        loop.run_all([running], progress)
+        return
+    paths = {str(path): path for path in files}
+    sources = DebugSources(paths, source_texts(running.plc.image, paths, libraries))
+    run_with_port({"plc": running}, DebugPort(debug_port, sources), progress)
 
 
 def _never(plc: Plc) -> bool:

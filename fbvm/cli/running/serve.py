@@ -101,24 +101,29 @@ def command(
             plc.attach(unit, network)
         if door:
             try_fins(network, door)
-        reason, saved = _start(plc, network, signals, door), True
+        reason = _start(plc, network, signals, door)
         debugging = _debug_port(stack, plc, debug_port, files, libraries) if debug_port is not None else None
-        while reason != "trap" and not signals.end:
-            try:
-                reason = loop.run(plc, until=lambda _: signals.is_heard or debugging is not None and debugging.is_called,
-                                  pace=EVENT)
-                if debugging and debugging.serve(lambda: [Debugged("plc", plc)], lambda: signals.is_heard):
-                    signals.end = True
-            except OutputError:  # the log; the memory is saved nevertheless
-                _save(plc, image)
-                raise
-            if reason == "until" and not signals.is_heard:  # a debugger was there
-                continue
-            signals.save = False
-            saved = _save(plc, image)
+        reason, saved = _serve(plc, reason, signals, debugging, image)
     if plc.trap:
         say(str(plc.trap), err=True)
     sys.exit(status.STOPPED if reason == "trap" else status.GOOD if saved else status.USAGE)
+
+
+def _serve(plc: Plc, reason: str, signals: Signals, debugging: DebugPort | None, image: Path | None) -> tuple[str, bool]:
+    """Runs until a trap or a signal; returns the reason of the end, and False if the memory could not be saved."""
+    saved = True
+    while reason != "trap" and not signals.end:
+        try:
+            reason = loop.run(plc, until=lambda _: signals.is_heard or debugging is not None and debugging.is_called, pace=EVENT)
+            if debugging and debugging.serve(lambda: [Debugged("plc", plc)], lambda: signals.is_heard):
+                signals.end = True
+        except OutputError:  # the log; the memory is saved nevertheless
+            _save(plc, image)
+            raise
+        if reason != "until" or signals.is_heard:
+            signals.save = False
+            saved = _save(plc, image)
+    return reason, saved
 
 
 def _debug_port(stack: ExitStack, plc: Plc, number: int, files: tuple[Path, ...], libraries: tuple[Path, ...]) -> DebugPort:

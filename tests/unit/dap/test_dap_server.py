@@ -176,7 +176,8 @@ def attached(wire: Wire, file: Path) -> None:
 @contextmanager
 def with_port(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """A verb with --debug in a process of its own, and its port; it ends by itself, without a traceback."""
-    with subprocess.Popen([*FBVM, *arguments, "--debug", "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    command = [*FBVM, *arguments, "--debug", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr
         said = ""
         while "--connect" not in said:
