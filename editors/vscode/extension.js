@@ -167,9 +167,10 @@ async function importProject(uri) {
 // --- VS Code's side ---
 
 const adapter = {
-  createDebugAdapterDescriptor() {
+  createDebugAdapterDescriptor({ configuration }) {
     const [command, ...first] = commandOf(folder());
-    return new vscode.DebugAdapterExecutable(command, [...first, 'dap']);
+    const where = configuration.request === 'attach' ? ['--connect', String(configuration.connect)] : [];
+    return new vscode.DebugAdapterExecutable(command, [...first, 'dap', ...where]);
   },
 };
 

@@ -51,6 +51,12 @@ function register(commandOf, debug) {
     discover(uri, Buffer.from(await vscode.workspace.fs.readFile(uri)).toString('utf8'));
   }
 
+  // An open file has its marks before anybody opens the view of tests.
+  function shown(document) {
+    if (/^test_.*\.st$/.test(path.basename(document.uri.fsPath))) discover(document.uri, document.getText());
+  }
+  vscode.workspace.textDocuments.forEach(shown);
+
   controller.resolveHandler = async (item) => {
     if (item) return;
     for (const uri of await vscode.workspace.findFiles(FILES, '**/{.venv,node_modules}/**')) await read(uri);
@@ -101,9 +107,8 @@ function register(commandOf, debug) {
   return [
     controller, watcher,
     watcher.onDidCreate(read), watcher.onDidChange(read), watcher.onDidDelete((uri) => controller.items.delete(uri.toString())),
-    vscode.workspace.onDidChangeTextDocument(({ document }) => {
-      if (/^test_.*\.st$/.test(path.basename(document.uri.fsPath))) discover(document.uri, document.getText());
-    }),
+    vscode.workspace.onDidChangeTextDocument(({ document }) => shown(document)),
+    vscode.workspace.onDidOpenTextDocument(shown),
     { runTest: (uri, name) => {
       const file = controller.items.get(uri);
       const item = file && file.children.get(`${uri}::${name}`);

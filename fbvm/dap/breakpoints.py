@@ -12,7 +12,7 @@ from fbvm.dap.session import Arguments, Body, Container, DebugSession, Refusal
 from fbvm.machine.breakpoints import Breakpoint, BreakpointRows
 from fbvm.machine.source_lines import find_lines
 from fbvm.step.debugger import Debugger
-from fbvm.step.filters import FILTERS, BetweenScans
+from fbvm.step.filters import BETWEEN, FILTERS, BetweenScans
 from fbvm.watch.conditions import ConditionError
 from fbvm.watch.paths import UnknownPlace
 from fbvm.watch.scopes import instances
@@ -242,11 +242,10 @@ class BreakpointRequests:
         return name in self._filters
 
     def _apply_filters(self, debugger: Debugger) -> None:
-        between = ("modbus", "response")
-        wanted: dict[str, frozenset[int]] = {name: _codes(self._filters[name]) for name in between if name in self._filters}
+        wanted: dict[str, frozenset[int]] = {name: _codes(self._filters[name]) for name in BETWEEN if name in self._filters}
         debugger.checks = {}
         for name in debugger.plcs if wanted else ():
-            if self.debug.plc(name).facts.described or "modbus" in wanted:
+            if self.debug.plc(name).facts.described or wanted.keys() - {"response"}:
                 debugger.checks[name] = BetweenScans(wanted)
 
 

@@ -12,6 +12,7 @@ from fbvm.dap.framing import Framer, FramingError, Message, encode
 from fbvm.dap.target import Opener
 from fbvm.run.slices import Slices
 
+MEANWHILE_S = 0.02
 Connection = tuple[Callable[[], bytes], Callable[[bytes], None], Callable[[], None]]
 """How bytes are read and written, and the connection closed."""
 
@@ -24,8 +25,11 @@ def serve(open_target: Opener, read: Callable[[], bytes], write: Callable[[bytes
     return serve_until_ended(open_target, read, write)[0]
 
 
-def serve_until_ended(open_target: Opener, read: Callable[[], bytes], write: Callable[[bytes], None]) -> tuple[str, bool]:
-    """Does what `serve` does; the second result is True if the client wants what is debugged to end."""
+def serve_until_ended(open_target: Opener, read: Callable[[], bytes], write: Callable[[bytes], None],
+                      meanwhile: Callable[[], bool] | None = None) -> tuple[str, bool]:  # fmt: skip
+    """Does what `serve` does; the second result is True if the client wants what is debugged to end.
+
+    `meanwhile` is called every 20 ms or so, whether or not something runs; when it returns True, the client is left."""
     waiting: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def reading() -> None:
@@ -45,10 +49,15 @@ def serve_until_ended(open_target: Opener, read: Callable[[], bytes], write: Cal
     threading.Thread(target=reading, daemon=True).start()
     try:
         while not adapter.ended:
+            if meanwhile and meanwhile():
+                return "", False
             if adapter.is_running and waiting.empty():
                 slices.slice()
                 continue
-            data = waiting.get()
+            try:
+                data = waiting.get(timeout=MEANWHILE_S if meanwhile else None)
+            except queue.Empty:
+                continue
             if not data:
                 return "the client is gone in the middle of a message" if framer.is_inside else "", False
             was_running = adapter.is_running
@@ -84,27 +93,42 @@ class DebugDoor:
         """True if a client waits."""
         return not self._waiting.empty()
 
-    def serve(self, open_target: Opener) -> bool:
-        """Serves the client that waits, if one does, until it disconnects; returns True if it wants the program to end."""
+    def serve(self, open_target: Opener, meanwhile: Callable[[], bool] | None = None) -> bool:
+        """Serves the client that waits, if one does, until it disconnects or `meanwhile`, which is called now and then, returns
+        True; returns True if the client wants the program to end."""
         if self._waiting.empty():
             return False
         read, write, close = self._waiting.get()
         try:
-            return serve_until_ended(open_target, read, write)[1]
+            return serve_until_ended(open_target, read, write, meanwhile)[1]
         finally:
             close()
 
 
 def pass_on(read: Callable[[], bytes], write: Callable[[bytes], None], receive: Callable[[], bytes],
-            send: Callable[[bytes], None], close: Callable[[], None]) -> None:  # fmt: skip
-    """Passes bytes from `read` to `send` and from `receive` to `write` until one of them ends.  Raises OSError."""
+            send: Callable[[bytes], None], end: Callable[[], None]) -> None:  # fmt: skip
+    """Passes bytes from `read` to `send` and from `receive` to `write` until one of them ends.
+
+    `end` ends the connection when `read` has ended; what `receive` raises from then on is its end.  Raises OSError."""
+    has_ended = threading.Event()
 
     def there() -> None:
         with suppress(OSError, ValueError):
             while data := read():
                 send(data)
-        close()
+        has_ended.set()
+        end()
 
     threading.Thread(target=there, daemon=True).start()
-    while data := receive():
+    while data := _received(receive, has_ended):
         write(data)
+
+
+def _received(receive: Callable[[], bytes], has_ended: threading.Event) -> bytes:
+    """What `receive` returns, b"" if it fails because the connection has been ended here.  Raises OSError."""
+    try:
+        return receive()
+    except OSError:
+        if has_ended.is_set():
+            return b""
+        raise

@@ -73,6 +73,8 @@ class Session:
             action = message.pop("do")
             if ACTIONS[action].changes and self._bench.read_only:
                 raise MessageError("this page may only look: fbvm runs with --read-only")
+            if ACTIONS[action].changes and self._bench.held_by:
+                raise MessageError(f"{self._bench.held_by} has the PLC: this page looks on meanwhile")
             if self._past and action in ("write", "force", "release"):
                 raise MessageError(f"this is scan {self._past[0]}, which is past: go back to now first")
             done = self._actions[action](**{name: value for name, value in message.items() if value is not None})

@@ -50,6 +50,8 @@ class Workbench:
                  test: Callable[[Sequence[Act], LivePlc, Sequence[str]], str] | None = None) -> None:  # fmt: skip
         self.plcs = {plc.name: plc for plc in plcs}
         self.control, self.read_only = control, read_only
+        self.held_by = ""
+        """Who has the PLCs instead of the pages, which only look meanwhile; "" if nobody does."""
         self.writable = None if writable is None else [self._checked(name) for name in writable]
         self.make_test = test
         """Writes the acts as a pytest; None where a run cannot be repeated by one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -18,6 +18,13 @@ from fbvm.syntax.text import read
 
 _DECLARES = re.compile(r"^[ \t]*(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|TYPE\s+|TYPE)\s+(\w+)", re.I | re.M)
 _WORD = re.compile(r"[A-Za-z_]\w*")
+_TEST = re.compile(r"test_.*\.st$")
+"""Names of files with tests."""
+TEST_LIBRARY = Path(__file__).parents[1] / "testing" / "library"
+"""The library with ASSERT, which `fbvm.testing` brings."""
+SOURCES = "src"
+ROOTS = (FILE, "pytest.ini", "pyproject.toml", ".git")
+"""What a folder holds above which tests do not look for blocks."""
 MOST_FILES = 500
 """Files of a folder without a project file that are looked at."""
 
@@ -37,6 +44,8 @@ class Project:
     program: Program
     paths: list[Path]
     """Its files, which the program knows by `str(path)`."""
+    named: list[Path]
+    """The files that its project file names, there or not; without one the file with which it was begun."""
     file: Path | None = None
     """The project file, None without one."""
     plc: str = ""
@@ -57,6 +66,16 @@ def path_of(uri: str) -> Path:
 def project_file_above(path: Path) -> Path | None:
     """The nearest `fbvm.toml` in the folder of a file or above."""
     return next((folder / FILE for folder in path.parents if (folder / FILE).is_file()), None)
+
+
+def _test_libraries(path: Path) -> Iterator[Path]:
+    """Where `fbvm test` finds what a test in ST names: ASSERT, and blocks in a `src` beside the test or above it."""
+    yield TEST_LIBRARY
+    for folder in path.parents:
+        if (folder / SOURCES).is_dir():
+            yield folder / SOURCES
+        if any((folder / name).exists() for name in ROOTS):
+            return
 
 
 class Projects:
@@ -98,6 +117,21 @@ class Projects:
         self.all = [each for each in self.all if each not in gone]
         return gone
 
+    def forget_regrouped(self, path: Path) -> list[Project]:
+        """Forget the programs that consist of other files now that a file has come or gone on disk."""
+        gone = [each for each in self.all if path in each.paths or self._concerns(each, path)]
+        gone = [each for each in gone if self._files(each) != each.paths]
+        self.all = [each for each in self.all if each not in gone]
+        return gone
+
+    def _concerns(self, project: Project, path: Path) -> bool:
+        return path in project.named if project.file is not None else path.parent == project.named[0].parent
+
+    def _files(self, project: Project) -> list[Path]:
+        """The files of which a program consists as the disk is now."""
+        paths = project.named if project.file is not None else self._together(project.named[0])
+        return [known for path in paths if self.text(known := path.absolute()) is not None]
+
     def _is_begun(self, described: Path) -> bool:
         return any(each.file == described for each in self.all)
 
@@ -113,11 +147,13 @@ class Projects:
             project = self._project(plc.sources, plc.dialect, plc.libraries, plc.program, plc.resource)
             if project is not None:
                 project.file, project.plc = described, plc.name
+                project.named = [source.absolute() for source in plc.sources]
                 made.append(project)
         return made
 
     def _undescribed(self, path: Path) -> list[Project]:
-        project = self._project(self._together(path), self.settings.dialect, self.settings.libraries, None, None)
+        libraries = (*self.settings.libraries, *(_test_libraries(path) if _TEST.match(path.name) else ()))
+        project = self._project(self._together(path), self.settings.dialect, libraries, None, None)
         return [project] if project is not None else []
 
     def _project(self, paths: Iterable[Path], dialect: str, libraries: tuple[Path, ...], program: str | None,
@@ -132,7 +168,7 @@ class Projects:
             text = self.text(path)
             if text is not None:
                 made.replace(str(path), text)
-        return Project(made, [path for path in known if str(path) in made.files])
+        return Project(made, [path for path in known if str(path) in made.files], known[:1])
 
     def text(self, path: Path) -> str | None:
         """The text of a file, unsaved or on disk; None for one that cannot be read."""

@@ -92,21 +92,27 @@ class Server(LanguageServer):
         if path.name == FILE:
             self.project_file_changed(path)
         elif path not in self.open_paths:
+            self._forgotten(self.projects.forget_regrouped(path))
             for project in self.projects.of(path):
                 self.changed(project, path)
+            self._open_again()
 
     def project_file_changed(self, path: Path | None) -> None:
         """What belongs together may have changed: the programs are begun anew.  None: the settings have changed."""
         self._forgotten(self.projects.forget(path))
         if path is not None and path in self.projects.wrong:
             del self.projects.wrong[path]
-        for each in list(self.open_paths):
-            if each.name != FILE and not self.projects.of(each):
-                for project in self.projects.open(each):
-                    self.changed(project, each)
+        self._open_again()
         if path is not None and path in self.open_paths:
             self.projects.wrong[path] = project_file.diagnostics(path, self.open_text(path))
         self._tell_project_files()
+
+    def _open_again(self) -> None:
+        """Begin the programs of open files that have none any more."""
+        for each in self.open_paths:
+            if each.name != FILE and not self.projects.of(each):
+                for project in self.projects.open(each):
+                    self.changed(project, each)
 
     def _forgotten(self, projects: list[Project]) -> None:
         for project in projects:

@@ -27,10 +27,15 @@ class Stream:
         except ConnectionError as error:
             raise BrokenPipeError(str(error)) from None
 
-    def close(self) -> None:
-        """Ends the connection for both sides."""
+    def end(self) -> None:
+        """Ends the connection for both sides: whoever waits in `receive` gets what has come, then b"".  For any thread; the one
+        that receives calls `close`."""
         with suppress(OSError):
             self._connection.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Ends the connection for both sides and frees it."""
+        self.end()
         self._connection.close()
 
     def __enter__(self) -> Stream:

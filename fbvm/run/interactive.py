@@ -67,11 +67,12 @@ class Control:
         self.has_ended = True
 
 
-def run_interactive(runs: Sequence[Running], control: Control, audience: Audience, *,
+def run_interactive(runs: Sequence[Running], control: Control, audience: Audience, *, until: Callable[[], bool] | None = None,
                     monotonic_ns: Callable[[], int] = time.monotonic_ns) -> None:  # fmt: skip
     """Runs PLCs until each has its `reason`: its own end, "stopped" after `control.end`, or "interrupted" after Ctrl-C.
 
-    A PLC with a trap ends for itself and can still be looked at: the loop goes on until `control.end`."""
+    A PLC with a trap ends for itself and can still be looked at: the loop goes on until `control.end`.  When `until` returns True
+    between two turns, the loop is left; called again after `Running.resume` of each PLC, it goes on."""
     interrupts = Interrupts()
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     loop = _Loop(runs, control, audience, [cast(RealNetwork, network) for network in networks.values()], monotonic_ns)
@@ -80,6 +81,8 @@ def run_interactive(runs: Sequence[Running], control: Control, audience: Audienc
             while not control.has_ended:
                 loop.turn(interrupts)
                 interrupts.check()
+                if until and until():
+                    return
     except KeyboardInterrupt:
         control.end()
     finally:
@@ -87,6 +90,12 @@ def run_interactive(runs: Sequence[Running], control: Control, audience: Audienc
     reason = STOPPED
     for run in runs:
         run.reason = run.reason or reason
+
+
+def let_look_on(audience: Audience) -> None:
+    """Lets an audience look on for a moment while somebody else executes scans."""
+    audience.serve(0)
+    audience.update(time.monotonic_ns())
 
 
 class _Loop:
@@ -104,7 +113,7 @@ class _Loop:
         for network in networks:
             network.driven = True
         for run in runs:
-            run.begin(self._now_ns)
+            run.begin(run.plc.elapsed_ns)
             run.pace = CYCLIC
 
     def turn(self, interrupts: Interrupts) -> None:

@@ -54,26 +54,23 @@ def run(
     return running.reason
 
 
-def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None) -> None:
+def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None, until: Callable[[], bool] | None = None, *,
+            resumed: bool = False) -> None:  # fmt: skip
     """Runs several PLCs side by side, each until its own end, which its `reason` says then.
 
     All have the same time, real if a network of any of them is real, so that PLCs may share a network.  `progress` is called
-    at most every 100 ms."""
+    at most every 100 ms.  When `until` returns True between two scans, the loop is left; the runs go on with `resumed`, after
+    `Running.resume` of each."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
-    start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
     interrupts = Interrupts()
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
     if networks:
-        _prepare(runs, start_ns)
+        _prepare(runs)
         watchdogs = [Watchdog(run.plc) for run in runs]
-        clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
-        for run in runs:
-            run.begin(start_ns + run.phase_ns, real.behind)
-    else:  # nothing happens between two periods of virtual time
-        for run in runs:
-            run.begin(start_ns)
-            run.pace, run.alone = CYCLIC, len(runs) == 1
+        clock = _begin_in_real_time(runs, cast(list[RealNetwork], list(networks.values())), interrupts)
+    else:
+        _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
@@ -82,6 +79,8 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
                 now_ns, woken = clock.reach(due_ns)
                 _scan_all(queue, now_ns, woken, watchdogs)
                 interrupts.check()
+                if until and until():
+                    break
                 if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                     told_ns = time.monotonic_ns()
                     progress()
@@ -94,14 +93,35 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
             watchdog.stop()
 
 
-def _prepare(runs: Sequence[Running], start_ns: int) -> None:
-    """Does what comes before real time begins: what takes long once for units, and the date for PLCs without one."""
+def _prepare(runs: Sequence[Running]) -> None:
+    """Does what takes long once, before time begins."""
+    for unit in (attached.own for run in runs for attached in run.plc.units):
+        if unit is not None:
+            unit.prepare()
+
+
+def _begin_in_real_time(runs: Sequence[Running], networks: list[RealNetwork], interrupts: Interrupts) -> _RealClock:
+    """Lets PLCs begin at the same moment, but for their phases."""
+    start_ns = _latest_ns(runs)
+    clock = _RealClock(networks, runs, start_ns, interrupts)
     for run in runs:
-        for unit in (attached.own for attached in run.plc.units):
-            if unit is not None:
-                unit.prepare()
-        if not run.plc.servicing.clock_ns:
-            run.plc.servicing.clock_ns = local_date_ns() - start_ns
+        servicing = run.plc.servicing
+        if not servicing.clock_ns:
+            servicing.clock_ns = local_date_ns() - start_ns
+        run.begin(start_ns + run.phase_ns, clock.behind)
+    return clock
+
+
+def _begin_in_virtual_time(runs: Sequence[Running], resumed: bool, alone: bool) -> None:
+    """Lets PLCs begin at the same moment, or each where it stood; nothing happens between two periods of virtual time."""
+    start_ns = _latest_ns(runs)
+    for run in runs:
+        run.begin(run.plc.elapsed_ns if resumed else start_ns)
+        run.pace, run.alone = CYCLIC, alone
+
+
+def _latest_ns(runs: Sequence[Running]) -> int:
+    return max((run.plc.elapsed_ns for run in runs), default=0)
 
 
 def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog]) -> None:

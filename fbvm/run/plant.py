@@ -99,6 +99,11 @@ class Plant:
         """All PLCs for `run_all`."""
         return [run for kind in self.kinds for run in kind.runs]
 
+    @property
+    def named_runs(self) -> dict[str, Running]:
+        """All PLCs by their names."""
+        return {name: run for kind in self.kinds for name, run in zip(kind.names, kind.runs, strict=True)}
+
     def close(self) -> None:
         """End all connections."""
         self.network.close()

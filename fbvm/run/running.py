@@ -78,6 +78,12 @@ class Running:
         self.due_ns = start_ns
         self._clock = clock(self._behind_ns) if clock and self.pace == EVENT else None
 
+    def resume(self) -> None:
+        """Called when somebody else has executed scans of the PLC, with what was to be written in them."""
+        if self.plc.scans:
+            self._writes = [write for write in self._writes if write.at_ns > self.plc.now_ns]
+        self.reason = self._goal.reached()
+
     def scan(self, now_ns: int) -> list[int]:
         """One scan or a burst at `now_ns` of the loop's time; plans the next, `due_ns`.  An overrun period is not made up
         for.

@@ -1,4 +1,4 @@
-"""What stops a run between two scans: a Modbus exception reply, a response code of an Ethernet unit that is not 0."""
+"""What stops a run between two scans: a Modbus exception reply, a response code of a unit that is not 0, a late scan."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import NamedTuple
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.packets import add_tap
 from fbvm.watch.paths import Place
+from fbvm.watch.values import show_time
 from fbvm.wire.modbus import Adu, Splitter, decode_reply
 from fbvm.wire.tap import DATA, TapEvent
 
@@ -34,15 +35,18 @@ FILTERS = (
            "the code, such as 2"),
     Filter("response", "Response codes that are not 0", "an Ethernet unit ended a request with a response code", True,
            "the code, such as 16#0302"),
+    Filter("late", "Late scans", "with real connections: a scan began a period or more after it was due", False,
+           "the delay in ms, such as 5"),
     Filter("warning", "Warnings of the run", "what the program asks and the PLC does not do", False),
 )  # fmt: skip
 """Traps stop a run whether or not their filters are on: nothing continues behind one."""
-WATCHDOG_CODES = ("R0103", "R0112")
+BETWEEN = ("modbus", "response", "late")
+"""The filters that are looked at between two scans."""
 
 
 @dataclass
 class BetweenScans:
-    """The filters "modbus" and "response" of one PLC.  `wanted` has those that are on, with their codes, none for all."""
+    """The filters of `BETWEEN` of one PLC.  `wanted` has those that are on, with their codes, none for all."""
 
     wanted: Mapping[str, frozenset[int]]
     found: str = ""
@@ -54,12 +58,15 @@ class BetweenScans:
         self._passed: list[str] = []
         self._codes = {place.name: place for place in _response_codes(plc)}
         self._before = {name: plc.read(place) for name, place in self._codes.items()}
+        self._began_ns = plc.now_ns
         if "modbus" in self.wanted:
             for network in {id(attached.network): attached.network for attached in plc.units}.values():
                 add_tap(network, self._tap)
 
     def checked(self, plc: Plc) -> bool:
         """Called after each scan: True if an exception reply has passed in it, or a response code has come."""
+        if self._is_late(plc):
+            return True
         passed, self._passed = self._passed, []
         if passed:
             self.found, self.kind = passed[0], "modbus"
@@ -75,6 +82,17 @@ class BetweenScans:
                 self.found, self.kind = f"{name} {RESPONSE_CODE} is 16#{value:04X}{meaning}", "response"
                 return True
         return False
+
+    def _is_late(self, plc: Plc) -> bool:
+        """True if the last scan began too late.  In virtual time none does."""
+        began_ns, self._began_ns = self._began_ns, plc.now_ns
+        late_ns = plc.now_ns - began_ns - plc.cycle_ns
+        if "late" not in self.wanted or late_ns < min((ms * 1_000_000 for ms in self.wanted["late"]), default=plc.cycle_ns):
+            return False
+        if plc.scans < 2 or late_ns <= 0:
+            return False
+        self.found, self.kind = f"scan {plc.scans - 1} began {show_time(late_ns)[2:]} late", "late"
+        return True
 
     def _tap(self, now_ns: int, unit: str, event: TapEvent) -> None:
         if event.kind is not DATA:

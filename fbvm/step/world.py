@@ -27,11 +27,12 @@ class ReadOnlyPast(ValueError):
 
 @dataclass
 class Debugged:
-    """A PLC under its name, and what is written into it at times of its own."""
+    """A PLC under its name, what is written into it at times of its own, and its recording if it is recorded already."""
 
     name: str
     plc: Plc
     writes: Sequence[TimedWrite] = ()
+    recorded: PlcRecording | None = None
 
 
 @dataclass
@@ -42,6 +43,8 @@ class _Live:
     recorded: PlcRecording
     writes: Sequence[TimedWrite]
     """What is written at times of its own, in order of time."""
+    is_recorded_elsewhere: bool
+    """True for a recording that was there before and goes on afterwards."""
     actions: dict[Position, list[Action]] = field(default_factory=dict)
     timed: dict[int, list[Action]] = field(default_factory=dict)
     """Of `writes` those that were done, by the scan before which they were."""
@@ -60,7 +63,7 @@ class World:
     """Executes scans of PLCs in the order of their times, PLCs of one time in the order in which `make` returns them.
 
     `make` returns new PLCs at power-on, in virtual time; what it returns is equal each time.  With `is_fixed` it is called once
-    only, and the past cannot be changed; `pace` is then that of the only PLC, if it has real connections."""
+    only, and the past cannot be changed; `pace` is then that of the PLCs, if one has real connections."""
 
     def __init__(self, make: Callable[[], Iterable[Debugged]], is_fixed: bool = False, pace: RealPace | None = None) -> None:
         self._make, self.is_fixed, self._pace = make, is_fixed, pace
@@ -69,7 +72,8 @@ class World:
 
     def _build(self, actions: Mapping[str, dict[Position, list[Action]]]) -> None:
         recording = Recording()
-        self._live = {one.name: _Live(one.plc, recording.add(one.name, one.plc), sorted(one.writes, key=lambda row: row.at_ns),
+        self._live = {one.name: _Live(one.plc, one.recorded or recording.add(one.name, one.plc),
+                                      sorted(one.writes, key=lambda row: row.at_ns), one.recorded is not None,
                                       actions.get(one.name, {})) for one in self._make()}  # fmt: skip
         self._rows = list(self._live.values())
 
@@ -141,7 +145,7 @@ class World:
                 break
             live.timed.setdefault(plc.scans, []).append(partial(_write, row))
         actions = self.actions_in(name, plc.scans)
-        now_ns = self._pace.wait() if self._pace and not plc.halted else None
+        now_ns = self._pace.wait(plc.elapsed_ns) if self._pace and not plc.halted else None
         if not actions:
             plc.scan(now_ns)
             return
@@ -199,7 +203,8 @@ class World:
             if self.has_actions(name, live.plc.scans):
                 self.begin()
                 self.scan(name)
-            live.recorded.close()
+            if not live.is_recorded_elsewhere:
+                live.recorded.close()
 
     def time_of(self, name: str, scan: int) -> int:
         """The time at which a scan began, or will begin."""

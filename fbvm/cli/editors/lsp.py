@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 
 import click
@@ -29,5 +30,6 @@ def command(stdio: bool) -> None:
     except ImportError:
         raise click.UsageError("pygls is missing: pip install 'fbvm[editor]'") from None
     gc.set_threshold(*COLLECTED)
-    server(fbvm.__version__).start_io()
+    with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as output:  # the server closes it at its end
+        server(fbvm.__version__).start_io(stdout=output)
     sys.exit(status.GOOD)

@@ -81,7 +81,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if as_json:
         say_json({"cycle_ns": options["cycle_ns"], "properties": [_as_dict(verdict) for verdict in verdicts]})
     found = [verdict for verdict in verdicts if verdict.run is not None]
-    chosen = ({"program": program} if program else {}) | compile_options()
+    chosen = ({"program": program} if program else {}) | compile_options(files)
     if options["test_file"] and found:
         with writing(options["test_file"]):
             write_file(options["test_file"], pytest_text(found, files, chosen))
@@ -142,7 +142,7 @@ def _record(image: Image, verdict: Verdict, options: dict[str, Any], files: Sequ
     about = {"journal": None, "trace": options["trace"], "selected": (), "verify": False, "depth": "scans"}
     plc = Plc(image, verdict.run.cycle_ns)
     with record_run(about, {"proof": str(verdict.question), "cycle": show_time(verdict.run.cycle_ns)}) as recorded:
-        text = program_text(files, libraries, program=program, drawn=False, e_banks=(), **compile_options())
+        text = program_text(files, libraries, program=program, drawn=False, e_banks=(), **compile_options(files))
         recorded.add(files[0].stem, plc, described(plc, text, about, files, libraries))
         repeated(plc, verdict.run)
 

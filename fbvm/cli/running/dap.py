@@ -36,7 +36,7 @@ def command(port: int | None, bind: str, address: str | None) -> None:
             _listen(bind, port)
         elif address is not None:
             with _connected(address) as stream:
-                pass_on(_read, _write, stream.receive, stream.send, stream.close)
+                pass_on(_read, _write, stream.receive, stream.send, stream.end)
         else:
             _report(serve(open_target, _read, _write))
     except OSError as error:

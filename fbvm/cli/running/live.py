@@ -8,11 +8,14 @@ from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from fbvm.base.diagnostics import errors
 from fbvm.cli.shared import status
+from fbvm.cli.shared.debug.door import DebugPort, debug_option
+from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.networks import build_network, mailbox_names
@@ -30,11 +33,16 @@ from fbvm.record.recording.file_writer import Described
 from fbvm.record.recording.program_text import ProgramText
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import source_lines
-from fbvm.run.interactive import Control, run_interactive
+from fbvm.run.interactive import Control, let_look_on, run_interactive
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import Project
 from fbvm.run.running import Running
+from fbvm.step.world import Debugged
 from fbvm.watch.paths import UnknownPlace
+
+if TYPE_CHECKING:
+    from fbvm.live.host import LiveHost
+    from fbvm.live.workbench import Workbench
 
 HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 MISSING = "the live page needs websockets: pip install 'fbvm[live]'"
@@ -61,12 +69,13 @@ MISSING = "the live page needs websockets: pip install 'fbvm[live]'"
 @click.option("--paused", is_flag=True, help="Wait before the first scan.")
 @click.option("--speed", type=click.FloatRange(0, 1000), default=1.0, show_default=True, metavar="N",
               help="How fast virtual time passes: 1 as the clock, 0.1 ten times slower, 0 as fast as it goes.")
+@debug_option
 @click.option("--trace", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Record the run, with what is done on the page, for `fbvm chart`, `table`, `why`, `convert` and `replay`.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, net: str | None,
     mappings: tuple[Mapping, ...], doors: tuple[Door, ...], port: int, bind: str, read_only: bool, writable: tuple[str, ...],
-    paused: bool, speed: float, trace: Path | None,
+    paused: bool, speed: float, debug_port: int | None, trace: Path | None,
 ) -> None:  # fmt: skip
     """Run a program or a PROJECT and print the address of a page on which it lives: values, rungs with power, the scan that
     stops, steps and goes back, units, frames and faults.
@@ -75,9 +84,12 @@ def command(
     network or the port of the page cannot be used."""
     if find_spec("websockets") is None:
         raise click.UsageError(MISSING)
+    if debug_port is not None and trace:
+        raise click.UsageError("--debug looks into scans itself: leave out --trace")
     control = Control(is_paused=paused, speed=speed)
     with ExitStack() as stack:
-        page = _Page(stack, control, bind=address(bind), port=port, read_only=read_only, writable=writable)
+        page = _Page(stack, control, bind=address(bind), port=port, read_only=read_only, writable=writable,
+                     debug_port=debug_port)  # fmt: skip
         if project := project_argument(files):
             if trace or mappings or doors:
                 raise click.UsageError("--trace, --map and --door are for FILE: what a project does stands in its file")
@@ -121,9 +133,9 @@ def _run_files(
 class _Page:
     """The page of a run, with its options."""
 
-    def __init__(self, stack: ExitStack, control: Control, *, bind: str, port: int, read_only: bool,
-                 writable: Sequence[str]) -> None:  # fmt: skip
-        self._stack, self._control = stack, control
+    def __init__(self, stack: ExitStack, control: Control, *, bind: str, port: int, read_only: bool, writable: Sequence[str],
+                 debug_port: int | None) -> None:  # fmt: skip
+        self._stack, self._control, self._debug_port = stack, control, debug_port
         self._bind, self._port, self._read_only, self._writable = bind, port, read_only, writable
 
     def run_project(self, file: Path, net: str | None) -> None:
@@ -179,4 +191,36 @@ class _Page:
                 fg="yellow", err=True)  # fmt: skip
         say(host.address)
         sys.stdout.flush()
-        run_interactive(runs, self._control, host)
+        if self._debug_port is None:
+            run_interactive(runs, self._control, host)
+            return
+        texts = {name: text for _, each in plcs.values() for name, text in each.items()}
+        port = DebugPort(self._debug_port, DebugSources({name: path for name in texts if (path := Path(name)).is_file()}, texts))
+        self._stack.callback(port.close)
+        _run_with_port(runs, bench, host, port)
+
+
+def _run_with_port(runs: list[Running], bench: Workbench, host: LiveHost, port: DebugPort) -> None:
+    """Runs as `run_interactive` does, and lets debuggers have the PLCs when they attach; pages look on meanwhile."""
+
+    def debugged() -> list[Debugged]:
+        return [Debugged(live.name, live.plc, run.writes, live.recorded)
+                for live, run in zip(bench.plcs.values(), runs, strict=True)]  # fmt: skip
+
+    def look_on() -> bool:
+        let_look_on(host)
+        return False
+
+    while True:
+        run_interactive(runs, bench.control, host, until=lambda: port.is_called)
+        if bench.control.has_ended or not port.is_called:
+            return
+        bench.held_by = "a debugger"
+        try:
+            if port.serve(debugged, look_on):
+                return
+        except KeyboardInterrupt:
+            return
+        bench.held_by = ""
+        for run in runs:
+            run.resume()

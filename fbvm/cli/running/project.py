@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
+from fbvm.cli.shared.debug.door import DebugPort, run_with_port
+from fbvm.cli.shared.debug.worlds import plant_sources
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.project_arguments import check_project_options, read_given_project
 from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run
@@ -29,7 +31,8 @@ from fbvm.watch.paths import Place
 from fbvm.watch.values import Value
 
 OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json",
-           "trace": "--trace", "journal": "--journal", "verify": "--verify", "depth": "--depth"}  # fmt: skip
+           "trace": "--trace", "journal": "--journal", "verify": "--verify", "depth": "--depth",
+           "debug_port": "--debug"}  # fmt: skip
 """The options that may be given with a project; all others are in its file."""
 HOW_TO_MAP = 'write [[door]] with address = "{endpoint}" and bind = "127.0.0.1:{port}"'
 
@@ -40,11 +43,14 @@ def run_project(file: Path, context: click.Context) -> int:
     check_project_options(context, OPTIONS)
     net = context.params["net"] if "net" in given else None
     for_ns, scans = context.params["for_ns"], context.params["scans"]
-    as_json = context.params["as_json"]
+    as_json, debug_port = context.params["as_json"], context.params["debug_port"]
     project = read_given_project(file)
     if not isinstance(project, Project):
         return _refuse(project, as_json)
-    _check_end(project, net, for_ns, scans)
+    if debug_port is None:
+        _check_end(project, net, for_ns, scans)
+    elif context.params["trace"] or context.params["journal"]:
+        raise click.UsageError("--debug looks into scans itself: leave out --trace and --journal")
     try:
         plant = Plant(project, net=net, for_ns=for_ns, scans=scans)
     except OSError as error:
@@ -69,12 +75,20 @@ def run_project(file: Path, context: click.Context) -> int:
                 progress.update(first)
                 recorded.tick()
 
-            run_all(plant.runs, tick)
+            _execute(plant, debug_port, tick)
     finally:
         plant.close()
     real = not plant.network.virtual_time and not as_json and sys.stderr.isatty()
     _print(plant, as_json, context.params["scan_time"] or real)
     return max(EXIT_STATUS.get(run.reason, status.GOOD) for run in plant.runs)
+
+
+def _execute(plant: Plant, debug_port: int | None, tick: Callable[[], None]) -> None:
+    """Runs all PLCs to their ends; with `debug_port` debuggers may attach meanwhile."""
+    if debug_port is None:
+        run_all(plant.runs, tick)
+    else:
+        run_with_port(plant.named_runs, DebugPort(debug_port, plant_sources(plant)), tick)
 
 
 def _record(plant: Plant, recorded: RunRecording, options: Mapping[str, Any]) -> None:

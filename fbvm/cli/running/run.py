@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,8 @@ from click.core import ParameterSource
 
 from fbvm.cli.running.project import run_project
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
-from fbvm.cli.shared.debug.door import NEVER_WITH, run_with_door
+from fbvm.cli.shared.debug.door import DebugPort, debug_option, run_with_port
+from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in
@@ -48,10 +50,14 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.trace.recorder import Recorder
+from fbvm.record.trace.source_texts import source_texts
 from fbvm.run import loop
-from fbvm.run.running import EVENT, PACES, TimedWrite
+from fbvm.run.running import EVENT, PACES, Running, TimedWrite
 from fbvm.watch.places import parse_for
 
+NEVER_WITH_DEBUG = {"journal": "--journal", "trace": "--trace", "html": "--html", "rungs": "--ladder", "charts": "--sfc",
+                    "charted": "--chart", "lines": "--break", "watched": "--watch", "conditions": "--break-if"}  # fmt: skip
+"""Options that look into scans themselves, by the names of their parameters."""
 HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 
 
@@ -92,8 +98,7 @@ HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 @click.option("--engine", type=click.Choice(CHOICES), default="auto", show_default=True,
               help="auto: Python first, machine code when that pays.")
 @click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
-@click.option("--debug", "debug_port", type=click.IntRange(0, 65535), metavar="PORT",
-              help="Let an editor's debugger attach at this port; 0 is one that the system picks.")
+@debug_option
 @click.option("--scan-time", is_flag=True,
               help="Say how long scans took and how late they began; a run over tcp on a terminal does so by itself.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -178,27 +183,33 @@ def _run(
         set_breakpoints(plc, lines, watched, conditions)
         with RunProgress(None if as_json else plc, scans, for_ns or max_ns) as shown_progress:
 
-            def progress(plc: Plc) -> None:
+            def progress() -> None:
                 shown_progress.update(plc)
                 recorded.tick()
                 if capture:  # of a quiet network a buffer would take minutes to fill
                     capture.flush()
 
-            if debug_port is not None:
-                reason = run_with_door(plc, debug_port, files, libraries, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns,
-                                       writes=writes, pace=pace, progress=progress)  # fmt: skip
-            else:
-                reason = loop.run(
-                    plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes,
-                    pace=pace, progress=progress,
-                )  # fmt: skip
+            running = Running(plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes,
+                              pace=pace)  # fmt: skip
+            _execute(running, debug_port, files, libraries, progress)
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
     for write, given in zip(writes, settings, strict=True):
         if not plc.scans or write.at_ns > plc.now_ns:
             say(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
     wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
-    return RunResult(plc, reason, places, recorder, as_json, until or "", wanted)
+    return RunResult(plc, running.reason, places, recorder, as_json, until or "", wanted)
+
+
+def _execute(running: Running, debug_port: int | None, files: tuple[Path, ...], libraries: tuple[Path, ...],
+             progress: Callable[[], None]) -> None:  # fmt: skip
+    """Runs a PLC to its end; with `debug_port` debuggers may attach meanwhile."""
+    if debug_port is None:
+        loop.run_all([running], progress)
+        return
+    paths = {str(path): path for path in files}
+    sources = DebugSources(paths, source_texts(running.plc.image, paths, libraries))
+    run_with_port({"plc": running}, DebugPort(debug_port, sources), progress)
 
 
 def _never(plc: Plc) -> bool:
@@ -246,7 +257,7 @@ def _check_usage(
     *, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
     max_ns: int | None, debug_port: int | None, **others: Any,
 ) -> None:  # fmt: skip
-    if debug_port is not None and (both := [said for name, said in NEVER_WITH.items() if others.get(name)]):
+    if debug_port is not None and (both := [said for name, said in NEVER_WITH_DEBUG.items() if others.get(name)]):
         raise click.UsageError(f"--debug looks into scans itself: leave out {', '.join(both)}")
     ends = sum(bound is not None for bound in (scans, for_ns, until))
     if ends > 1 or not (ends or doors or debug_port is not None):

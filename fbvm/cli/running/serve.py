@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from io import TextIOWrapper
 from pathlib import Path
@@ -18,6 +18,8 @@ from fbvm.base.data import data_folder
 from fbvm.base.files import reason
 from fbvm.base.host import ending_signals, handling, saving_signals
 from fbvm.cli.shared import status
+from fbvm.cli.shared.debug.door import DebugPort, debug_option
+from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
 from fbvm.cli.shared.files import OutputError, growing_file, writing
 from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, say_fins, try_fins
@@ -33,17 +35,19 @@ from fbvm.net.notices import Notice, NoticeKind
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.trace import memory_images
 from fbvm.record.trace.requests import RequestLog
+from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT
+from fbvm.step.world import Debugged
 from fbvm.wire.link import Peer
 
 CYCLE_NS = 10_000_000
 START_LIMIT_NS = 5_000_000_000
 SHIPPED = data_folder("examples") / "server.st"
+"""The server program that is shipped, among the examples."""
 SERVED = {"CIO": 5801, "D": 32768}
 """Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
-
 
 OWN_SETTINGS = {"sockets": "Sockets", "read_only": "Read_Only", "fn0f": "Fn0F", "full_dm": "Full_DM", "idle_ns": "Idle_Time"}
 """The options that set inputs of the shipped server program."""
@@ -67,6 +71,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 @fins_options
 @watch_cycle_option
 @recording_file_options
+@debug_option
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.  Words that it does not "
                    "have begin with 0; words of units are not set.")
@@ -75,7 +80,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], bind: str, port: int, image: Path | None,
     log: Path | None, watch_ns: int, backlog: bool, fins: bool, fins_bind: str, fins_port: int, fins_node: int | None,
-    fins_control: bool, trace: Path | None, journal: Path | None, verify: bool, **settings: int | None,
+    fins_control: bool, debug_port: int | None, trace: Path | None, journal: Path | None, verify: bool, **settings: int | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
     reach the first port at which it waits.  With --fins, SCADA software and libraries that speak FINS reach it, too.
@@ -101,19 +106,41 @@ def command(
         if door:
             try_fins(network, door)
         recorded = _recording(stack, plc, files, libraries, program, {"trace": trace, "journal": journal, "verify": verify})
-        reason, saved = _start(plc, network, signals, door), True
-        while reason != "trap" and not signals.end:
-            try:
-                reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT,
-                                  progress=lambda _: recorded.tick())
-            except OutputError:  # the log; the memory is saved nevertheless
-                _save(plc, image)
-                raise
-            signals.save = False
-            saved = _save(plc, image)
+        reason = _start(plc, network, signals, door)
+        debugging = _debug_port(stack, plc, debug_port, files, libraries) if debug_port is not None else None
+        reason, saved = _serve(plc, reason, signals, debugging, image, recorded.tick)
     if plc.trap:
         say(str(plc.trap), err=True)
     sys.exit(status.STOPPED if reason == "trap" else status.GOOD if saved else status.USAGE)
+
+
+def _serve(plc: Plc, reason: str, signals: Signals, debugging: DebugPort | None, image: Path | None,
+           record: Callable[[], None]) -> tuple[str, bool]:  # fmt: skip
+    """Runs until a trap or a signal, and records now and then; returns the reason of the end, and False if the memory could
+    not be saved."""
+    saved = True
+    while reason != "trap" and not signals.end:
+        try:
+            reason = loop.run(plc, until=lambda _: signals.is_heard or debugging is not None and debugging.is_called, pace=EVENT,
+                              progress=lambda _: record())
+            if debugging and debugging.serve(lambda: [Debugged("plc", plc)], lambda: signals.is_heard):
+                signals.end = True
+        except OutputError:  # the log; the memory is saved nevertheless
+            _save(plc, image)
+            raise
+        if reason != "until" or signals.is_heard:
+            signals.save = False
+            saved = _save(plc, image)
+    return reason, saved
+
+
+def _debug_port(stack: ExitStack, plc: Plc, number: int, files: tuple[Path, ...], libraries: tuple[Path, ...]) -> DebugPort:
+    """Where debuggers attach; it is closed with the stack."""
+    given = files or (SHIPPED,)
+    paths = {str(path): path for path in given}
+    port = DebugPort(number, DebugSources(paths, source_texts(plc.image, paths, libraries)))
+    stack.callback(port.close)
+    return port
 
 
 def _shipped(settings: dict[str, int | None]) -> Plc:
@@ -168,7 +195,7 @@ def _recording(stack: ExitStack, plc: Plc, files: tuple[Path, ...], libraries: t
     recorded = stack.enter_context(record_run(options, {}))
     if recorded.recording:
         sources = files or (SHIPPED,)
-        text = program_text(sources, libraries, program=program, **compile_options())
+        text = program_text(sources, libraries, program=program, **compile_options(sources))
         recorded.add(sources[0].stem, plc, described(plc, text, options, sources, libraries))
     return recorded
 
@@ -223,6 +250,11 @@ class Signals:
     def __init__(self) -> None:
         self.end = False
         self.save = False
+
+    @property
+    def is_heard(self) -> bool:
+        """True if one of them has come."""
+        return self.end or self.save
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if number in saving_signals():

@@ -10,15 +10,16 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from fbvm.cli.running.debug_targets import DebugTarget, ProjectTarget
+from fbvm.base.diagnostics import Diagnostic
 from fbvm.cli.shared import status
+from fbvm.cli.shared.debug.worlds import NetworkPackets, ProgramErrors, ProjectWorld, program_world
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.shared.paths import SourcePath
-from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
+from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument, read_given_project
 from fbvm.cli.shared.prompt import prompt_lines
-from fbvm.cli.shared.sources import compile_or_exit, source_options
+from fbvm.cli.shared.sources import compile_or_exit, report_diagnostics, source_options
 from fbvm.cli.shared.terminal import named, say
 from fbvm.cli.shared.traces import is_recording, open_trace
 from fbvm.record.recording.file_scans import FileScans
@@ -26,6 +27,7 @@ from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.signals import packets
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth
+from fbvm.run.project import Project
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.past_session import PastSession
 from fbvm.step.session import Session
@@ -80,17 +82,16 @@ def command(
     for row in mappings:
         if row.host is not None:
             raise click.UsageError(f"stepping stays in memory: --map {row.endpoint}=peer")
-    debugged: DebugTarget
+    packets = NetworkPackets()
     if project := project_argument(files):
-        debugged = ProjectTarget(project, name)
-        texts = source_texts(debugged.image, debugged.files, debugged.libraries)
+        world = _project_world(project, packets)
+        session, texts = Session(world, _chosen(world.names, name)), world.sources.texts
     else:
         image = compile_or_exit(files, program, libraries, runnable=True, drawn=True)
         image = image.with_e_banks(e_banks_in([*watched, *(given.name for given in settings)]))
-        debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
+        session = Session(program_world(image, cycle_ns, mappings, timing, seed, packets))
         texts = source_texts(image, given_sources(files), libraries)
-    session = Session.of(debugged.make)
-    commands = Commands(session, StopReport(session, texts), lambda: debugged.packets)
+    commands = Commands(session, StopReport(session, texts), lambda: packets.packets)
     try:
         for given in settings:
             _write(session, given)
@@ -136,6 +137,27 @@ def _prompt(commands: Commands) -> None:
         _interact(commands)
     else:
         _script(commands)
+
+
+def _project_world(file: Path, packets: NetworkPackets) -> ProjectWorld:
+    """The PLCs of a project.  Ends with status 3 if it has errors."""
+    project = read_given_project(file)
+    try:
+        if isinstance(project, Project):
+            return ProjectWorld(project, packets)
+        diagnostics: Sequence[Diagnostic] = project
+    except ProgramErrors as error:
+        diagnostics = error.diagnostics
+    report_diagnostics(list(diagnostics), False)
+    sys.exit(status.PROGRAM_ERRORS)
+
+
+def _chosen(names: Sequence[str], name: str | None) -> str:
+    """The PLC of that name, the only one without a name.  Raises UsageError."""
+    if (name or names[0]) not in names or (name is None and len(names) > 1):
+        said = f"there is no PLC {name}" if name else "there are several PLCs; say which by --plc NAME"
+        raise click.UsageError(f"{said}; there is {', '.join(names)}")
+    return name or names[0]
 
 
 def _write(session: Session, given: Setting) -> None:

@@ -45,11 +45,8 @@ def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]
 
 def families(paths: Sequence[Path]) -> list[tuple[str, str]]:
     """The family of tools that wrote each document among some files, with the reason."""
-    found = []
-    for made in map(imported, paths):
-        if isinstance(made, Imported):
-            found.append((made.family, made.because))
-    return found
+    found = map(within, paths)
+    return [(made.family, made.because) for made in found if made is not None and made.because]
 
 
 def sources_of(paths: Sequence[Path]) -> list[Source]:

@@ -29,6 +29,10 @@ class Within:
 
     texts: Mapping[str, str]
     diagnostics: Sequence[Diagnostic]
+    family: str = ""
+    """The family of tools that wrote it: "beremiz", "codesys", "twincat"; "" if that is not known, or of no use."""
+    because: str = ""
+    """From what the family was concluded."""
 
     @property
     def errors(self) -> list[Diagnostic]:
@@ -49,7 +53,8 @@ def within(path: Path, resource: str | None = None) -> Within | None:
     suffix = path.suffix.lower()
     if suffix == PROJECT_SUFFIX:
         project = read_project(path)
-        return Within({source.name: source.text for source in project.sources}, project.diagnostics)
+        return Within({source.name: source.text for source in project.sources}, project.diagnostics,
+                      "twincat", f"{path.name} is a project of TwinCAT")  # fmt: skip
     try:
         data = read_file(path, SOURCE_BYTES) if path.is_file() or suffix in SUFFIXES else b""
     except OSError:
@@ -64,10 +69,12 @@ def _within(data: bytes, name: str, suffix: str, resource: str | None) -> Within
     if suffix in TWINCAT_SUFFIXES:
         made = twincat.read_object(data, name)
         source = task_source(name, [made.task]) if made.task else made.source
-        return Within({source.name: source.text} if source else {}, made.diagnostics)
+        texts = {source.name: source.text} if source else {}
+        return Within(texts, made.diagnostics, "twincat", f"{name} is an object of TwinCAT")
     if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and DOCUMENT in data[:HEAD_BYTES]:
         document = import_xml(data, name)
-        return Within({f"{name}/{file}": text for file, text in document.files.items()}, document.diagnostics)
+        return Within({f"{name}/{file}": text for file, text in document.files.items()}, document.diagnostics,
+                      document.family, document.because)  # fmt: skip
     if suffix in CX_SUFFIXES or is_project(data):
         project = import_project(data, name, resource)
         return Within({f"{name}/{file}": text for file, text in project.files.items()}, project.diagnostics)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from fbvm.dap.framing import Framer, FramingError, encode
-from fbvm.dap.server import serve
+from fbvm.dap.server import pass_on, serve
 from fbvm.dap.target import LaunchError, Target
-from fbvm.net.streams import connect
+from fbvm.net.streams import Listener, connect
 
 Message = dict[str, Any]
 TEXT = "PROGRAM Main\nVAR n : INT; END_VAR\nn := n + 1;\nIF n = 500 THEN n := 0; END_IF\nEND_PROGRAM\n"
@@ -170,19 +173,127 @@ def attached(wire: Wire, file: Path) -> None:
     wire.until("disconnect")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("net", ["loop", "tcp"])
-def test_attached_to_a_plc_that_runs(file: Path, net: str) -> None:
-    command = [*FBVM, "run", str(file), "--net", net, "--debug", "0"]
+@contextmanager
+def with_port(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A verb with --debug in a process of its own, and its port; it ends by itself, without a traceback."""
+    command = [*FBVM, *arguments, "--debug", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr
         said = ""
         while "--connect" not in said:
             said = process.stderr.readline()
         try:
-            with connect("127.0.0.1", int(said.split()[-1])) as stream:
-                attached(Wire(stream.receive, stream.send), file)
+            yield process, int(said.split()[-1])
             assert process.wait(timeout=30) in (0, 130)
         finally:
             process.kill()
         assert "Traceback" not in process.stderr.read()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arguments", [["run", "--net", "loop"], ["run", "--net", "tcp"], ["live"], ["live", "--net", "tcp"]],
+                         ids=" ".join)  # fmt: skip
+def test_attached_to_a_plc_that_runs(file: Path, arguments: list[str]) -> None:
+    if arguments[0] == "live":
+        pytest.importorskip("websockets")
+    with with_port(*arguments, str(file)) as (_, port), connect("127.0.0.1", port) as stream:
+        attached(Wire(stream.receive, stream.send), file)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("net", ["loop", "tcp"])
+def test_attached_to_all_plcs_of_a_project_and_again_when_it_went_on(file: Path, net: str) -> None:
+    (file.parent / "other.st").write_text(TEXT, encoding="utf-8")
+    project = file.parent / "fbvm.toml"
+    project.write_text('[plc.one]\nsources = ["count.st"]\n[plc.two]\nsources = ["other.st"]\ncycle = "20ms"\n', encoding="utf-8")
+    with with_port("run", str(file.parent), "--net", net) as (_, port):
+        scans = []
+        for last in (False, True):
+            with connect("127.0.0.1", port) as stream:
+                wire = Wire(stream.receive, stream.send)
+                wire.send("initialize", adapterID="fbvm")
+                wire.send("attach", plc="two", stopOnEntry=True)
+                wire.send("configurationDone")
+                wire.until("stopped")
+                wire.send("threads")
+                names = [row["name"].split(" ")[0] for row in wire.until("threads")["body"]["threads"]]
+                assert names == ["two", "one"]
+                wire.send("fbvm/stepScan", scans=5, threadId=1)
+                wire.until("stopped")
+                wire.send("evaluate", expression="Main.n")
+                scans.append(int(wire.until("evaluate")["body"]["result"]))
+                wire.send("disconnect", terminateDebuggee=last)
+                wire.until("disconnect")
+        assert scans[0] != scans[1]
+
+
+@pytest.mark.slow
+def test_attached_to_a_server() -> None:
+    with with_port("serve", "--port", "0") as (_, port), connect("127.0.0.1", port) as stream:
+        wire = Wire(stream.receive, stream.send)
+        wire.send("initialize", adapterID="fbvm")
+        wire.send("attach")
+        wire.send("setFunctionBreakpoints", breakpoints=[{"name": "Main"}])
+        wire.send("configurationDone")
+        assert wire.until("stopped")["body"]["reason"] == "breakpoint"
+        wire.send("evaluate", expression="Main.Server.Sockets")
+        assert wire.until("evaluate")["body"]["result"] == "1"
+        wire.send("setFunctionBreakpoints", breakpoints=[])
+        wire.send("continue", threadId=1)
+        wire.until("continue")
+        wire.send("disconnect", terminateDebuggee=True)
+        wire.until("disconnect")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGTERM")
+def test_a_server_ends_at_a_signal_while_a_debugger_has_it() -> None:
+    with with_port("serve", "--port", "0") as (process, port), connect("127.0.0.1", port) as stream:
+        wire = Wire(stream.receive, stream.send)
+        wire.send("initialize", adapterID="fbvm")
+        wire.send("attach", stopOnEntry=True)
+        wire.send("configurationDone")
+        wire.until("stopped")
+        process.terminate()
+
+
+def test_a_bridge_whose_editor_is_gone_ends_though_its_connection_is_ended_first() -> None:
+    ended = threading.Event()
+
+    def receive() -> bytes:
+        assert ended.wait(20)
+        raise OSError(errno.EBADF, "Bad file descriptor")
+
+    written = bytearray()
+    pass_on(lambda: b"", written.extend, receive, written.extend, ended.set)
+    assert written == b""
+
+
+def test_a_bridge_tells_of_a_connection_that_breaks_while_its_editor_is_there() -> None:
+    gone = threading.Event()
+
+    def read() -> bytes:
+        gone.wait(20)
+        return b""
+
+    def receive() -> bytes:
+        raise ConnectionResetError(errno.ECONNRESET, "reset")
+
+    try:
+        with pytest.raises(ConnectionResetError):
+            pass_on(read, bytearray().extend, receive, bytearray().extend, gone.set)
+    finally:
+        gone.set()
+
+
+def test_a_stream_that_is_ended_gives_its_last_bytes_and_then_the_end() -> None:
+    listener = Listener("127.0.0.1", 0)
+    try:
+        with connect("127.0.0.1", listener.port) as stream, listener.accept() as other:
+            other.send(b"last")
+            assert stream.receive() == b"last"
+            stream.end()
+            assert stream.receive() == b"" and other.receive() == b""
+            stream.end()
+    finally:
+        listener.close()

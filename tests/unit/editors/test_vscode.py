@@ -15,8 +15,12 @@ from typing import Any
 import pytest
 
 from fbvm.base.dialects import DIALECTS
+from fbvm.cli.shared.debug.attach import ATTACH
+from fbvm.cli.shared.debug.launch import LAUNCH
+from fbvm.engine.choice.tiers import CHOICES
 
 HERE = Path(__file__).resolve().parents[3] / "editors" / "vscode"
+JSON_TYPES = {"string": str, "array": list, "object": dict, "boolean": bool, "integer": int}
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 
 
@@ -61,6 +65,21 @@ def test_commands_are_those_that_the_extension_has_and_the_server_names() -> Non
     registered = {*re.findall(r"(?<!\.)\bon\('(\w+)', ", scripts()), *re.findall(r"^  (\w+): ", debugger, re.M)}
     assert commands == registered
     assert {"run", "debug", "chart", "test", "debugTest"} <= commands
+
+
+def test_configurations_have_the_keys_that_the_debugger_takes() -> None:
+    described = package()["contributes"]["debuggers"][0]
+    for request, keys in (("launch", LAUNCH), ("attach", ATTACH)):
+        offered = described["configurationAttributes"][request]["properties"]
+        assert set(offered) == set(keys) - {"noDebug"}
+        for name, row in offered.items():
+            named = [row["type"]] if isinstance(row["type"], str) else row["type"]
+            assert {JSON_TYPES[kind] for kind in named} == set(keys[name]), name
+    assert set(described["configurationAttributes"]["launch"]["properties"]["dialect"]["enum"]) == set(DIALECTS)
+    assert set(described["configurationAttributes"]["launch"]["properties"]["engine"]["enum"]) == set(CHOICES)
+    for snippet in described["configurationSnippets"]:
+        body = snippet["body"]
+        assert set(body) - {"type", "request", "name"} <= set(described["configurationAttributes"][body["request"]]["properties"])
 
 
 def test_dialects_of_the_setting_are_those_of_the_compiler() -> None:

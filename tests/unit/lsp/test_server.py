@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import subprocess
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -60,6 +62,9 @@ class Editor(LanguageClient):
         change = types.TextDocumentContentChangePartial(types.Range(types.Position(*start), types.Position(*end)), text)
         self.text_document_did_change(types.DidChangeTextDocumentParams(
             types.VersionedTextDocumentIdentifier(uri=self.uri(name), version=self.versions[name]), [change]))
+
+    def watched(self, name: str, change: types.FileChangeType) -> None:
+        self.workspace_did_change_watched_files(types.DidChangeWatchedFilesParams([types.FileEvent(self.uri(name), change)]))
 
     async def codes(self, name: str, wanted: list[str]) -> None:
         """Wait until a file has these diagnostics."""
@@ -215,6 +220,42 @@ def test_a_project_file_says_what_belongs_together_and_has_mistakes_of_its_own(f
     conversation(folder, talk, "main.st", "fbvm.toml")
 
 
+def test_files_that_come_and_go_on_disk_belong_to_the_program_or_not(folder: Path) -> None:
+    pump = folder / "Pump.st"
+
+    async def talk(editor: Editor) -> None:
+        await editor.codes("main.st", [])
+        pump.unlink()
+        editor.watched("Pump.st", types.FileChangeType.Deleted)
+        await editor.codes("main.st", ["S0204"])
+        pump.write_text(PUMP.replace("Level", "Height"), encoding="utf-8")
+        editor.watched("Pump.st", types.FileChangeType.Created)
+        await editor.codes("main.st", ["S0402"])
+        pump.write_text(PUMP, encoding="utf-8")
+        editor.watched("Pump.st", types.FileChangeType.Changed)
+        await editor.codes("main.st", [])
+
+    conversation(folder, talk, "main.st")
+    (folder / "fbvm.toml").write_text('[plc.pump]\nsources = ["main.st", "Pump.st"]\n', encoding="utf-8")
+    conversation(folder, talk, "main.st")
+
+
+def test_a_test_in_structured_text_knows_assert_and_the_blocks_that_pytest_would_find(folder: Path) -> None:
+    (folder / "fbvm.toml").write_text('[plc.pump]\nsources = ["main.st", "Pump.st"]\n', encoding="utf-8")
+    (folder / "src").mkdir()
+    (folder / "src" / "Lamp.st").write_text(PUMP.replace("Pump", "Lamp"), encoding="utf-8")
+    (folder / "tests").mkdir()
+    (folder / "tests" / "test_lamp.st").write_text(
+        "PROGRAM It_shines\nVAR L : Lamp; END_VAR\n    L(Level := 1);\n    ASSERT(L.Runs);\n    ASSERTS(L.Runs);\nEND_PROGRAM\n",
+        encoding="utf-8")
+
+    async def talk(editor: Editor) -> None:
+        await editor.codes("tests/test_lamp.st", ["S0401"])
+        assert editor.diagnostics[editor.uri("tests/test_lamp.st")][0].range.start == types.Position(4, 4)
+
+    conversation(folder, talk, "tests/test_lamp.st")
+
+
 def test_keys_that_come_faster_than_checks_end_in_the_right_diagnostics(folder: Path) -> None:
     async def talk(editor: Editor) -> None:
         for at in range(40):
@@ -224,3 +265,13 @@ def test_keys_that_come_faster_than_checks_end_in_the_right_diagnostics(folder: 
         await editor.codes("main.st", [])
 
     conversation(folder, talk, "main.st")
+
+
+def test_the_end_of_a_conversation_is_the_end_of_the_process_without_a_word() -> None:
+    said = b""
+    for message in ({"id": 1, "method": "initialize", "params": {"capabilities": {}, "processId": None, "rootUri": None}},
+                    {"method": "initialized", "params": {}}, {"id": 2, "method": "shutdown"}, {"method": "exit"}):  # fmt: skip
+        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
+        said += b"Content-Length: %d\r\n\r\n" % len(body) + body
+    done = subprocess.run([sys.executable, "-m", "fbvm", "lsp"], input=said, capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, b"") and b'"id": 2' in done.stdout

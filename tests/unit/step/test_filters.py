@@ -58,3 +58,23 @@ def test_a_response_code_of_the_unit_stops_it() -> None:
     reached = done(found.resume(5000))
     assert reached and reached.kind == "response" and "Response Code is 16#" in reached.reasons[0]
     assert found.session.here == reached.position
+
+
+def late_scans(wanted: frozenset[int], *began_ms: int) -> list[str]:
+    """What the filter says of scans that began at these times, the cycle being 10 ms."""
+    image = compile_text("PROGRAM Main\nVAR n : INT; END_VAR\nn := n + 1;\nEND_PROGRAM\n").image
+    assert image is not None
+    plc, check = Plc(image, 10_000_000), BetweenScans({"late": wanted})
+    check.attached(plc)
+    said = []
+    for at_ms in began_ms:
+        plc.scan(at_ms * 1_000_000)
+        if check.checked(plc):
+            said.append(check.found)
+    return said
+
+
+def test_a_scan_that_begins_too_late_stops_the_run() -> None:
+    assert late_scans(frozenset((5,)), 0, 10, 24, 39, 55, 65) == ["scan 3 began 5ms late", "scan 4 began 6ms late"]
+    assert late_scans(frozenset(), 0, 10, 29, 49, 59) == ["scan 3 began 10ms late"]
+    assert late_scans(frozenset((1,)), 0, 10, 20, 30) == []

@@ -11,35 +11,29 @@ import click
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.base.files import reason
+from fbvm.cli.shared.debug.attach import literal
+from fbvm.cli.shared.debug.worlds import NetworkPackets, ProgramErrors, ProjectWorld, program_world
 from fbvm.cli.shared.e_banks import e_banks_in
-from fbvm.cli.shared.networks import build_network, mailbox_names
-from fbvm.cli.shared.options import Mapping as Mapped
 from fbvm.cli.shared.options import mapping
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.dap.target import LaunchError, Target, checked
 from fbvm.interchange.formats.given import given_sources, inputs
-from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
-from fbvm.net.loop import LoopNetwork
 from fbvm.record.recording.container import RecordingError
 from fbvm.record.recording.file_reader import RecordingFile
 from fbvm.record.recording.file_scans import FileScans
 from fbvm.record.recording.scans import RecordedScans
-from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth
-from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import FILE, Project, project_file, read_project
-from fbvm.run.real_pace import RealPace
 from fbvm.run.running import TimedWrite
 from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position
 from fbvm.step.session import Session
-from fbvm.step.world import Debugged, World
+from fbvm.step.world import World
 from fbvm.watch.places import parse_for
 from fbvm.watch.values import parse_time_ns
-from fbvm.wire.tap import TapEvent
 
 LAUNCH: dict[str, tuple[type, ...]] = {
     "program": (str, list), "project": (str,), "plc": (str,), "main": (str,), "resource": (str,), "libraries": (list,),
@@ -70,34 +64,6 @@ def open_launch(arguments: Mapping[str, Any]) -> Target:
         raise LaunchError(said) from None
 
 
-ATTACH: dict[str, tuple[type, ...]] = {"stopOnEntry": (bool,), "force": (dict,), "keepForces": (bool,), "cwd": (str,),
-                                       "connect": (str, int)}  # fmt: skip
-"""The keys of an attach configuration; `connect` is for the extension that starts `fbvm dap --connect`."""
-
-
-def open_attached(plc: Plc, paths: Mapping[str, Path], libraries: Sequence[Path], arguments: Mapping[str, Any]) -> Target:
-    """A PLC that runs, from now on.  `paths` are its sources by name.  Raises LaunchError."""
-    given = checked(arguments, ATTACH, "attach")
-    pace = RealPace(plc)
-    try:
-        world = World(lambda: [Debugged("plc", plc)], is_fixed=True, pace=pace if pace.is_real else None)
-        forced = set(plc.forces)
-        for name, value in given.get("force", {}).items():
-            place = plc.find(name)
-            plc.force(name, parse_for(place, _text(value)))
-    except (LookupError, TypeError, ValueError) as error:
-        raise LaunchError(str(error)) from None
-
-    def close() -> None:
-        world.leave()
-        for name in () if given.get("keepForces") else set(plc.forces) - forced:
-            plc.unforce(name)
-
-    notes = ["going back shows what was recorded since now, read-only: real connections do not travel in time"]
-    return Target({"plc": Session(world, "plc")}, source_texts(plc.image, paths, libraries), paths, stop_on_entry=given.get(
-        "stopOnEntry"), notes=notes, close=close)  # fmt: skip
-
-
 def _is_project(path: Path) -> bool:
     return path.suffix == ".toml" or (path.is_dir() and project_file(path) is not None)
 
@@ -118,15 +84,17 @@ def _sources(given: Mapping[str, Any], folder: Path) -> list[Path]:
 
 def _program(given: Mapping[str, Any], folder: Path) -> Target:
     """A program on a PLC with its units and a network in memory."""
+    if "plc" in given:
+        raise LaunchError("plc: it names one of the PLCs of a project; a program is one PLC")
     if given.get("dialect", "standard") not in DIALECTS:
         raise LaunchError(f"there is no dialect {given['dialect']!r}; there are {', '.join(DIALECTS)}")
     files, libraries = _sources(given, folder), [folder / str(path) for path in given.get("libraries", ())]
     try:
         sources, said = inputs(files, given.get("resource"))
     except OSError as error:
-        raise LaunchError(f"a project of CX-Programmer cannot be read: {reason(error)}") from None
+        raise LaunchError(f"a project cannot be read: {reason(error)}") from None
     if errors(said):
-        raise LaunchError("the project of CX-Programmer cannot be taken over", _said(said))
+        raise LaunchError("the project cannot be taken over", _said(said))
     compilation = compile_files(sources, program=given.get("main"), libraries=libraries, runnable=True, drawn=True,
                                 resource=given.get("resource"), dialect=given.get("dialect", "standard"))  # fmt: skip
     image = _image(compilation.image, compilation.diagnostics)
@@ -137,19 +105,15 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     timing, seed = given.get("timing", "exact"), given.get("seed", 0)
     if timing not in ("exact", "real"):
         raise LaunchError(f"timing is exact or real, not {timing!r}")
-    tapped = _Tapped()
-
-    def make() -> list[Debugged]:
-        plc = Plc(image, cycle_ns, engine=given.get("engine", "auto"))
-        network = network_in_memory(mappings, seed)
-        tapped.listen(network)
-        for unit in usual_units(mailbox_names(image), timing, seed):
-            plc.attach(unit, network)
-        return [Debugged("plc", plc, [row.of_plc(plc) for row in sets])]
-
+    for row in mappings:
+        if row.host is not None:
+            raise LaunchError(f"the debugger's network stays in memory: map {row.endpoint}=peer")
+    packets = NetworkPackets()
+    world = program_world(image, cycle_ns, mappings, timing, seed, packets, given.get("engine", "auto"),
+                          lambda name, plc: [row.of_plc(plc) for row in sets])  # fmt: skip
+    paths = {str(path): path for path in files}
     texts = source_texts(image, given_sources(files, given.get("resource")), libraries)
-    return _target(given, World(make), texts, {str(path): path for path in files}, tapped, cycle_ns,
-                   _said([*said, *compilation.diagnostics]))  # fmt: skip
+    return _target(given, world, "plc", texts, paths, packets, _said([*said, *compilation.diagnostics]))
 
 
 def _recording(path: Path, libraries: Sequence[Path]) -> Target:
@@ -187,96 +151,57 @@ def _test(node: str, folder: Path) -> Target:
     return Target(sessions, item.texts, paths, notes=[item.output], failure=item.reason)
 
 
-def network_in_memory(mappings: Iterable[Mapped], seed: int) -> LoopNetwork:
-    """A network in memory with a Modbus server at each mapped endpoint.  Raises LaunchError for one outside."""
-    rows = tuple(mappings)
-    for row in rows:
-        if row.host is not None:
-            raise LaunchError(f"the debugger's network stays in memory: map {row.endpoint}=peer")
-    network = build_network("loop", rows, seed)
-    assert isinstance(network, LoopNetwork)
-    return network
-
-
 def _project(given: Mapping[str, Any], path: Path) -> Target:
     """The PLCs of a project, which share one time and one network in memory."""
     own = {"main", "resource", "libraries", "dialect", "cycle", "engine", "timing", "map"} & set(given)
     if own:
         raise LaunchError(f"{', '.join(sorted(own))}: with a project its file says that")
+    project = _read_project(path)
+    chosen, sets, packets = given.get("plc"), [_SetRow.of(row) for row in given.get("set", ())], NetworkPackets()
+    names: list[str] = []
+
+    def writes(name: str, plc: Plc) -> list[TimedWrite]:
+        names.append(name)
+        return [row.of_plc(plc) for row in sets] if name == (chosen or names[0]) else []
+
+    try:
+        world = ProjectWorld(project, packets, writes)
+    except ProgramErrors as error:
+        raise LaunchError(str(error), _said(error.diagnostics)) from None
+    chosen = chosen or world.names[0]
+    if chosen not in world.names:
+        raise LaunchError(f"there is no PLC {chosen}; there is {', '.join(world.names)}")
+    return _target(given, world, chosen, world.sources.texts, world.sources.paths, packets, _said(world.diagnostics))
+
+
+def _read_project(path: Path) -> Project:
+    """The project of a file or a folder.  Raises LaunchError."""
     file = project_file(path) if path.is_dir() else path
     if file is None or not file.is_file():
         raise LaunchError(f"there is no {FILE} in {path}" if path.is_dir() else f"there is no file {path}")
     project = read_project(file)
     if not isinstance(project, Project):
         raise LaunchError(f"{file.name} has errors", _said(project))
-    tapped, sets = _Tapped(), [_SetRow.of(row) for row in given.get("set", ())]
-
-    def plant() -> Plant:
-        made = Plant(project, net="loop", for_ns=ENDLESS)
-        if errors(made.diagnostics):
-            raise LaunchError("the program has errors", _said(made.diagnostics))
-        return made
-
-    first = plant()
-    names = [name for kind in first.kinds for name in kind.names]
-    chosen = given.get("plc", names[0])
-    if chosen not in names:
-        raise LaunchError(f"there is no PLC {chosen}; there is {', '.join(names)}")
-    notes = _said(first.diagnostics)
-    first.close()
-
-    def make() -> list[Debugged]:
-        made = plant()
-        assert isinstance(made.network, LoopNetwork)
-        tapped.listen(made.network)
-        rows = [Debugged(name, run.plc, list(run.writes)) for kind in made.kinds
-                for name, run in zip(kind.names, kind.runs, strict=True)]  # fmt: skip
-        for row in rows:
-            if row.name == chosen:
-                row.writes = [*row.writes, *(one.of_plc(row.plc) for one in sets)]
-        return rows
-
-    world = World(make)
-    texts: dict[str, str] = {}
-    for kind in first.kinds:
-        files = given_sources(kind.row.sources, kind.row.resource)
-        texts |= source_texts(kind.runs[0].plc.image, files, kind.row.libraries)
-    paths = {str(path): path for kind in first.kinds for path in kind.row.sources}
-    target = _target(given, world, texts, paths, tapped, world[chosen].cycle_ns, notes)
-    target.sessions = {name: target.sessions[name] for name in [chosen, *(name for name in names if name != chosen)]}
-    return target
+    return project
 
 
-def _target(given: Mapping[str, Any], world: World, texts: Mapping[str, str], paths: Mapping[str, Path], tapped: _Tapped,
-            cycle_ns: int, notes: str) -> Target:  # fmt: skip
-    sessions = {name: Session(world, name) for name in world.names}
-    first = next(iter(sessions.values())) if "plc" not in given else sessions[given["plc"]]
+def _target(given: Mapping[str, Any], world: World, chosen: str, texts: Mapping[str, str], paths: Mapping[str, Path],
+            packets: NetworkPackets, notes: str) -> Target:  # fmt: skip
+    """The PLCs of a world, the chosen one first, with the forces and the end that are given."""
+    names = [chosen, *(name for name in world.names if name != chosen)]
+    sessions = {name: Session(world, name) for name in names}
+    first = sessions[chosen]
     for name, value in given.get("force", {}).items():
         place = first.find(name)
-        parsed = parse_for(place, _text(value))
+        parsed = parse_for(place, literal(value))
         first.act(lambda plc, name=name, parsed=parsed: plc.force(name, parsed))  # type: ignore[misc]
     until = None
     if "for" in given or "scans" in given:
         bounds = [given["scans"]] if "scans" in given else []
+        cycle_ns = world[chosen].cycle_ns
         until = min([*bounds, *([-(-_time_ns(given["for"]) // cycle_ns)] if "for" in given else [])])
     assert first.here == Position()
-    return Target(sessions, texts, paths, lambda: tapped.packets, until, given.get("stopOnEntry"), [notes] if notes else [])
-
-
-class _Tapped:
-    """The packets of the network that was made last."""
-
-    def __init__(self) -> None:
-        self.packets: list[Packet] = []
-
-    def listen(self, network: LoopNetwork) -> None:
-        """Dissects what passes a network from now on."""
-        self.packets, dissector = [], Dissector(once=True)
-
-        def tap(now_ns: int, unit: str, event: TapEvent) -> None:
-            self.packets.extend(dissector.dissect(now_ns, event))
-
-        network.tap = tap
+    return Target(sessions, texts, paths, lambda: packets.packets, until, given.get("stopOnEntry"), [notes] if notes else [])
 
 
 class _SetRow:
@@ -290,17 +215,12 @@ class _SetRow:
         """The row of an object.  Raises LaunchError."""
         if not isinstance(row, dict) or not {"name", "value"} <= set(row) <= {"name", "value", "at"}:
             raise LaunchError(f'a row of set is {{"name": ..., "value": ..., "at": "50ms"}}, not {row!r}')
-        return cls(str(row["name"]), _text(row["value"]), _time_ns(row["at"]) if "at" in row else 0)
+        return cls(str(row["name"]), literal(row["value"]), _time_ns(row["at"]) if "at" in row else 0)
 
     def of_plc(self, plc: Plc) -> TimedWrite:
         """What is written into a PLC."""
         place = plc.find(self.name)
         return TimedWrite(place, parse_for(place, self.value), self.at_ns)
-
-
-def _text(value: object) -> str:
-    """A JSON value as a literal of a program."""
-    return str(value).upper() if isinstance(value, bool) else str(value)
 
 
 def _time_ns(text: object) -> int:
