@@ -175,7 +175,7 @@ class Project:
             self._found_pous.pop(key[1], None)
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
-            pou.inherits = any(refused.what == "EXTENDS" for refused in declaration.refused)
+            pou.modifiers = frozenset(word.text for word in declaration.modifiers)
             pou.failed_names |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
             pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)

@@ -57,7 +57,7 @@ def lay_out(checker: Checker) -> Placement:
     located = [v for v in checker.global_order if v.place == "area"]
     for pou in checker.bodies:
         located += [v for v in pou.order if v.place == "area"]
-    _place_located(located, placement)
+    _place_located(list(dict.fromkeys(located)), placement)
     for pou in checker.bodies:
         _complete_type(pou)
     for row in checker.var_config.completed:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fbvm.base.types import BOOL, machine
 from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.builder.places import is_aggregate
 from fbvm.code.image import RungPicture
-from fbvm.code.lowering import byte_order, pointers
+from fbvm.code.lowering import byte_order, pointers, pou_calls
 from fbvm.code.lowering.context import EXIT, BodyContext, StatementRules
 from fbvm.code.operations import Block, Node
 from fbvm.code.pictures.sfc import sfc_picture
@@ -41,6 +43,9 @@ def _assign(body: BodyContext, node: tree.Assign, site: int) -> None:
 def _assign_one(body: BodyContext, target: tree.Expr, value: tree.Expr, site: int) -> None:
     """`target := value`: the subscripts of the target are evaluated first, then the value."""
     kind = body.facts.types[target]
+    if (setter := body.facts.sets.get(target)) is not None:
+        pou_calls.run(body, target, replace(setter, inputs=[(setter.pou.parameters("VAR_INPUT")[0], value)]))
+        return
     if isinstance(value, tree.Call) and value in body.facts.reversed_bytes:
         called = body.facts.calls[value]
         assert isinstance(called, StandardCall)
