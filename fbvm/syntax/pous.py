@@ -11,7 +11,6 @@ from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.st.declarations import Settings
 from fbvm.syntax.st.jumps import Jumps, Tangled
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.st.refused import refused_what
 from fbvm.syntax.st.statements import Items, Members
 from fbvm.syntax.tree import (
     AccessVars,
@@ -115,15 +114,15 @@ class SourceBuilder(SfcElements):
     def property(self, word: Token, head: Head, colon: Token, spec: TypeSpec, accessors: list[Pou], end: Token) -> Members:
         methods: list[Pou] = []
         for each in accessors:
-            value = VarDecl(head.name.start, head.name.end, (head.name,), None, spec, None)
-            sections = (VarSection(head.name.start, head.name.end, "VAR_INPUT", (), (value,), True), *each.sections)
+            value = VarDecl(head.name.start, spec.end, (head.name,), None, spec, None)
+            sections = (VarSection(head.name.start, spec.end, "VAR_INPUT", (), (value,), True), *each.sections)
             own = tuple(word.text for word in each.modifiers)
             modifiers = (*(word for word in head.modifiers if not (own and word.text in _ACCESS)), *each.modifiers)
             getting = each.kind == "GET"
             if any(known.kind == each.kind for known in methods):
                 self.report("S0101", each.start, each.end, f"{head.name.text} has two {each.kind}", "")
                 continue
-            methods.append(Pou(each.start, each.end, each.kind, head.name, spec if getting else None,
+            methods.append(Pou(head.name.start, each.end, each.kind, head.name, spec if getting else None,
                                each.sections if getting else sections, each.body, each.refused, modifiers=modifiers))
         if not accessors:
             self.report("S0101", head.name.start, head.name.end, f"the PROPERTY {head.name.text} has neither GET nor SET",
@@ -182,7 +181,7 @@ class SourceBuilder(SfcElements):
         from fbvm.syntax.sfc.charts import Charts
 
         charts = Charts(self, actions, declared)
-        body = charts.body(word, body, [each for each in elements if not isinstance(each, Refused)])
+        body = charts.body(word, body, [each for each in elements if not isinstance(each, Refused | Members)])
         declared += charts.sections
         return body, charts.actions
 

@@ -67,28 +67,28 @@ def action(scope: Scope, callee: tree.Expr) -> tuple[Pou, tree.Expr | None] | No
         return None
     name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(scope, callee)
     if name is not None:
-        home = scope.pou.owner if scope.pou is not None else None
-        own = home.actions.get(fold(name)) if home is not None else None
+        home = scope.pou.own_block if scope.pou is not None else None
+        own = home.action(fold(name)) if home is not None else None
         return (own, None) if own is not None else None
     if not isinstance(callee, tree.Member):
         return None
     kind = objects.instance_of(scope, callee.of)
     if kind is None:
         return None
-    of_instance = scope.context.block_of(kind).actions.get(fold(callee.name.text))
+    of_instance = scope.context.block_of(kind).action(fold(callee.name.text))
     return (of_instance, callee.of) if of_instance is not None else None
 
 
 def _bind_action(scope: Scope, call: tree.Call, found: tuple[Pou, tree.Expr | None]) -> str:
     called, instance = found
-    bound = PouCall(called, instance)
+    bound = PouCall(called, instance, dynamic=objects.may_be_derived(scope, instance))
     if call.arguments and scope.dialect.action_inputs and instance is not None and called.home is not None:
         bind_inputs(scope, call, called.home, bound)
     elif call.arguments:
         scope.error("S0402", call.arguments[0], f"the ACTION {called.tree.name.text} has no parameters",
                     "write the inputs of its instance first" +
                     (f", or take {takers('action_inputs')}" if instance is not None else ""))
-    scope.note_call(called, call)
+    scope.note_call(called, call, bound.dynamic)
     scope.facts.calls[call] = bound
     return ""
 
@@ -124,7 +124,8 @@ def _instance(scope: Scope, call: tree.Call, as_value: bool) -> Type | str | Non
     if as_value:
         return ""
     if pou.kind == "CLASS":
-        scope.error("S0401", call.callee, f"{pou.name} is a CLASS and has no body to call", "call one of its methods: name.method()")
+        scope.error("S0401", call.callee, f"{pou.name} is a CLASS and has no body to call",
+                    "call one of its methods: name.method()")
         return None
     bound = PouCall(pou, call.callee, dynamic=objects.may_be_derived(scope, call.callee))
     variable = scope.facts.variables.get(call.callee)

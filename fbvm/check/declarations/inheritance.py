@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.base.types import Type, fold
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import ArrayType, StructType, Type, fold
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.syntax import tree
@@ -69,6 +70,19 @@ def shown(method: Pou) -> str:
     return f"the method {name}" if method.kind == "METHOD" else f"{method.kind.capitalize()} of the property {name}"
 
 
+def refuse_abstract(context: Context, kind: Type, source: Source, node: tree.Node) -> None:
+    """Report a variable that is or holds an instance of a block that is ABSTRACT."""
+    while isinstance(kind, ArrayType):
+        kind = kind.element
+    if isinstance(kind, StructType) and not kind.block:
+        for member in kind.fields.values():
+            refuse_abstract(context, member.type, source, node)
+    elif isinstance(kind, StructType) and "ABSTRACT" in context.block_of(kind).modifiers:
+        lacking = ", ".join(shown(method) for method in missing(context.block_of(kind)))
+        context.report.add("S1007", source, node, f"{kind} is ABSTRACT and has no instances",
+                           "declare one of a block that extends it" + (f" and has {lacking}" if lacking else ""))
+
+
 # --- members ----------------------------------------------------------------------------------------------------------
 
 
@@ -79,7 +93,8 @@ def check_members(context: Context, pou: Pou) -> None:
         for parent in parents:
             _check_override(context, pou, method, parent)
         if "OVERRIDE" in method.modifiers and not parents and not pou.inherits:
-            _report(context, "S1003", method, f"{shown(method)} overrides nothing", "leave OVERRIDE out, or name what it overrides")
+            _report(context, "S1003", method, f"{shown(method)} overrides nothing",
+                    "leave OVERRIDE out, or name what it overrides")
         if "ABSTRACT" in method.modifiers and pou.kind != "INTERFACE" and "ABSTRACT" not in pou.modifiers:
             _report(context, "S1007", method, f"{shown(method)} is ABSTRACT, and {pou.name} is not",
                     f"write {pou.kind} ABSTRACT {pou.name}")

@@ -21,7 +21,7 @@ from fbvm.base.types import (
     followed,
 )
 from fbvm.check.declarations import initializers
-from fbvm.check.declarations.inheritance import resolve_head
+from fbvm.check.declarations.inheritance import refuse_abstract, resolve_head
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.declarations.variables import check_qualifiers, initialized, is_constant, make_variable, type_of
 from fbvm.check.expressions.scope import Scope
@@ -65,10 +65,7 @@ class _Interface:
         if pou.block is None:
             resolve_head(self.context, pou)
         if pou.base is not None:
-            pou.variables = {name: v for name, v in pou.base.variables.items() if v.kind not in ("VAR_TEMP", "VAR_EXTERNAL")}
-            pou.order = [variable for variable in pou.base.order if variable.kind != "VAR_TEMP"]
-            pou.edges = list(pou.base.edges)
-            pou.other_names = {**pou.base.other_names, **pou.other_names}
+            self._inherit(pou.base)
         pou.later = {fold(name.text): (declared, section) for section in pou.tree.sections if section.kind != "VAR_EXTERNAL"
                      for declared in section.variables for name in declared.names}
         for section in pou.tree.sections:
@@ -93,6 +90,14 @@ class _Interface:
             self._instance()
         for action, source in pou.written_actions:
             self._action(action, source)
+
+    def _inherit(self, base: Pou) -> None:
+        """Take over the variables of the block that this one extends: they come first, where they lie in that."""
+        pou = self.pou
+        pou.variables = {name: v for name, v in base.variables.items() if v.kind not in ("VAR_TEMP", "VAR_EXTERNAL")}
+        pou.order = [variable for variable in base.order if variable.kind != "VAR_TEMP"]
+        pou.edges = list(base.edges)
+        pou.other_names = {**base.other_names, **pou.other_names}
 
     def _error(self, code: str, node: tree.Node, message: str, hint: str = "",
                related: tuple[Source, int, str] | None = None) -> None:
@@ -201,8 +206,10 @@ class _Interface:
             made = make_variable(self.context, declared, name, section, self.pou.source, resolved)
             made.owner = self.pou
             self._pass_by_reference(made, section)
-            if is_block(made.type) and made.kind == "VAR_OUTPUT" and self.pou.is_function:
-                self._error("S0901", name, f"an instance as {section.kind} of a FUNCTION is understood but not "
+            if made.kind != "VAR_IN_OUT":
+                refuse_abstract(self.context, made.type, self.pou.source, name)
+            if is_block(made.type) and made.kind == "VAR_OUTPUT" and self.pou.is_routine:
+                self._error("S0901", name, f"an instance as {section.kind} of a {self.pou.kind} is understood but not "
                             "executed by this version", "pass it as VAR_IN_OUT")
             self._place(made, declared)
             self._register(made)

@@ -10,8 +10,9 @@ from fbvm.check.declarations.locations import location_of
 from fbvm.check.declarations.specs import resolve, resolve_parameter
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Pou, Report, Variable, is_block
+from fbvm.check.symbols.facts import Pou, Variable, is_block
 from fbvm.check.symbols.project import Resolved
+from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.syntax import tree
 

@@ -25,6 +25,11 @@ def name(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
         return variable(scope, expr, found)
     if objects.is_self(scope, expr):
         return objects.pointer_to_self(scope, expr, want)
+    return _enumerated(scope, expr, want)
+
+
+def _enumerated(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
+    """The type of a name that is a member of an enumeration, else a diagnostic."""
     own = scope.source.library
     members = [m for m in scope.project.enum_members.get(fold(expr.text), ()) if m[2] or not own]
     near = [m for m in members if m[2] == own]

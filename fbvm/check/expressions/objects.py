@@ -1,6 +1,6 @@
-"""THIS, SUPER, and the members of instances that are executed: which method or property a name means, and who may name it.
+"""THIS, SUPER, and the members of instances that are executed: which method or property a name means, who may name it.
 
-Source: IEC 61131-3 ed. 3, 6.6.5.5 to 6.6.5.9 and 6.6.7; pointers in place of THIS and SUPER, and properties, as CODESYS has them."""
+Source: IEC 61131-3 ed. 3, 6.6.5.5 to 6.6.5.9 and 6.6.7; THIS^, SUPER^ and properties are CODESYS's."""
 
 from __future__ import annotations
 
@@ -228,7 +228,8 @@ def _is_callable(scope: Scope, expr: tree.Expr, method: Pou, instance: tree.Expr
 
 def has_body(scope: Scope, node: tree.Node, method: Pou, instance: tree.Expr | None) -> bool:
     """False, after a diagnostic, for SUPER with a method that is ABSTRACT."""
-    if "ABSTRACT" in method.modifiers and not is_dynamic(scope, method, instance):
+    if "ABSTRACT" in method.modifiers and instance is not None and is_own_instance(scope, instance) and \
+            not may_be_derived(scope, instance):
         scope.error("S1007", node, f"{method.tree.name.text} of {_home(method)} is ABSTRACT and has no body to execute")
         return False
     return True

@@ -144,13 +144,13 @@ class Context:
     def candidates(self, pou: Pou) -> dict[Pou, list[int]]:
         """The bodies that a call of a method or block may mean, by the numbers of the types for which each is meant.
 
-        pou: what the call names: a method, an accessor or a block.  Only types that have instances count."""
-        home = pou.block or pou
+        pou: what the call names: a method, an accessor, an ACTION or a block.  Types that are ABSTRACT have no instances."""
+        home = pou.block or pou.owner
         found: dict[Pou, list[int]] = {}
         for block in self._blocks.values():
             if block.kind == "INTERFACE" or "ABSTRACT" in block.modifiers or not derives(block.type, home.type):
                 continue
-            meant = block if pou.block is None else block.method(pou.key)
+            meant = block.method(pou.key) if pou.block is not None else block.action(pou.key) if pou.home is not None else block
             if meant is not None:
                 found.setdefault(meant, []).append(block.identifier)
         return found

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeGuard
 
 from fbvm.base.areas import Address
-from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, Elementary, Field, RefType, StructType, Type, base, fold
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import shown_in_hexadecimal
@@ -177,9 +177,9 @@ class Pou:
 
     @property
     def key(self) -> str:
-        """The key of a method or accessor among the methods of its block."""
+        """The key of a method or accessor among the methods of its block, of an ACTION its name."""
         name = fold(self.tree.name.text)
-        return name if self.kind == "METHOD" else f"{self.kind} {name}"
+        return f"{self.kind} {name}" if self.kind in ("GET", "SET") else name
 
     def lineage(self) -> Iterator[Pou]:
         """Itself, what it EXTENDS, what that EXTENDS ..."""
@@ -194,6 +194,10 @@ class Pou:
             return self.methods[key]
         parents = self.interfaces if self.kind == "INTERFACE" else [self.base] if self.base is not None else []
         return next((found for parent in parents if (found := parent.method(key)) is not None), None)
+
+    def action(self, name: str) -> Pou | None:
+        """Its ACTION of that folded name, its own or an inherited one."""
+        return next((pou.actions[name] for pou in self.lineage() if name in pou.actions), None)
 
     def all_referred(self) -> list[Variable]:
         """The variables of its instances that something refers to: those of what it extends first."""
@@ -356,6 +360,8 @@ class Facts:
     """THIS and SUPER, with the block as which they see the instance."""
     gets: dict[tree.Expr, tree.Call] = field(default_factory=dict)
     """Expressions that name a property, with the calls of GET that they mean."""
+    as_interfaces: set[tree.Expr] = field(default_factory=set)
+    """Instances to which an interface is made to refer."""
     sets: dict[tree.Expr, PouCall] = field(default_factory=dict)
     """Targets of assignments that name a property, with the calls of SET that they mean; those have no input yet."""
     text_cases: set[tree.Case] = field(default_factory=set)
@@ -387,36 +393,6 @@ class Facts:
 
 
 @dataclass(frozen=True, eq=False)
-class Spot:
-    """A variable that is named by a path: a program or global variable, then members and numbers of elements.
-
-    Without a root it is an address."""
-
-    root: Variable | None
-    steps: tuple[Field | int, ...]
-    type: Type
-    address: Address | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Completed:
-    """What VAR_CONFIG says about a variable: its address, or its initial bytes."""
-
-    spot: Spot
-    address: Address | None
-    initial: bytes | None
-
-
-@dataclass(frozen=True, eq=False)
-class AccessPath:
-    """What VAR_ACCESS says about a variable: another name, and whether that name can be written."""
-
-    name: str
-    spot: Spot
-    writable: bool
-
-
-@dataclass(frozen=True, eq=False)
 class Run:
     """What a task runs: an instance of a program, or a block in it."""
 
@@ -443,27 +419,6 @@ class TaskFact:
     interval_ns: int
     single: str = ""
     runs: list[Run] = field(default_factory=list)
-
-
-class Report:
-    """Collects diagnostics; one code is reported once for one place."""
-
-    def __init__(self) -> None:
-        self.diagnostics: list[Diagnostic] = []
-        self._seen: set[tuple[str, Source, int]] = set()
-
-    def add(self, code: str, source: Source, node: tree.Node, message: str, hint: str = "",
-            related: tuple[Source, int, str] | None = None) -> None:
-        key = (code, source, node.start)
-        if key not in self._seen:
-            self._seen.add(key)
-            self.diagnostics.append(Diagnostic(code, source, node.start, node.end, message, hint, related))
-
-    def refuse(self, source: Source, node: tree.Refused | tree.RefusedStatement) -> None:
-        """Report why something that was read is not executed."""
-        why = "is object-oriented text, which fbvm does not execute" if node.code == "S0902" else \
-            "is understood but not executed by this version"
-        self.add(node.code, source, node, f"{node.what} {why}")
 
 
 def is_block(kind: Type) -> bool:

@@ -16,8 +16,9 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.symbols.dependencies import Dependencies, Key
-from fbvm.check.symbols.facts import Facts, Pou, Report, Variable, list_name
+from fbvm.check.symbols.facts import Facts, Pou, Variable, list_name
 from fbvm.check.symbols.library import Libraries
+from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.check.symbols.size_limits import SizeLimits
 from fbvm.syntax import tree

@@ -9,8 +9,9 @@ from fbvm.base.areas import FLAG_AREAS, SLOTS_OFFSET, Address
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
+from fbvm.check.symbols.config_facts import Completed, Spot
 from fbvm.check.symbols.containment import Containment
-from fbvm.check.symbols.facts import Completed, Pou, Spot, Variable, holds_block
+from fbvm.check.symbols.facts import Pou, Variable, holds_block
 from fbvm.code.image import Layout, Objects, Retained
 from fbvm.code.layout.objects import Numbering
 from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT

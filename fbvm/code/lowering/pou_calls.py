@@ -28,11 +28,10 @@ def run(body: BodyContext, call: tree.Expr, called: PouCall) -> None:
     if called.pou.home is None:
         _enabled(body, call, called, ())
         return
-    instance = body.place(called.instance) if called.instance is not None else Place(("self", 0, ()), BOOL)
+    instance = _instance(body, called) or Place(("self", 0, ()), BOOL)
     if called.inputs:
-        instance = body.reusable(instance)
         _inputs(body, called, instance, body.site(call))
-    body.emit(("call", body.program.number(called.pou), instance.address))
+    body.emit(dispatch.call(body, called, instance, body.site(call)))
 
 
 def value(body: BodyContext, call: tree.Call, called: PouCall) -> Node:

@@ -101,7 +101,8 @@ def _contents(body: BodyContext, expr: ladder.Contents) -> Node:
 
 
 PLACES: PlaceRules = {
-    tree.NameRef: _own_instance, tree.Direct: _direct, tree.Member: _member, tree.Part: _part, tree.Deref: _dereferenced, tree.Index: _index,
+    tree.NameRef: _own_instance,
+    tree.Direct: _direct, tree.Member: _member, tree.Part: _part, tree.Deref: _dereferenced, tree.Index: _index,
     ladder.Memory: plc_addresses.place_at, ladder.Words: _words, ladder.Contents: _words,
 }
 VALUES: ValueRules = {
