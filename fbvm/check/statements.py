@@ -6,7 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 
 from fbvm.base.dialects import takers
-from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base
+from fbvm.base.types import BOOL, EnumType, RefType, StringType, StructType, Type, base
 from fbvm.check import charts
 from fbvm.check.calls import calls
 from fbvm.check.expressions import objects, references
@@ -15,7 +15,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.expressions.writes import place, warn_of_written_counter, writable
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Pou, Value
+from fbvm.check.symbols.facts import Pou, Value, is_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree import il, ladder, sfc
 
@@ -86,14 +86,23 @@ class _Statements:
                            conversion_hint(value_kind, kind))
 
     def _attempt(self, node: tree.Assign, kinds: list[Type | None]) -> None:
-        """`r ?= s`: r becomes s if the types agree, else NULL; without classes the compiler knows which."""
+        """`r ?= s`: r becomes s if the types agree, else NULL; of references to instances the program finds out which."""
         kind = self.scope.infer(node.value, kinds[-1])
         for target, wanted in zip(node.targets, kinds, strict=True):
             if wanted is None or kind is None:
                 continue
+            if isinstance(wanted, RefType) and wanted.interface and is_block(kind):
+                if assignable(kind, wanted):
+                    self.scope.fit(node.value, wanted)
+                else:
+                    self.facts.failed.add(target)
+                continue
             if not isinstance(wanted, RefType) or not isinstance(kind, RefType):
                 wrong, shown = (target, wanted) if not isinstance(wanted, RefType) else (node.value, kind)
                 self.error("S0301", wrong, f"?= tries a reference, this is {shown}", "write := for values")
+            elif wanted.target is not None and is_block(wanted.target) and kind.target is not None and is_block(kind.target):
+                assert isinstance(wanted.target, StructType)
+                self.facts.attempts[target] = wanted.target
             elif not assignable(kind, wanted):
                 self.facts.failed.add(target)
 

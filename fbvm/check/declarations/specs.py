@@ -316,6 +316,8 @@ def _structure(scope: Scope, spec: tree.StructSpec | tree.UnionSpec, name: str,
     """A structure, or a union: its members share their place, and the first initial value holds."""
     made = Members(isinstance(spec, tree.UnionSpec) or spec.overlap, pack)
     complete, limits = True, scope.project.size_limits
+    if isinstance(spec, tree.StructSpec) and spec.bases and not _extend(scope, spec, made):
+        return None
     for declared in spec.members:
         packed = isinstance(declared.spec, tree.NamedType) and fold(declared.spec.text) == "BIT"
         resolved = (BOOL, bytes(1)) if packed else resolve(scope, declared.spec)
@@ -337,6 +339,20 @@ def _structure(scope: Scope, spec: tree.StructSpec | tree.UnionSpec, name: str,
         return None
     name = name or f"STRUCT {scope.context.new_anonymous_number()}"
     return made.structure(name)
+
+
+def _extend(scope: Scope, spec: tree.StructSpec, made: Members) -> bool:
+    """Begin a structure with the members of the one that it extends; False after a diagnostic."""
+    resolved = resolve(scope, spec.bases[0])
+    if resolved is None:
+        return False
+    kind, initial = resolved
+    if not isinstance(kind, StructType) or kind.block or len(spec.bases) > 1:
+        scope.error("S1001", spec.bases[-1], f"a structure extends one structure, and {kind} is none" if len(spec.bases) == 1 else
+                    "a structure extends one structure")
+        return False
+    made.extend(kind, initial)
+    return True
 
 
 def _given(spec: tree.EnumSpec) -> tree.StructInit | None:

@@ -117,7 +117,7 @@ class Scope:
             return self.adopt(expr, target, code) is not None
         if assignable(kind, target):
             if isinstance(kind, StructType) and isinstance(target, RefType):
-                self._refer_to(expr, kind)
+                self.refer_to(expr, kind)
             value = self.facts.constants.get(expr)
             return value is None or self._in_range(expr, value, target, code)
         if converted_by_dialect(kind, target, self.dialect):
@@ -133,7 +133,7 @@ class Scope:
                    (literal_hint(value, base(target)) if constant else mismatch_hint(expr, kind, target)))
         return False
 
-    def _refer_to(self, expr: tree.Expr, kind: StructType) -> None:
+    def refer_to(self, expr: tree.Expr, kind: StructType) -> None:
         """Record that an interface refers to an instance of this type."""
         self.facts.as_interfaces.add(expr)
         self.context.block_of(kind).refer_to_instances()

@@ -28,8 +28,8 @@ class Uses:
             if isinstance(call, PouCall):
                 roots = [value for _, value in call.in_outs] + ([call.instance] if call.instance else [])
                 self.called.update(facts.variables.get(facts.root(root)) for root in roots)
-        self.called.update(facts.variables.get(facts.root(call.instance)) for call in facts.sets.values() if call.instance)
-        self.called.update(facts.variables.get(facts.root(place)) for place in (*facts.holders, *facts.as_interfaces))
+        assigned = [call.instance for call in facts.sets.values() if call.instance]
+        self.called.update(facts.variables.get(facts.root(place)) for place in (*assigned, *facts.holders, *facts.as_interfaces))
 
 
 def unused(report: Report, pou: Pou, uses: Uses) -> None:

@@ -155,6 +155,11 @@ class Context:
                 found.setdefault(meant, []).append(block.identifier)
         return found
 
+    def numbers_of(self, kind: StructType) -> list[int]:
+        """The numbers with which instances of a type begin, and of those derived from it."""
+        return sorted(block.identifier for block in self._blocks.values()
+                      if block.kind != "INTERFACE" and derives(block.type, kind))
+
     # --- global variables -------------------------------------------------------------------------------------------
 
     def global_variable(self, name: str, source: Source) -> Variable | None:

@@ -349,6 +349,8 @@ class Facts:
     labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     failed: set[tree.Expr] = field(default_factory=set)
     """Targets of assignment attempts that get NULL."""
+    attempts: dict[tree.Expr, StructType] = field(default_factory=dict)
+    """Targets of assignment attempts that get the reference if its instance is of this type, else NULL."""
     assigned: set[tree.Call] = field(default_factory=set)
     """Calls whose result is the whole value of an assignment."""
     reversed_bytes: set[tree.Call] = field(default_factory=set)

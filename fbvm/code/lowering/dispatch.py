@@ -7,8 +7,8 @@ outputs and result back."""
 
 from __future__ import annotations
 
-from fbvm.base.types import UDINT
-from fbvm.check.symbols.facts import Pou, PouCall, Variable
+from fbvm.base.types import UDINT, RefType, StructType
+from fbvm.check.symbols.facts import Pou, PouCall, StandardCall, Variable
 from fbvm.code.builder.places import Place
 from fbvm.code.lowering.context import BodyContext
 from fbvm.code.operations import Address, Block, Node
@@ -33,6 +33,31 @@ def call(body: BodyContext, called: PouCall, instance: Place | None, site: int) 
     rows = tuple((tuple((number, number) for number in numbers), _row(body, pou, meant, address))
                  for meant, numbers in found.items())
     return ("case", "u32", instance.moved(0, UDINT).load(), rows, (("stop", _NO_SUCH_TYPE, site),))
+
+
+def attempted(body: BodyContext, reference: Node, wanted: StructType, site: int) -> Node:
+    """A reference to an instance if that is of a type, or derived from it, else NULL.
+
+    wanted: the type of a block, or of what an interface refers to."""
+    held = body.to_temporary(reference)
+    result = body.to_temporary(("const", "ref", 0), always=True)
+    found: Block = (("let", result[2], "ref", held),)
+    labels = tuple((number, number) for number in body.checker.numbers_of(wanted))
+    number = Place((("ref", held, site), 0, ()), UDINT).load()
+    asked: Block = (("case", "u32", number, ((labels, found),), ()),) if labels else ()
+    body.emit(("if", ((("ne", "b", "ref", held, ("const", "ref", 0)), asked),), ()))
+    return result
+
+
+def query(body: BodyContext, called: StandardCall, site: int) -> Node:
+    """__QUERYINTERFACE(object, target) and __QUERYPOINTER: whether the object is of the target's type; the target refers to it
+    then, and is NULL otherwise."""
+    (source, _), (target, kind) = called.arguments
+    assert isinstance(kind, RefType) and isinstance(kind.target, StructType)
+    place = body.reusable(body.place(target))
+    result = attempted(body, body.value(source, kind), kind.target, site)
+    body.write(place, result, site)
+    return body.to_temporary(("ne", "b", "ref", result, ("const", "ref", 0)))
 
 
 def _row(body: BodyContext, named: Pou, meant: Pou, address: Address | None) -> Block:

@@ -58,8 +58,11 @@ class ArraySpec(TypeSpec):
 
 @_node
 class StructSpec(TypeSpec):
+    """`STRUCT .. END_STRUCT`, of a type that EXTENDS `bases` behind the members of these."""
+
     members: tuple[VarDecl, ...]
     overlap: bool = False
+    bases: tuple[NamedType, ...] = ()
 
 
 @_node
