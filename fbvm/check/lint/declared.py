@@ -35,7 +35,9 @@ class Uses:
 def unused(report: Report, pou: Pou, uses: Uses) -> None:
     """Warn of variables of a POU that it does not use; a name that begins with `_` is unused on purpose."""
     for variable in pou.order:
-        if variable.owner is not pou or variable.kind not in OWN or " " in variable.name or variable.name.startswith("_") or variable.constant:
+        if variable.owner is not pou or variable.kind not in OWN or variable.constant:
+            continue
+        if " " in variable.name or variable.name.startswith("_"):
             continue
         if _instance(variable.type):
             never_called(report, variable, uses)

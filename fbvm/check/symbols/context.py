@@ -14,8 +14,8 @@ from fbvm.base.dialects import Dialect
 from fbvm.base.types import EnumType, RefType, StructType, Type, derives, fold
 from fbvm.check.symbols.dependencies import Dependencies, Key, has_lasting_body, key_of
 from fbvm.check.symbols.elementary_types import elementary_type
-from fbvm.check.symbols.facts import Facts, Pou, StandardCall, TaskFact, Value, Variable, list_name
-from fbvm.check.symbols.project import Project, Resolved, TypeEntry
+from fbvm.check.symbols.facts import Facts, Pou, StandardCall, TaskFact, Value, Variable
+from fbvm.check.symbols.project import Project, Resolved, TypeEntry, list_name
 from fbvm.check.symbols.statement_lists import writes_eno
 from fbvm.syntax import tree
 

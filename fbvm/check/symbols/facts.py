@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TypeGuard
 
 from fbvm.base.areas import Address
@@ -438,11 +437,6 @@ def is_open(location: tree.Location, kind: Type) -> bool:
 _LEVELS = re.compile(r"%[IQM](?:[BWDL]\d+(?:\.\d+){2,}|X?\d+(?:\.\d+){2,})", re.I)
 _WORD_LEVELS = re.compile(r"%[IQM][BWDL]\d+\.\d+", re.I)
 """With a BOOL it is a bit of that byte or word."""
-
-
-def list_name(source: Source) -> str:
-    """The folded name under which programs know the global variables of a source: that of its file."""
-    return fold(Path(source.name).stem)
 
 
 def holds_block(kind: Type) -> bool:

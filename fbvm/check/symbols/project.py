@@ -10,13 +10,14 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.symbols.dependencies import Dependencies, Key
-from fbvm.check.symbols.facts import Facts, Pou, Variable, list_name
+from fbvm.check.symbols.facts import Facts, Pou, Variable
 from fbvm.check.symbols.library import Libraries
 from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
@@ -306,3 +307,8 @@ def _refused_name(node: tree.Refused, source: Source) -> str:
         return fold(source.text[node.start:node.end].split(None, 1)[0].rstrip(":"))
     match = _PART.match(source.text, node.start)
     return fold(match[1]) if match else ""
+
+
+def list_name(source: Source) -> str:
+    """The folded name under which programs know the global variables of a source: that of its file."""
+    return fold(Path(source.name).stem)
