@@ -22,9 +22,9 @@ from fbvm.check.calls import generics
 from fbvm.check.checker import Checker
 from fbvm.check.lint.linter import lint_steps
 from fbvm.check.lint.suppression import ANY, Suppressions
-from fbvm.check.symbols.facts import Report
 from fbvm.check.symbols.library import Libraries, LibraryError
 from fbvm.check.symbols.project import Project
+from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.size_limits import SizeLimits
 from fbvm.code.builder.evaluation import evaluate
 from fbvm.code.compiler.follow_on_errors import FollowOnErrors

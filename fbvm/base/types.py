@@ -121,6 +121,8 @@ class StructType(Type):
     block: bool = False
     other_names: dict[str, str] = field(default_factory=dict, hash=False, compare=False)
     """Names under which a member is known besides its own, folded."""
+    parents: tuple[StructType, ...] = field(default=(), hash=False, compare=False)
+    """What it EXTENDS and IMPLEMENTS, directly."""
 
     def member(self, name: str) -> Field | None:
         folded = fold(name)
@@ -149,11 +151,13 @@ class SubrangeType(Type):
 class RefType(Type):
     """REF_TO target, or POINTER TO target, which `moves` by arithmetic; `target` None is the type of NULL.
 
-    What is declared REFERENCE TO target `follows`: wherever it is named, what it is bound to is meant."""
+    What is declared REFERENCE TO target `follows`: wherever it is named, what it is bound to is meant.  A variable of an
+    `interface` holds a reference to an instance that implements it; its target has methods and no variables."""
 
     target: Type | None
     moves: bool = False
     follows: bool = False
+    interface: bool = False
 
 
 _PARENTS = {
@@ -229,6 +233,16 @@ def pointer(target: Type) -> RefType:
 def bound(target: Type) -> RefType:
     """REFERENCE TO target."""
     return RefType(f"REFERENCE TO {target.name}", 8, 8, target, follows=True)
+
+
+def interface(target: StructType) -> RefType:
+    """A variable of an INTERFACE, whose methods `target` has."""
+    return RefType(target.name, 8, 8, target, interface=True)
+
+
+def derives(kind: Type | None, target: Type | None) -> bool:
+    """True if both are one type, or `kind` is a block or structure that extends or implements `target`, at whatever depth."""
+    return kind == target or isinstance(kind, StructType) and any(derives(parent, target) for parent in kind.parents)
 
 
 def followed(kind: Type) -> Type:
@@ -333,7 +347,8 @@ def converts(source: Type, target: Type) -> bool:
         return source is character(target)
     if isinstance(source, RefType) and isinstance(target, RefType):
         return source.follows == target.follows and (
-            source.target is None or source.target == target.target or source.moves and target.moves)
+            source.target is None or source.moves and target.moves or
+            source.interface == target.interface and derives(source.target, target.target))
     return isinstance(source, Elementary) and target.name in IMPLICIT.get(source.name, ()) \
         and isinstance(target, Elementary)
 

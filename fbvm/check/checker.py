@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from fbvm.check.calls import calls, generics
-from fbvm.check.declarations import globals, interfaces, specs, variables
+from fbvm.check.declarations import globals, inheritance, interfaces, specs, variables
 from fbvm.check.declarations.configurations import Configurations
 from fbvm.check.declarations.var_config import VarConfig
 from fbvm.check.expressions import references, rules
@@ -26,6 +26,7 @@ RULES = Rules(
     interface=interfaces.resolve_interface,
     later_constant=variables.later_constant,
     body=check_body,
+    members=inheritance.check_members,
 )
 
 
@@ -77,22 +78,32 @@ class Checker(Context):
         for start in self.facts.starts[first:]:
             references.check_initial(Scope(self, start.source, start.pou), start)
 
+    def _callees(self, pou: Pou) -> dict[Pou, None]:
+        """The POUs whose bodies a POU may execute by its calls."""
+        meant = [found for named in pou.dynamic_calls for found in self.candidates(named)]
+        return dict.fromkeys((*pou.calls, *meant))
+
     def _report_recursion(self) -> None:
         """Report POUs that call themselves, directly or through others (7.2)."""
+        def node_of(caller: Pou, callee: Pou) -> tree.Node:
+            """The call by which one POU executes another."""
+            return next((node for named, node in caller.dynamic_calls.items() if callee in self.candidates(named)),
+                        None) or caller.calls[callee]
+
         done: set[Pou] = set()
         path: list[Pou] = []
 
         def visit(pou: Pou) -> None:
             if pou in path:
                 ring = [p.name for p in path[path.index(pou):]] + [pou.name]
-                self.report.add("S0408", path[-1].source, path[-1].calls[pou],
+                self.report.add("S0408", path[-1].source, node_of(path[-1], pou),
                                 f"{' calls '.join(ring)}: calls must not come back", "use a loop")
                 return
             if pou in done:
                 return
             done.add(pou)
             path.append(pou)
-            for callee in pou.calls:
+            for callee in self._callees(pou):
                 visit(callee)
             path.pop()
 

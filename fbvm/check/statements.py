@@ -6,16 +6,16 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 
 from fbvm.base.dialects import takers
-from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base
+from fbvm.base.types import BOOL, EnumType, RefType, StringType, StructType, Type, base
 from fbvm.check import charts
 from fbvm.check.calls import calls
-from fbvm.check.expressions import references
+from fbvm.check.expressions import objects, references
 from fbvm.check.expressions.assignability import as_number, assignable, conversion_hint
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.expressions.writes import place, warn_of_written_counter, writable
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Pou, Value
+from fbvm.check.symbols.facts import Pou, Value, is_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree import il, ladder, sfc
 
@@ -43,6 +43,10 @@ class _Statements:
 
     def target(self, expr: tree.Expr, purpose: str = "be written") -> Type | None:
         """The type of a place that is written, or None after a diagnostic."""
+        if purpose == "be written":
+            is_property, taken = objects.target_property(self.scope, expr)
+            if is_property:
+                return taken
         kind = self.scope.infer(expr)
         if kind is None:
             return None
@@ -73,6 +77,8 @@ class _Statements:
             return
         if isinstance(node.value, tree.Call):
             self.facts.assigned.add(node.value)
+        if len(node.targets) > 1 and any(target in self.facts.sets for target in node.targets):
+            self.error("S1008", node.targets[0], "one of several targets is a property", "assign to it by itself")
         self.scope.fit(node.value, last)
         for kind, value, value_kind in zip(kinds, node.targets[1:], kinds[1:], strict=False):
             if kind is not None and value_kind is not None and not assignable(value_kind, kind):
@@ -80,18 +86,30 @@ class _Statements:
                            conversion_hint(value_kind, kind))
 
     def _attempt(self, node: tree.Assign, kinds: list[Type | None]) -> None:
-        """`r ?= s`: r becomes s if the types agree, else NULL; without classes the compiler knows which."""
+        """`r ?= s`: r becomes s if the types agree, else NULL; of references to instances the program finds out which."""
         kind = self.scope.infer(node.value, kinds[-1])
         for target, wanted in zip(node.targets, kinds, strict=True):
             if wanted is None or kind is None:
                 continue
+            if isinstance(wanted, RefType) and wanted.interface and is_block(kind):
+                if assignable(kind, wanted):
+                    self.scope.fit(node.value, wanted)
+                else:
+                    self.facts.failed.add(target)
+                continue
             if not isinstance(wanted, RefType) or not isinstance(kind, RefType):
                 wrong, shown = (target, wanted) if not isinstance(wanted, RefType) else (node.value, kind)
                 self.error("S0301", wrong, f"?= tries a reference, this is {shown}", "write := for values")
+            elif wanted.target is not None and is_block(wanted.target) and kind.target is not None and is_block(kind.target):
+                assert isinstance(wanted.target, StructType)
+                self.facts.attempts[target] = wanted.target
             elif not assignable(kind, wanted):
                 self.facts.failed.add(target)
 
     def _set_or_reset(self, node: tree.Assign, kinds: list[Type | None]) -> None:
+        for target in node.targets:
+            if target in self.facts.sets:
+                self.error("S1008", target, f"{node.op} works on a variable, and this is a property", "write IF and :=")
         for target, kind in zip(node.targets, kinds, strict=True):
             if kind is not None and base(kind) != BOOL:
                 self.error("S0301", target, f"{node.op} sets a BOOL; this is {kind}")

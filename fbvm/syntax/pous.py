@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
 
 from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.st.declarations import Settings
 from fbvm.syntax.st.jumps import Jumps, Tangled
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.st.refused import refused_what
-from fbvm.syntax.st.statements import Items
+from fbvm.syntax.st.statements import Items, Members
 from fbvm.syntax.tree import (
     AccessVars,
     Action,
@@ -24,15 +25,24 @@ from fbvm.syntax.tree import (
     RefusedStatement,
     SourceText,
     TypeSpec,
+    VarDecl,
     VarSection,
 )
 from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Step, Transition
 
-Head = tuple[Name, list[Refused]]
 Section = VarSection | Refused | Settings
-Element = Action | Step | Transition | Refused
+Element = Action | Step | Transition | Refused | Members
+
+
+class Head(NamedTuple):
+    """The head of a POU: its name, the words in front of that, and what it EXTENDS and IMPLEMENTS."""
+
+    name: Name
+    modifiers: tuple[Name, ...]
+    bases: tuple[NamedType, ...]
+    interfaces: tuple[NamedType, ...]
 
 
 class SourceBuilder(SfcElements):
@@ -43,15 +53,15 @@ class SourceBuilder(SfcElements):
 
     # --- heads ---
 
-    def add_inheritance(self, refused: list[Refused], word: Token, names: list[NamedType]) -> list[Refused]:
-        what, code = refused_what(word.text)
-        refused.append(Refused(word.start, names[-1].end, what, code))
-        return refused
+    def add_inheritance(self, parts: list[tuple[str, NamedType]], word: Token,
+                        names: list[NamedType]) -> list[tuple[str, NamedType]]:
+        parts += [(word.text.upper(), name) for name in names]
+        return parts
 
-    def pou_head(self, modifiers: list[Token], token: Token, inheritance: list[Refused]) -> Head:
-        """The name of a POU, and the parts of its head that are refused.  FINAL and the access words PUBLIC, PRIVATE ... are
-        not among these: they change nothing that the POU does."""
-        return self.declared(token), [*(self.refused(m) for m in modifiers if m.text.upper() == "ABSTRACT"), *inheritance]
+    def pou_head(self, modifiers: list[Token], token: Token, inheritance: list[tuple[str, NamedType]]) -> Head:
+        words = tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers)
+        return Head(self.declared(token), words, tuple(each for word, each in inheritance if word == "EXTENDS"),
+                    tuple(each for word, each in inheritance if word == "IMPLEMENTS"))
 
     # --- POUs ---
 
@@ -61,12 +71,12 @@ class SourceBuilder(SfcElements):
 
     def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None,
                  sections: list[Section], items: Items, elements: list[Element], end: Token) -> Pou:
-        name, refused = head
+        refused: list[Refused] = []
         accesses = tuple(each for each in sections if isinstance(each, AccessVars) and word.type == "PROGRAM")
         refused += [_out_of_place(part) for part in (*sections, *elements)
-                    if part not in accesses and not isinstance(part, VarSection | Action | Step | Transition)]
-        body = self.block(_without_blocks(items, refused))
-        self.refuse_self_references()
+                    if part not in accesses and not isinstance(part, VarSection | Action | Step | Transition | Members)]
+        methods = [method for each in (*items, *elements) if isinstance(each, Members) for method in each.methods]
+        body = self.block([each for each in _without_blocks(items, refused) if not isinstance(each, Members)])
         declared = [each for each in sections if isinstance(each, VarSection)]
         actions = [each for each in elements if isinstance(each, Action)]
         self._add_ladders(word, actions, declared)
@@ -75,8 +85,66 @@ class SourceBuilder(SfcElements):
         body = self._without_jumps(body, declared)
         if self.charted or any(isinstance(each, Step | Transition) for each in elements):
             body, actions = self._charts(word, body, elements, actions, declared)
-        return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused), tuple(actions),
-                   accesses)
+        return Pou(word.start, end.end, word.text.upper(), head.name, result, tuple(declared), body, tuple(refused),
+                   tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods))
+
+    def interface(self, word: Token, head: Head, members: list[Members], end: Token) -> Pou:
+        methods = tuple(method for each in members for method in each.methods)
+        return Pou(word.start, end.end, "INTERFACE", head.name, None, (), (), modifiers=head.modifiers, bases=head.bases,
+                   interfaces=head.interfaces, methods=methods)
+
+    # --- methods and properties ---
+
+    def method(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None, sections: list[Section],
+               items: Items, end: Token) -> Members:
+        with self._apart(word.start):
+            made = self.function(word, head, colon, result, sections, items, [], end)
+        return Members(word.start, end.end, (made,))
+
+    def accessor(self, modifiers: list[Token], word: Token, sections: list[Section], items: Items, end: Token) -> Pou:
+        """GET or SET of a property, whose name and type `property` puts in."""
+        start = modifiers[0].start if modifiers else word.start
+        head = Head(self.name(word), tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers), (), ())
+        with self._apart(start):
+            made = self.function(word, head, None, None, sections, items, [], end)
+        if end.text.upper() != f"END_{word.text.upper()}":
+            self.report("S0101", end.start, end.end, f"END_{word.text.upper()} expected, but {end.text} found", "")
+        return made
+
+    def property(self, word: Token, head: Head, colon: Token, spec: TypeSpec, accessors: list[Pou], end: Token) -> Members:
+        methods: list[Pou] = []
+        for each in accessors:
+            value = VarDecl(head.name.start, spec.end, (head.name,), None, spec, None)
+            sections = (VarSection(head.name.start, spec.end, "VAR_INPUT", (), (value,), True), *each.sections)
+            own = tuple(word.text for word in each.modifiers)
+            modifiers = (*(word for word in head.modifiers if not (own and word.text in _ACCESS)), *each.modifiers)
+            getting = each.kind == "GET"
+            if any(known.kind == each.kind for known in methods):
+                self.report("S0101", each.start, each.end, f"{head.name.text} has two {each.kind}", "")
+                continue
+            methods.append(Pou(head.name.start, each.end, each.kind, head.name, spec if getting else None,
+                               each.sections if getting else sections, each.body, each.refused, modifiers=modifiers))
+        if not accessors:
+            self.report("S0101", head.name.start, head.name.end, f"the PROPERTY {head.name.text} has neither GET nor SET",
+                        "write GET .. END_GET, SET .. END_SET, or both")
+        return Members(word.start, end.end, tuple(methods))
+
+    @contextmanager
+    def _apart(self, start: int) -> Iterator[None]:
+        """Build what was read from `start` on as a POU of its own, inside the POU that is being read."""
+        ladders, lists, targets, labels = self.ladders, self.lists, self.targets, self.labels
+        blocks, numbered, charted = dict(self.blocks), self.numbered, self.charted
+        self.ladders = [each for each in ladders if each.start >= start]
+        self.lists = [each for each in lists if each.start >= start]
+        self.targets = {each: name for each, name in targets.items() if each.start >= start}
+        self.labels = {each: name for each, name in labels.items() if each.start >= start}
+        self.charted = {}
+        yield
+        self.ladders = [each for each in ladders if each.start < start]
+        self.lists = [each for each in lists if each.start < start]
+        self.targets = {each: name for each, name in targets.items() if each.start < start}
+        self.labels = {each: name for each, name in labels.items() if each.start < start}
+        self.blocks, self.numbered, self.charted = blocks, numbered, charted
 
     def _add_ladders(self, word: Token, actions: list[Action], declared: list[VarSection]) -> None:
         """Add to `actions` the subroutines of the POU's LADDERs, and to `declared` what their rungs need."""
@@ -113,7 +181,7 @@ class SourceBuilder(SfcElements):
         from fbvm.syntax.sfc.charts import Charts
 
         charts = Charts(self, actions, declared)
-        body = charts.body(word, body, [each for each in elements if not isinstance(each, Refused)])
+        body = charts.body(word, body, [each for each in elements if not isinstance(each, Refused | Members)])
         declared += charts.sections
         return body, charts.actions
 
@@ -146,7 +214,6 @@ class SourceBuilder(SfcElements):
     def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None, items: Items,
                end: Token) -> Action:
         body = self.block(items)
-        self.refuse_self_references()
         return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
 
     def action_chart(self, word: Token, token: Token, colon: Token, items: Items, parts: list[Part], end: Token) -> Action:
@@ -161,17 +228,20 @@ class SourceBuilder(SfcElements):
                        tuple(a for a in actions if isinstance(a, Action)), tuple(a for a in actions if isinstance(a, Refused)))
 
 
+_ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
+
+
 def _without_blocks(items: Items, refused: list[Refused]) -> Items:
-    """A list of statements without METHODs and the like, which are added to `refused`: these belong to the POU, not to its
-    body."""
+    """A list of statements without NAMESPACEs and the like, which are added to `refused`: these belong to the POU, not to
+    its body."""
     blocks = [item for item in items if isinstance(item, RefusedStatement) and _is_block(item)]
     refused += [Refused(block.start, block.end, block.what, block.code) for block in blocks]
     return [item for item in items if item not in blocks] if blocks else items
 
 
 def _is_block(statement: RefusedStatement) -> bool:
-    """Whether a refused statement is a METHOD or the like."""
-    return statement.what not in ("THIS", "SUPER", "JMP", "__TRY") and not statement.what.startswith("label")
+    """Whether a refused statement is a NAMESPACE or the like."""
+    return statement.what not in ("JMP", "__TRY") and not statement.what.startswith("label")
 
 
 def _out_of_place(item: Refused | Settings) -> Refused:

@@ -18,8 +18,8 @@ from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.files import reason
 from fbvm.base.types import fold
 from fbvm.check.lint.suppression import ANY, Wanted
-from fbvm.check.symbols.facts import Report
 from fbvm.check.symbols.library import Libraries
+from fbvm.check.symbols.report import Report
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.interchange.formats.given import within

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, EnumType, RefType, StringType, Type, fold, followed
+from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, EnumType, RefType, StringType, Type, derives, fold, followed
 from fbvm.check.calls.arguments import MIXED, MIXED_HINT, mixed, output
 from fbvm.check.expressions import references
 from fbvm.check.expressions.assignability import same
@@ -21,7 +21,7 @@ PARAMETER_KINDS = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 
 def bind(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
     """Match the arguments of a call with the parameters of a POU; report those that do not fit or are missing."""
-    scope.note_call(pou, call)
+    scope.note_call(pou, call, bound.dynamic)
     other = mixed(call, scope.dialect)
     if other is not None:
         scope.error("S0406", other, MIXED, MIXED_HINT)
@@ -159,7 +159,7 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
         return False
     numbers = scope.dialect.numbers_of_enumerations
     if not same(kind.base if numbers and isinstance(kind, EnumType) else kind, variable.type) and \
-            not _long_enough(kind, variable):
+            not _long_enough(kind, variable) and not (is_block(variable.type) and derives(kind, variable.type)):
         hint = "an in-out takes a variable of exactly its own type"
         if variable.by_reference:
             hint = "an input that is read where it lies takes a variable of exactly its own type"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from fbvm.base.dialects import takers
-from fbvm.base.types import ArrayType, StructType, Type, fold
-from fbvm.check.calls import generics, standard
+from fbvm.base.types import ArrayType, RefType, StructType, Type, fold
+from fbvm.check.calls import generics, methods, standard
 from fbvm.check.calls.binding import bind, bind_inputs
-from fbvm.check.expressions import names, qualified
+from fbvm.check.expressions import names, objects, qualified
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Pou, PouCall
@@ -37,6 +37,11 @@ def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -
     name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(scope, callee)
     if (named := action(scope, callee)) is not None:
         return _bind_action(scope, call, named)
+    is_method, result = methods.call(scope, call)
+    if is_method:
+        return result
+    if objects.is_self(scope, callee):
+        return _instance(scope, call, as_value)
     if name is None or variable is not None and variable.kind != "RESULT":
         return _instance(scope, call, as_value)
     pou = scope.project.pou(name, scope.source)
@@ -62,28 +67,28 @@ def action(scope: Scope, callee: tree.Expr) -> tuple[Pou, tree.Expr | None] | No
         return None
     name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(scope, callee)
     if name is not None:
-        home = scope.pou.owner if scope.pou is not None else None
-        own = home.actions.get(fold(name)) if home is not None else None
+        home = scope.pou.own_block if scope.pou is not None else None
+        own = home.action(fold(name)) if home is not None else None
         return (own, None) if own is not None else None
     if not isinstance(callee, tree.Member):
         return None
-    kind = scope.infer(callee.of)
-    if not isinstance(kind, StructType) or not kind.block:
+    kind = objects.instance_of(scope, callee.of)
+    if kind is None:
         return None
-    of_instance = scope.context.block_of(kind).actions.get(fold(callee.name.text))
+    of_instance = scope.context.block_of(kind).action(fold(callee.name.text))
     return (of_instance, callee.of) if of_instance is not None else None
 
 
 def _bind_action(scope: Scope, call: tree.Call, found: tuple[Pou, tree.Expr | None]) -> str:
     called, instance = found
-    bound = PouCall(called, instance)
+    bound = PouCall(called, instance, dynamic=objects.may_be_derived(scope, instance))
     if call.arguments and scope.dialect.action_inputs and instance is not None and called.home is not None:
         bind_inputs(scope, call, called.home, bound)
     elif call.arguments:
         scope.error("S0402", call.arguments[0], f"the ACTION {called.tree.name.text} has no parameters",
                     "write the inputs of its instance first" +
                     (f", or take {takers('action_inputs')}" if instance is not None else ""))
-    scope.note_call(called, call)
+    scope.note_call(called, call, bound.dynamic)
     scope.facts.calls[call] = bound
     return ""
 
@@ -96,8 +101,13 @@ def _arguments_alone(scope: Scope, call: tree.Call) -> None:
 
 
 def _instance(scope: Scope, call: tree.Call, as_value: bool) -> Type | str | None:
-    kind = scope.infer(call.callee)
+    kind = objects.instance_of(scope, call.callee) if objects.is_self(scope, call.callee) else scope.infer(call.callee)
     if kind is None:
+        _arguments_alone(scope, call)
+        return None
+    if isinstance(kind, RefType) and kind.interface:
+        scope.error("S0401", call.callee, f"{_shown(call.callee)} is an interface and has no body to call",
+                    "call one of its methods: name.method()")
         _arguments_alone(scope, call)
         return None
     if not isinstance(kind, StructType) or not kind.block:
@@ -113,7 +123,11 @@ def _instance(scope: Scope, call: tree.Call, as_value: bool) -> Type | str | Non
         return None
     if as_value:
         return ""
-    bound = PouCall(pou, call.callee)
+    if pou.kind == "CLASS":
+        scope.error("S0401", call.callee, f"{pou.name} is a CLASS and has no body to call",
+                    "call one of its methods: name.method()")
+        return None
+    bound = PouCall(pou, call.callee, dynamic=objects.may_be_derived(scope, call.callee))
     variable = scope.facts.variables.get(call.callee)
     if variable is not None and variable.owner is not None:
         bound.tasked = variable.owner.tasked.get(variable)

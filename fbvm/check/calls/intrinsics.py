@@ -5,21 +5,21 @@ Source: IEC 61131-3 ed. 3 table 15, and the operators of CODESYS, of which some 
 from __future__ import annotations
 
 from fbvm.base.areas import FLAG_AREAS
-from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, Type, string
+from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, RefType, StructType, Type, string
 from fbvm.check.calls.arguments import Arguments
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
-from fbvm.check.symbols.facts import UNTYPED_INT, StandardCall
+from fbvm.check.expressions.writes import writable
+from fbvm.check.symbols.facts import UNTYPED_INT, StandardCall, is_block
 from fbvm.syntax import tree
 
 _PARAMETERS = {"SIZEOF": ["IN"], "XSIZEOF": ["IN"], "LOWER_BOUND": ["ARR", "DIM"], "UPPER_BOUND": ["ARR", "DIM"],
-               "__ISVALIDREF": ["REF"], "__POUNAME": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"]}
+               "__ISVALIDREF": ["REF"], "__POUNAME": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"],
+               "__QUERYINTERFACE": ["ITFOBJECT", "ITFDST"], "__QUERYPOINTER": ["ITFOBJECT", "PDST"]}
 _NO_HEAP = "makes and ends variables while the program runs, and here each has its place before that"
-_QUERY = "asks for the type of an object, and there are none"
 REFUSED = {
     "__NEW": ("S0901", _NO_HEAP, "declare the variables, or an ARRAY of them, and point at one with ADR"),
     "__DELETE": ("S0901", _NO_HEAP, "declare the variables, or an ARRAY of them, and point at one with ADR"),
-    "__QUERYINTERFACE": ("S0902", _QUERY, ""), "__QUERYPOINTER": ("S0902", _QUERY, ""),
     "INDEXOF": ("S0901", "gives the number of a POU in the runtime system of CODESYS", "no program here needs it"),
     "ADRINST": ("S0901", "gives the place of the own instance", "pass the instance as VAR_IN_OUT"),
     "INI": ("S0901", "gives RETAIN variables of an instance their first values again", "assign these in the program"),
@@ -48,6 +48,8 @@ def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | None:
         return string(max(1, len(shown)))
     if name == "__ISVALIDREF":
         return _is_bound(scope, call, values[0])
+    if name in ("__QUERYINTERFACE", "__QUERYPOINTER"):
+        return _query(scope, call, name, values[0], values[1])
     if name == "BITADR":
         return _bit_address(scope, call, values[0])
     if name == "__PLC_ADDRESS":
@@ -66,6 +68,27 @@ def _is_bound(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
         scope.error("S0405", value, "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
         return None
     scope.facts.calls[call] = StandardCall("__ISVALIDREF", [(value, kind)])
+    return BOOL
+
+
+def _query(scope: Scope, call: tree.Call, name: str, source: tree.Expr, target: tree.Expr) -> Type | None:
+    """__QUERYINTERFACE(object, interface) and __QUERYPOINTER(object, pointer): BOOL, whether the object is of that type."""
+    kind, wanted = scope.infer(source), scope.infer(target)
+    if kind is None or wanted is None:
+        return None
+    what = "a variable of an interface" if name == "__QUERYINTERFACE" else "a POINTER TO a block"
+    if not isinstance(wanted, RefType) or wanted.interface != (name == "__QUERYINTERFACE") or wanted.target is None or \
+            not is_block(wanted.target) or not scope.is_variable(target):
+        scope.error("S0405", target, f"{name} writes {what}, this is {wanted}")
+        return None
+    if isinstance(kind, StructType) and kind.block:
+        scope.refer_to(source, kind)
+    elif not (isinstance(kind, RefType) and kind.interface):
+        scope.error("S0405", source, f"{name} asks an instance or an interface, this is {kind}")
+        return None
+    if not writable(scope, target, "be written"):
+        return None
+    scope.facts.calls[call] = StandardCall("__QUERY", [(source, kind), (target, wanted)])
     return BOOL
 
 

@@ -9,8 +9,8 @@ from fbvm.check.declarations.variables import check_qualifiers, initialized, mak
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.dependencies import Dependencies, Key
-from fbvm.check.symbols.facts import is_open, list_name
-from fbvm.check.symbols.project import GlobalDeclaration, Project
+from fbvm.check.symbols.facts import is_open
+from fbvm.check.symbols.project import GlobalDeclaration, Project, list_name
 
 
 def enroll(context: Context) -> None:

@@ -13,6 +13,7 @@ from fbvm.check.expressions.constants import decode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
+from fbvm.syntax.tree.node import changed
 
 
 def replace_by_values(scope: Scope, expr: tree.Expr) -> bool:
@@ -56,9 +57,7 @@ def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
         assert isinstance(each.initial, tree.Expr)
         targets = [tree.NameRef(name.start, name.end, name.text) for name in each.names]
         assigned += [tree.Assign(target.start, each.initial.end, (target,), ":=", each.initial) for target in targets]
-    old = pou.tree
-    return tree.Pou(old.start, old.end, old.kind, old.name, old.result, old.sections, (*assigned, *old.body), old.refused,
-                    old.actions, old.accesses)
+    return changed(pou.tree, body=(*assigned, *pou.tree.body))
 
 
 def _initial_value(scope: Scope, place: tree.Expr) -> tuple[Type, bytes] | None:

@@ -21,6 +21,7 @@ from fbvm.base.types import (
     followed,
 )
 from fbvm.check.declarations import initializers
+from fbvm.check.declarations.inheritance import refuse_abstract, resolve_head
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.declarations.variables import check_qualifiers, initialized, is_constant, make_variable, type_of
 from fbvm.check.expressions.scope import Scope
@@ -61,6 +62,10 @@ class _Interface:
     def resolve(self) -> None:
         """Fill in the variables and the layout."""
         pou = self.pou
+        if pou.block is None:
+            resolve_head(self.context, pou)
+        if pou.base is not None:
+            self._inherit(pou.base)
         pou.later = {fold(name.text): (declared, section) for section in pou.tree.sections if section.kind != "VAR_EXTERNAL"
                      for declared in section.variables for name in declared.names}
         for section in pou.tree.sections:
@@ -77,13 +82,22 @@ class _Interface:
             eno = Variable("ENO", BOOL, "VAR_OUTPUT", pou.source, pou.tree.name, pou, initial=b"\x01")
             self._register(eno)
             pou.enables_itself = True
-        if pou.is_function:
+        if pou.is_routine:
             self._frame([v for v in pou.order if v.place == "self"])
         else:
+            self._methods()
             self._frame(pou.parameters("VAR_TEMP"))
             self._instance()
         for action, source in pou.written_actions:
             self._action(action, source)
+
+    def _inherit(self, base: Pou) -> None:
+        """Take over the variables of the block that this one extends: they come first, where they lie in that."""
+        pou = self.pou
+        pou.variables = {name: v for name, v in base.variables.items() if v.kind not in ("VAR_TEMP", "VAR_EXTERNAL")}
+        pou.order = [variable for variable in base.order if variable.kind != "VAR_TEMP"]
+        pou.edges = list(base.edges)
+        pou.other_names = {**base.other_names, **pou.other_names}
 
     def _error(self, code: str, node: tree.Node, message: str, hint: str = "",
                related: tuple[Source, int, str] | None = None) -> None:
@@ -111,10 +125,56 @@ class _Interface:
             pou.actions[name] = Pou(f"{pou.name}.{action.name.text}", "ACTION", source, body, pou.variables, type=pou.type,
                                     resolved=True, failed_names=pou.failed_names, inherits=pou.inherits, home=pou)
 
+    # --- methods ----------------------------------------------------------------------------------------------------
+
+    def _methods(self) -> None:
+        """Make the POUs of methods and accessors, and the variables that each of them keeps in the instance."""
+        pou = self.pou
+        if pou.is_function and pou.tree.methods:
+            self._error("S0205", pou.tree.methods[0].name, "a FUNCTION has no METHOD", "make it a FUNCTION_BLOCK")
+            return
+        for written in pou.tree.methods:
+            name, shown = fold(written.name.text), f"{pou.name}.{written.name.text}"
+            key = name if written.kind == "METHOD" else f"{written.kind} {name}"
+            others = (name, f"GET {name}", f"SET {name}") if written.kind == "METHOD" else (name, key)
+            clash = pou.variables.get(name)
+            if clash is not None or any(other in pou.methods for other in others) or name in pou.actions:
+                self._error("S1005", written.name, f"{written.name.text} is declared twice in {pou.name}",
+                            "variables, actions, methods and properties of a block share their names")
+                continue
+            made = Pou(shown if written.kind == "METHOD" else f"{shown}.{written.kind.capitalize()}", written.kind, pou.source,
+                       written, block=pou, modifiers=frozenset(word.text for word in written.modifiers))
+            pou.methods[key] = made
+            for refused in written.refused:
+                self.context.report.refuse(pou.source, refused)
+            for section in written.sections:
+                if section.kind == "VAR_INST":
+                    self._kept(made, section)
+
+    def _kept(self, method: Pou, section: tree.VarSection) -> None:
+        """The variables of VAR_INST: they lie in the instance, and only their method sees them."""
+        check_qualifiers(self.context.report, section, self.pou.source, "FUNCTION_BLOCK")
+        for declared in section.variables:
+            resolved = self._resolved(declared, section)
+            for name in declared.names:
+                if resolved is None:
+                    method.failed_names.add(fold(name.text))
+                    continue
+                made = make_variable(self.context, declared, name, section, self.pou.source, resolved)
+                made.owner = self.pou
+                if fold(name.text) in method.variables:
+                    self._error("S0202", name, f"{name.text} is declared twice in {method.name}")
+                    continue
+                method.variables[fold(name.text)] = made
+                made.name = f"{method.tree.name.text}.{name.text}"
+                self.pou.order.append(made)
+
     # --- sections ---------------------------------------------------------------------------------------------------
 
     def _is_allowed(self, section: tree.VarSection) -> bool:
         """True for a section that a POU of this kind may have; else a diagnostic."""
+        if section.kind == "VAR_INST" and self.pou.block is not None:
+            return False  # the instance has them
         if section.kind in _SECTIONS:
             check_qualifiers(self.context.report, section, self.pou.source, self.pou.kind)
             return True
@@ -146,8 +206,10 @@ class _Interface:
             made = make_variable(self.context, declared, name, section, self.pou.source, resolved)
             made.owner = self.pou
             self._pass_by_reference(made, section)
-            if is_block(made.type) and made.kind == "VAR_OUTPUT" and self.pou.is_function:
-                self._error("S0901", name, f"an instance as {section.kind} of a FUNCTION is understood but not "
+            if made.kind != "VAR_IN_OUT":
+                refuse_abstract(self.context, made.type, self.pou.source, name)
+            if is_block(made.type) and made.kind == "VAR_OUTPUT" and self.pou.is_routine:
+                self._error("S0901", name, f"an instance as {section.kind} of a {self.pou.kind} is understood but not "
                             "executed by this version", "pass it as VAR_IN_OUT")
             self._place(made, declared)
             self._register(made)
@@ -162,7 +224,7 @@ class _Interface:
         resolved = type_of(self.scope, declared)
         if resolved is None or declared.initial is None:
             return resolved
-        in_frame = section.kind == "VAR_TEMP" or self.pou.is_function and section.kind in ("VAR", "VAR_OUTPUT")
+        in_frame = section.kind == "VAR_TEMP" or self.pou.is_routine and section.kind in ("VAR", "VAR_OUTPUT")
         if not in_frame or is_constant(section):
             return initialized(self.scope, declared, resolved)
         if self.scope.dialect.initial_variables and initializers.varies(self.scope, declared.initial):
@@ -186,7 +248,7 @@ class _Interface:
 
     def _is_open_input(self, made: Variable) -> bool:
         """True for an input ARRAY [*] of a FUNCTION, which reads the argument where it lies and may not write it."""
-        return isinstance(made.type, OpenArrayType) and self.pou.is_function and not self.scope.dialect.no_open_inputs
+        return isinstance(made.type, OpenArrayType) and self.pou.is_routine and not self.scope.dialect.no_open_inputs
 
     def _place(self, variable: Variable, declared: tree.VarDecl) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
@@ -194,10 +256,10 @@ class _Interface:
         variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
         if variable.kind == "VAR_STAT":
             variable.place = "abs"  # one for all instances and calls
-        elif variable.kind == "VAR_TEMP" or self.pou.is_function:
-            variable.place = "self" if self.pou.is_function else "frame"
+        elif variable.kind == "VAR_TEMP" or self.pou.is_routine:
+            variable.place = "self" if self.pou.is_routine else "frame"
         if declared.location is not None:
-            located = variable.kind in _LOCATED and not self.pou.is_function
+            located = variable.kind in _LOCATED and not self.pou.is_routine
             if located and is_open(declared.location, variable.type):
                 self._place_by_var_config(variable, declared.location)
             else:
@@ -225,7 +287,7 @@ class _Interface:
         kind = variable.type
         if isinstance(kind, _WITH_BOUNDS) and variable.kind != "VAR_IN_OUT":
             what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"
-            if variable.kind == "VAR_INPUT" and self.pou.is_function:
+            if variable.kind == "VAR_INPUT" and self.pou.is_routine:
                 self._error("S0903", declared.spec, f"{what} as an input is not in the dialect {self.scope.dialect.name}",
                             "declare it in VAR_IN_OUT, or VAR_IN_OUT CONSTANT")
             else:
@@ -234,7 +296,7 @@ class _Interface:
                                                           variable.kind == "VAR_INPUT" and what == "ARRAY [*]" else ""))
 
     def _edge(self, variable: Variable, declared: tree.VarDecl) -> None:
-        if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or self.pou.is_function:
+        if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or self.pou.is_routine:
             self._error("S0206", variable.node,
                         f"{declared.edge} belongs to a BOOL input of a block or program")
             return
@@ -242,10 +304,14 @@ class _Interface:
 
     def _register(self, variable: Variable) -> None:
         other = self.pou.variables.get(fold(variable.name))
-        if other is None and fold(variable.name) == fold(self.pou.name) and self.pou.is_function:
+        if other is None and fold(variable.name) == fold(self.pou.tree.name.text) and self.pou.tree.result is not None:
             self._error("S0202", variable.node, f"{variable.name} is the name of the function itself",
                         "that name stands for the result; rename the variable")
             self.pou.failed_names.add(fold(variable.name))
+            return
+        if other is not None and other.owner is not self.pou and not self.pou.is_routine and other.owner is not None:
+            self._error("S1005", variable.node, f"{other.owner.name} has a variable {other.name} already, which {self.pou.name} "
+                        "inherits", "rename it", (other.source, other.node.start, "declared here"))
             return
         if other is not None:
             self._error("S0202", variable.node, f"{variable.name} is declared twice in {self.pou.name}", "",
@@ -291,13 +357,14 @@ class _Interface:
     def _result(self, spec: tree.TypeSpec) -> None:
         pou, resolved = self.pou, resolve(self.scope, spec)
         if resolved is None:
-            pou.failed_names.add(fold(pou.name))
+            pou.failed_names.add(fold(pou.tree.name.text))
             return
         if is_block(resolved[0]):
             self._error("S0901", spec, "an instance as a result is understood but not executed")
             return
-        pou.result = Variable(pou.name, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])
-        pou.variables.setdefault(fold(pou.name), pou.result)
+        name = pou.tree.name.text if pou.block is not None else pou.name
+        pou.result = Variable(name, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])
+        pou.variables.setdefault(fold(name), pou.result)
         pou.order.append(pou.result)
 
     # --- layout -----------------------------------------------------------------------------------------------------
@@ -319,13 +386,17 @@ class _Interface:
         self.pou.frame_initial = bytes(content)
 
     def _instance(self) -> None:
-        content = bytearray(self.context.new_type_identifier().to_bytes(4, "little") + bytes(4))
-        held = [variable for variable in self.pou.order if variable.place == "self"]
+        self.pou.identifier = self.context.new_type_identifier()
+        content = bytearray(self.pou.identifier.to_bytes(4, "little") + bytes(4))
+        if self.pou.base is not None:
+            content += self.pou.base.initial[len(content):]
+        held = [variable for variable in self.pou.order if variable.place == "self" and variable.owner is self.pou]
         for variable in held if self._fit(held) else ():
             _append(content, variable)
         content += bytes(-len(content) % 8)
         fields = {fold(v.name): _field(v) for v in self.pou.order if v.place != "frame"}
-        self.pou.type = StructType(self.pou.name, len(content), 8, fields, True, self.pou.other_names)
+        parents = tuple(each.type for each in (self.pou.base, *self.pou.interfaces) if each is not None and each.type is not None)
+        self.pou.type = StructType(self.pou.name, len(content), 8, fields, True, self.pou.other_names, parents)
         self.pou.initial = bytes(content)
 
     def _fit(self, variables: Iterable[Variable]) -> bool:

@@ -20,6 +20,7 @@ from fbvm.base.types import (
     bound,
     fold,
     followed,
+    interface,
     open_array,
     pointer,
     reference,
@@ -97,7 +98,7 @@ def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:
         entry = scope.project.type_entry(target.text, scope.source)
         pou = scope.project.pou(target.text, scope.source) if entry is None else None
         awaiting = entry if entry is not None and entry.busy else pou if pou is not None and pou.busy else None
-        if awaiting is not None:
+        if awaiting is not None and not (pou is not None and pou.kind == "INTERFACE"):
             name = awaiting.tree.name.text
             made = RefType(f"{spec.kind} {name}", 8, 8, None, spec.kind == "POINTER TO", spec.kind == "REFERENCE TO")
             awaiting.awaited.append(made)
@@ -151,10 +152,13 @@ def _hint(scope: Scope, name: str) -> str:
 
 
 def _block(scope: Scope, pou: Pou, spec: tree.NamedType) -> Resolved | None:
-    if pou.kind != "FUNCTION_BLOCK":
+    if pou.kind not in ("FUNCTION_BLOCK", "CLASS", "INTERFACE"):
         scope.error("S0204", spec, f"{pou.name} is a {pou.kind}, not a type",
                     "only function blocks have instances in variables")
         return None
+    if pou.kind == "INTERFACE":
+        assert pou.type is not None or not pou.resolved
+        return (interface(pou.type), bytes(8)) if scope.context.interface(pou, scope.source, spec) and pou.type else None
     if not scope.context.interface(pou, scope.source, spec):
         return None
     assert pou.type is not None
@@ -312,6 +316,8 @@ def _structure(scope: Scope, spec: tree.StructSpec | tree.UnionSpec, name: str,
     """A structure, or a union: its members share their place, and the first initial value holds."""
     made = Members(isinstance(spec, tree.UnionSpec) or spec.overlap, pack)
     complete, limits = True, scope.project.size_limits
+    if isinstance(spec, tree.StructSpec) and spec.bases and not _extend(scope, spec, made):
+        return None
     for declared in spec.members:
         packed = isinstance(declared.spec, tree.NamedType) and fold(declared.spec.text) == "BIT"
         resolved = (BOOL, bytes(1)) if packed else resolve(scope, declared.spec)
@@ -333,6 +339,20 @@ def _structure(scope: Scope, spec: tree.StructSpec | tree.UnionSpec, name: str,
         return None
     name = name or f"STRUCT {scope.context.new_anonymous_number()}"
     return made.structure(name)
+
+
+def _extend(scope: Scope, spec: tree.StructSpec, made: Members) -> bool:
+    """Begin a structure with the members of the one that it extends; False after a diagnostic."""
+    resolved = resolve(scope, spec.bases[0])
+    if resolved is None:
+        return False
+    kind, initial = resolved
+    if not isinstance(kind, StructType) or kind.block or len(spec.bases) > 1:
+        scope.error("S1001", spec.bases[-1], f"a structure extends one structure, and {kind} is none" if len(spec.bases) == 1 else
+                    "a structure extends one structure")
+        return False
+    made.extend(kind, initial)
+    return True
 
 
 def _given(spec: tree.EnumSpec) -> tree.StructInit | None:

@@ -30,6 +30,13 @@ class Members:
         self._taken: list[tuple[int, int]] = []
         """First bit and bit behind of each member."""
         self._align = 1
+        self._parents: tuple[StructType, ...] = ()
+
+    def extend(self, kind: StructType, initial: bytes) -> None:
+        """Begin with the members of another structure, where they lie in that."""
+        self.fields |= kind.fields
+        self._parents, self._content, self._align = (kind,), bytearray(initial), kind.align
+        self._taken.append((0, 8 * kind.size))
 
     def add(self, name: str, kind: Type, initial: bytes, location: tree.Location | None, packed: bool = False) -> str:
         """Put one more member in its place.  Returns what is wrong with it, "" if nothing.  `packed` ones are single bits."""
@@ -79,7 +86,8 @@ class Members:
     def structure(self, name: str) -> tuple[StructType, bytes]:
         """The type of the whole and its initial bytes."""
         self._content += bytes(-len(self._content) % self._align)
-        return StructType(name, len(self._content), self._align, self.fields), bytes(self._content)
+        made = StructType(name, len(self._content), self._align, self.fields, parents=self._parents)
+        return made, bytes(self._content)
 
 
 def _located(name: str, kind: Type, location: tree.Location) -> tuple[int, int | None] | str:

@@ -18,9 +18,10 @@ from fbvm.check.declarations.locations import completes, example, location_of
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.expressions.constant_integers import integer
 from fbvm.check.expressions.scope import Scope
+from fbvm.check.symbols.config_facts import AccessPath, Completed, Spot
 from fbvm.check.symbols.containment import Containment
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import AccessPath, Completed, Spot, Variable, is_open
+from fbvm.check.symbols.facts import Variable, is_open
 from fbvm.syntax import tree
 
 _WIDTHS: dict[int, Type] = {1: BOOL, 8: BYTE, 32: DWORD, 64: LWORD}

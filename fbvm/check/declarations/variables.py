@@ -10,8 +10,9 @@ from fbvm.check.declarations.locations import location_of
 from fbvm.check.declarations.specs import resolve, resolve_parameter
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Pou, Report, Variable, is_block
+from fbvm.check.symbols.facts import Pou, Variable, is_block
 from fbvm.check.symbols.project import Resolved
+from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.syntax import tree
 
@@ -19,15 +20,20 @@ _QUALIFIERS = {
     "VAR": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "VAR_INPUT": ("CONSTANT", "RETAIN", "NON_RETAIN"),
     "VAR_OUTPUT": ("RETAIN", "NON_RETAIN"), "VAR_IN_OUT": ("CONSTANT",), "VAR_TEMP": (), "VAR_EXTERNAL": ("CONSTANT",),
     "VAR_GLOBAL": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
+    "VAR_INST": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
     "VAR_STAT": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
 }
 """Qualifiers that each kind of section can have."""
+_ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
+"""Access words, which blocks and classes have in front of variables; these are not seen from outside in any case."""
 
 
 def check_qualifiers(report: Report, section: tree.VarSection, source: Source, pou_kind: str) -> None:
     """Report qualifiers that a section of a POU of that kind cannot have."""
     words = [fold(q.text) for q in section.qualifiers]
     for word, node in zip(words, section.qualifiers, strict=True):
+        if word in _ACCESS and section.kind == "VAR" and pou_kind in ("FUNCTION_BLOCK", "CLASS"):
+            continue
         if word not in _QUALIFIERS[section.kind] or (pou_kind == "FUNCTION" and word != "CONSTANT"):
             report.add("S0206", source, node, f"{section.kind} of a {pou_kind} cannot be {word}")
     if "CONSTANT" in words and len(words) > 1 or {"RETAIN", "NON_RETAIN"} <= set(words):

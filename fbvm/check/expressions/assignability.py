@@ -18,6 +18,7 @@ from fbvm.base.types import (
     Type,
     base,
     converts,
+    derives,
     families,
     families_of,
     fold,
@@ -43,6 +44,8 @@ def assignable(kind: Type, target: Type) -> bool:
         return False
     if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
         return kind.bounds == target.bounds and same(kind.element, target.element) and not (kind.packed or target.packed)
+    if isinstance(target, RefType) and target.interface and isinstance(kind, StructType):
+        return kind.block and derives(kind, target.target)
     if isinstance(target, StructType) or isinstance(kind, StructType):
         return kind == target and not (isinstance(target, StructType) and target.block)
     return converts(kind, target)

@@ -21,7 +21,7 @@ from fbvm.base.types import (
     base,
     fold,
 )
-from fbvm.check.expressions import any_parameters, literals, names, qualified, references, unknown_names
+from fbvm.check.expressions import any_parameters, literals, names, objects, qualified, references, unknown_names
 from fbvm.check.expressions.assignability import BOUNDS_HINT
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
@@ -48,7 +48,12 @@ def member(scope: Scope, expr: tree.Member, want: Type | None) -> Type | None:
             return None
         names.program(scope, of)
         scope.qualifiers.add(of)
-    whole = scope.infer(of)
+    is_property, kind = objects.value_of_property(scope, expr)
+    if is_property:
+        return kind
+    whole = objects.instance_of(scope, of) if objects.is_self(scope, of) else scope.infer(of)
+    if isinstance(whole, RefType) and whole.interface:
+        whole = whole.target
     if isinstance(whole, StructType):
         return _field(scope, expr, whole)
     if isinstance(whole, AnyType):
@@ -67,7 +72,8 @@ def _field(scope: Scope, expr: tree.Member, whole: StructType) -> Type | None:
     """The type of a member of a structure or an instance."""
     name = expr.name
     field = whole.member(name.text)
-    if field is not None and (not whole.block or field.kind in READABLE or _is_readable_local(scope, whole, field)):
+    if field is not None and (not whole.block or field.kind in READABLE or _is_readable_local(scope, whole, field) or
+                              objects.is_own_instance(scope, expr.of) and field.kind != "VAR_INST"):
         scope.facts.fields[expr] = field
         return field.type
     if field is not None:
@@ -134,10 +140,13 @@ def part(scope: Scope, expr: tree.Part, want: Type | None) -> Type | None:
 
 def target(scope: Scope, expr: tree.Deref, want: Type | None) -> Type | None:
     """The type of what a reference refers to: `r^`."""
+    if objects.is_self(scope, expr.of):
+        assert isinstance(expr.of, tree.NameRef)
+        return objects.self_type(scope, expr.of)
     kind = scope.infer(expr.of)
     if kind is None:
         return None
-    if not isinstance(kind, RefType):
+    if not isinstance(kind, RefType) or kind.interface:
         scope.error("S0304", expr.of, f"this is {kind}, not a reference: ^ has nothing to follow")
         return None
     return kind.target

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.areas import FLAG_AREAS, AddressError, parse_address
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, Type, fold
-from fbvm.check.expressions import unknown_names
+from fbvm.check.expressions import objects, unknown_names
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
@@ -15,9 +15,21 @@ def name(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
     if scope.pou is not None and scope.pou.later and fold(expr.text) in scope.pou.later:
         constant = scope.context.rules.later_constant(scope.context, scope.pou, expr)
         return variable(scope, expr, constant) if constant is not None else None
-    found = scope.variable(expr.text)
+    found = scope.own_variable(expr.text)
+    if found is None and scope.pou is not None:
+        is_property, kind = objects.value_of_property(scope, expr)
+        if is_property:
+            return kind
+    found = found or scope.variable(expr.text)
     if found is not None:
         return variable(scope, expr, found)
+    if objects.is_self(scope, expr):
+        return objects.pointer_to_self(scope, expr, want)
+    return _enumerated(scope, expr, want)
+
+
+def _enumerated(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
+    """The type of a name that is a member of an enumeration, else a diagnostic."""
     own = scope.source.library
     members = [m for m in scope.project.enum_members.get(fold(expr.text), ()) if m[2] or not own]
     near = [m for m in members if m[2] == own]

@@ -12,6 +12,7 @@ from fbvm.base.types import (
     ArrayType,
     StructType,
     Type,
+    derives,
     fold,
     pointer,
     reference,
@@ -154,7 +155,7 @@ def _fits(scope: Scope, start: Start) -> bool:
     if not start.kind.follows:
         return scope.fit(start.whole, start.kind, "S0705", "the initial value")
     kind = refer(scope, start.place, lasting=False)
-    if kind is None or kind == start.kind.target:
+    if kind is None or derives(kind, start.kind.target):
         return kind is not None
     scope.error("S0705", start.place, f"a {start.kind} is needed here, this is {kind}")
     return False
@@ -184,7 +185,7 @@ def lend(scope: Scope, value: tree.Expr, kind: Type, code: str, name: str) -> bo
                     f"name the variable alone: {scope.text(named(value))}")
         return False
     found = refer(scope, value, lasting=False)
-    if found is None or found == kind:
+    if found is None or derives(found, kind):
         return found is not None
     scope.error(code, value, f"{name} refers to {kind}, this is {found}")
     return False

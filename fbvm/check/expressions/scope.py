@@ -116,6 +116,8 @@ class Scope:
         if is_untyped(kind):
             return self.adopt(expr, target, code) is not None
         if assignable(kind, target):
+            if isinstance(kind, StructType) and isinstance(target, RefType):
+                self.refer_to(expr, kind)
             value = self.facts.constants.get(expr)
             return value is None or self._in_range(expr, value, target, code)
         if converted_by_dialect(kind, target, self.dialect):
@@ -130,6 +132,12 @@ class Scope:
                    hidden_hint(expr, target) or self.power_hint(expr, target) or
                    (literal_hint(value, base(target)) if constant else mismatch_hint(expr, kind, target)))
         return False
+
+    def refer_to(self, expr: tree.Expr, kind: StructType) -> None:
+        """Record that an interface refers to an instance of this type."""
+        self.facts.as_interfaces.add(expr)
+        self.context.block_of(kind).refer_to_instances()
+        self.project.dependencies.repeatable = False
 
     def power_hint(self, expr: tree.Expr, target: Type) -> str:
         """The hint for a power where an integer is needed, "" for another expression."""
@@ -216,20 +224,27 @@ class Scope:
         else:
             self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(self.facts.constants[expr], base(target)))
 
-    def note_call(self, pou: Pou, node: tree.Node) -> None:
-        """Record that the POU of this scope calls another one."""
+    def note_call(self, pou: Pou, node: tree.Node, dynamic: bool = False) -> None:
+        """Record that the POU of this scope calls another one, or with `dynamic` perhaps one that overrides it."""
         if self.pou is not None:
             self.pou.calls.setdefault(pou, node)
+            if dynamic:
+                self.pou.dynamic_calls.setdefault(pou, node)
 
     # --- names ------------------------------------------------------------------------------------------------------
 
     def variable(self, name: str) -> Variable | None:
-        """The variable that a name means here: the POU's own, else a global one."""
-        if self.pou is not None:
-            found = self.pou.variables.get(fold(name))
-            if found is not None:
-                return found
-        return self.context.global_variable(name, self.source)
+        """The variable that a name means here: the POU's own, one of its instance, else a global one."""
+        return self.own_variable(name) or self.context.global_variable(name, self.source)
+
+    def own_variable(self, name: str) -> Variable | None:
+        """The variable of that name of the POU or, in a method, of the instance: all but the VAR_TEMPs of that."""
+        pou = self.pou
+        found = pou.variables.get(fold(name)) if pou is not None else None
+        if found is None and pou is not None and pou.block is not None:
+            found = pou.block.variables.get(fold(name))
+            return None if found is not None and found.kind == "VAR_TEMP" else found
+        return found
 
     def named_type(self, name: str) -> Type | None:
         """The type of that name, elementary or declared; None without a diagnostic of its own."""

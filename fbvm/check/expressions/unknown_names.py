@@ -14,6 +14,8 @@ from fbvm.syntax import tree
 _USES = {
     "FUNCTION": "call it: {}(...)",
     "FUNCTION_BLOCK": "declare an instance, such as  my_{0} : {0};  and name an output of it",
+    "CLASS": "declare an instance, such as  my_{0} : {0};  and call one of its methods",
+    "INTERFACE": "declare a variable of it, and assign an instance that implements it",
     "PROGRAM": "a task runs it; what others need of it belongs in a VAR_GLOBAL",
 }
 """What to do with a POU of each kind that is named where a value is needed."""

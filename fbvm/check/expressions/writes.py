@@ -5,6 +5,7 @@ from __future__ import annotations
 from fbvm.base.areas import AREAS, Address
 from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
+from fbvm.check.expressions import objects
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Facts, Variable
 from fbvm.syntax import tree
@@ -85,6 +86,8 @@ def _hint(scope: Scope, expr: tree.Expr) -> str:
 
 def _is_written_by_others(scope: Scope, expr: tree.Expr, member: Field) -> bool:
     """True for a member of an instance that the dialect lets others write."""
+    if isinstance(expr, tree.Member) and objects.is_own_instance(scope, expr.of):
+        return not member.constant
     dialect, whole = scope.dialect, scope.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
     if member.constant or not isinstance(whole, StructType) or not whole.block:
         return False

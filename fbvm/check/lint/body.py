@@ -8,7 +8,8 @@ from typing import Any
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
-from fbvm.check.symbols.facts import Facts, Pou, Report
+from fbvm.check.symbols.facts import Facts, Pou
+from fbvm.check.symbols.report import Report
 from fbvm.syntax import tree
 from fbvm.syntax.tree import il, ladder, sfc
 

@@ -8,7 +8,8 @@ from fbvm.base.areas import AREAS, FLAG_AREAS, Address
 from fbvm.base.types import BOOL, ArrayType, Type, base
 from fbvm.check.expressions.values import is_any
 from fbvm.check.lint.body import Body
-from fbvm.check.symbols.facts import Facts, Pou, PouCall, Report, Variable, is_block
+from fbvm.check.symbols.facts import Facts, Pou, PouCall, Variable, is_block
+from fbvm.check.symbols.report import Report
 from fbvm.syntax import tree
 from fbvm.syntax.tree import sfc
 
@@ -27,13 +28,16 @@ class Uses:
             if isinstance(call, PouCall):
                 roots = [value for _, value in call.in_outs] + ([call.instance] if call.instance else [])
                 self.called.update(facts.variables.get(facts.root(root)) for root in roots)
-        self.called.update(facts.variables.get(facts.root(place)) for place in facts.holders)
+        assigned = [call.instance for call in facts.sets.values() if call.instance]
+        self.called.update(facts.variables.get(facts.root(place)) for place in (*assigned, *facts.holders, *facts.as_interfaces))
 
 
 def unused(report: Report, pou: Pou, uses: Uses) -> None:
     """Warn of variables of a POU that it does not use; a name that begins with `_` is unused on purpose."""
     for variable in pou.order:
-        if variable.kind not in OWN or " " in variable.name or variable.name.startswith("_") or variable.constant:
+        if variable.owner is not pou or variable.kind not in OWN or variable.constant:
+            continue
+        if " " in variable.name or variable.name.startswith("_"):
             continue
         if _instance(variable.type):
             never_called(report, variable, uses)
@@ -49,7 +53,9 @@ def pins(report: Report, pou: Pou, uses: Uses) -> None:
         return
     hidden = {edge.raw: edge.hidden for edge in pou.edges}
     for variable in pou.order:
-        if variable.name.startswith("_") or variable.name.upper() in ("EN", "ENO") or variable.location or variable.open:
+        if variable.owner is not pou or variable.location or variable.open:
+            continue
+        if variable.name.startswith("_") or variable.name.upper() in ("EN", "ENO"):
             continue
         if variable.kind in ("VAR_INPUT", "VAR_IN_OUT") and hidden.get(variable, variable) not in uses.variables:
             what = "input" if variable.kind == "VAR_INPUT" else "in-out"
@@ -91,7 +97,7 @@ def result(body: Body) -> None:
         return
     if not any(isinstance(node, tree.Return) and node.value is not None for node in body.nodes):
         body.warn("S0292", pou.tree.name, f"{pou.name} never sets its result, which stays as it begins",
-                  f"assign it: {pou.name} := ...")
+                  f"assign it: {pou.result.name} := ...")
 
 
 # --- places in memory -------------------------------------------------------------------------------------------------

@@ -43,7 +43,7 @@ def lint_steps(context: Context, program: str | None) -> Iterator[None]:
         flow(body)
         writes.body(body)
         declared.result(body)
-        declared.overlaps(report, pou.order)
+        declared.overlaps(report, [variable for variable in pou.order if variable.owner is pou])
     for pou in own:
         yield
         declared.unused(report, pou, uses)

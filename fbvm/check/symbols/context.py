@@ -5,17 +5,17 @@ of a POU, the context looks it up, and has it resolved first by the rule that `R
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
-from fbvm.base.types import EnumType, RefType, StructType, Type, fold
+from fbvm.base.types import EnumType, RefType, StructType, Type, derives, fold
 from fbvm.check.symbols.dependencies import Dependencies, Key, has_lasting_body, key_of
 from fbvm.check.symbols.elementary_types import elementary_type
-from fbvm.check.symbols.facts import Facts, Pou, StandardCall, TaskFact, Value, Variable, list_name
-from fbvm.check.symbols.project import Project, Resolved, TypeEntry
+from fbvm.check.symbols.facts import Facts, Pou, StandardCall, TaskFact, Value, Variable
+from fbvm.check.symbols.project import Project, Resolved, TypeEntry, list_name
 from fbvm.check.symbols.statement_lists import writes_eno
 from fbvm.syntax import tree
 
@@ -41,6 +41,8 @@ class Rules:
     """Resolves a CONSTANT of a POU that is declared behind the declaration that names it; None after a diagnostic."""
     body: Callable[[Context, Pou], None]
     """Checks the statements of a POU."""
+    members: Callable[[Context, Pou], None]
+    """Checks the methods of a POU against those that it inherits and implements."""
 
 
 class Context:
@@ -135,6 +137,29 @@ class Context:
         """The function block or program whose instances have this type."""
         return self._blocks[id(kind)]
 
+    def blocks(self) -> Iterable[Pou]:
+        """All POUs that have instances or are interfaces, as far as they are resolved."""
+        return self._blocks.values()
+
+    def candidates(self, pou: Pou) -> dict[Pou, list[int]]:
+        """The bodies that a call of a method or block may mean, by the numbers of the types for which each is meant.
+
+        pou: what the call names: a method, an accessor, an ACTION or a block.  Types that are ABSTRACT have no instances."""
+        home = pou.block or pou.owner
+        found: dict[Pou, list[int]] = {}
+        for block in self._blocks.values():
+            if block.kind == "INTERFACE" or "ABSTRACT" in block.modifiers or not derives(block.type, home.type):
+                continue
+            meant = block.method(pou.key) if pou.block is not None else block.action(pou.key) if pou.home is not None else block
+            if meant is not None:
+                found.setdefault(meant, []).append(block.identifier)
+        return found
+
+    def numbers_of(self, kind: StructType) -> list[int]:
+        """The numbers with which instances of a type begin, and of those derived from it."""
+        return sorted(block.identifier for block in self._blocks.values()
+                      if block.kind != "INTERFACE" and derives(block.type, kind))
+
     # --- global variables -------------------------------------------------------------------------------------------
 
     def global_variable(self, name: str, source: Source) -> Variable | None:
@@ -222,8 +247,10 @@ class Context:
             self._repeat(recorded, pou)
         else:
             self._record(pou)
-        for action in pou.actions.values():
-            self.check_body(action)
+        for part in (*pou.actions.values(), *pou.methods.values()):
+            self.check_body(part)
+        if pou.block is None and (pou.methods or pou.tree.bases or pou.tree.interfaces):
+            self.rules.members(self, pou)
 
     def _record(self, pou: Pou) -> None:
         """Check the body of a library's POU, and keep its dependencies if repeating them can replace the check."""

@@ -46,6 +46,6 @@ def key_of(pou: Pou) -> Key:
 def has_lasting_body(pou: Pou) -> bool:
     """True for a POU of a library whose body is the same in every program.
 
-    False for one with ACTIONs, and for a tree that was made for one call or one program."""
+    False for one with ACTIONs, methods or a base, and for a tree that was made for one call or one program."""
     return bool(pou.source.library) and pou.kind in ("FUNCTION", "FUNCTION_BLOCK") and \
-        pou.as_written and not pou.written_actions
+        pou.as_written and not pou.written_actions and not pou.tree.methods and not pou.tree.bases

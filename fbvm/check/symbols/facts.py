@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TypeGuard
 
 from fbvm.base.areas import Address
-from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, Elementary, Field, RefType, StructType, Type, base, fold
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import shown_in_hexadecimal
@@ -110,6 +110,8 @@ class Pou:
     """False if its tree is not that of its source, but was made for one call or one program."""
     resolved: bool = False
     calls: dict[Pou, Node] = field(default_factory=dict)
+    dynamic_calls: dict[Pou, Node] = field(default_factory=dict)
+    """Of these the calls that may execute the body of a derived type instead."""
     writes_eno: bool = False
     enables_itself: bool = False
     """True if the body writes ENO without declaring it: ENO is TRUE at each start then."""
@@ -118,7 +120,7 @@ class Pou:
     failed_names: set[str] = field(default_factory=set)
     """Folded names whose declaration has an error: using them is not reported again."""
     inherits: bool = False
-    """True if it EXTENDS another POU, which was refused: any unknown name may come from that."""
+    """True if what it EXTENDS has an error that is reported: any unknown name may come from that."""
     later: dict[str, tuple[VarDecl, VarSection]] = field(default_factory=dict)
     """By folded name the declarations behind the one that is being resolved."""
     later_constants: dict[VarDecl, tuple[Type, bytes] | None] = field(default_factory=dict)
@@ -134,6 +136,20 @@ class Pou:
     """Its ACTIONs by folded name; each is a body that works on the same instance."""
     home: Pou | None = None
     """The POU that an ACTION belongs to."""
+    block: Pou | None = None
+    """The block, class, program or interface that a METHOD belongs to, or an accessor of a PROPERTY."""
+    base: Pou | None = None
+    """The block that it EXTENDS."""
+    interfaces: list[Pou] = field(default_factory=list)
+    """The interfaces that it IMPLEMENTS; those that an INTERFACE EXTENDS."""
+    methods: dict[str, Pou] = field(default_factory=dict)
+    """Its own methods by folded name; accessors of properties have the names `GET name` and `SET name`."""
+    modifiers: frozenset[str] = frozenset()
+    """The words of its head: ABSTRACT, FINAL, OVERRIDE, PUBLIC, PRIVATE, PROTECTED, INTERNAL."""
+    identifier: int = 0
+    """The number with which each of its instances begins."""
+    this: Variable | None = None
+    """Of a block that extends none: its instance as a whole, if a reference to it or to a derived one is made."""
     types: dict[str, Type] = field(default_factory=dict)
     """What generic types stand for in a function that was instantiated for one call."""
     passed_as_is: frozenset[str] | None = None
@@ -148,9 +164,56 @@ class Pou:
     def is_function(self) -> bool:
         return self.kind == "FUNCTION"
 
+    @property
+    def is_routine(self) -> bool:
+        """True for a FUNCTION, METHOD or accessor: its variables lie in a frame and begin anew at each call."""
+        return self.kind in ("FUNCTION", "METHOD", "GET", "SET")
+
+    @property
+    def own_block(self) -> Pou | None:
+        """The POU on whose instance its body works; None for a FUNCTION."""
+        return None if self.kind == "FUNCTION" else self.block or self.owner
+
+    @property
+    def key(self) -> str:
+        """The key of a method or accessor among the methods of its block, of an ACTION its name."""
+        name = fold(self.tree.name.text)
+        return f"{self.kind} {name}" if self.kind in ("GET", "SET") else name
+
+    def lineage(self) -> Iterator[Pou]:
+        """Itself, what it EXTENDS, what that EXTENDS ..."""
+        pou: Pou | None = self
+        while pou is not None:
+            yield pou
+            pou = pou.base
+
+    def method(self, key: str) -> Pou | None:
+        """Its method of that key, its own or an inherited one; of an interface one of those that it extends."""
+        if key in self.methods:
+            return self.methods[key]
+        parents = self.interfaces if self.kind == "INTERFACE" else [self.base] if self.base is not None else []
+        return next((found for parent in parents if (found := parent.method(key)) is not None), None)
+
+    def action(self, name: str) -> Pou | None:
+        """Its ACTION of that folded name, its own or an inherited one."""
+        return next((pou.actions[name] for pou in self.lineage() if name in pou.actions), None)
+
+    def all_referred(self) -> list[Variable]:
+        """The variables of its instances that something refers to: those of what it extends first."""
+        return [variable for pou in [*self.lineage()][::-1] for variable in pou.referred]
+
+    def refer_to_instances(self) -> Variable:
+        """Make each instance of a block, and of those derived from it, something that references refer to as a whole."""
+        *_, root = self.lineage()
+        if root.this is None:
+            assert root.type is not None
+            root.this = Variable("THIS", root.type, "VAR", root.source, root.tree.name, root)
+            root.referred.append(root.this)
+        return root.this
+
     def is_failed(self, name: str) -> bool:
         """True if it is reported already why nothing is known under this name."""
-        return self.inherits or fold(name) in self.failed_names
+        return self.inherits or fold(name) in self.failed_names or self.block is not None and self.block.is_failed(name)
 
     @property
     def has_failed_names(self) -> bool:
@@ -192,6 +255,8 @@ class PouCall:
     enabled: list[tuple[tree.Expr, bool]] = field(default_factory=list)
     tasked: Variable | None = None
     """The variable that says whether the body is run by a task of its own, and not by calls."""
+    dynamic: bool = False
+    """True if the instance may be of a derived type, whose body is executed then."""
 
 
 @dataclass(eq=False)
@@ -283,6 +348,8 @@ class Facts:
     labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     failed: set[tree.Expr] = field(default_factory=set)
     """Targets of assignment attempts that get NULL."""
+    attempts: dict[tree.Expr, StructType] = field(default_factory=dict)
+    """Targets of assignment attempts that get the reference if its instance is of this type, else NULL."""
     assigned: set[tree.Call] = field(default_factory=set)
     """Calls whose result is the whole value of an assignment."""
     reversed_bytes: set[tree.Call] = field(default_factory=set)
@@ -290,6 +357,14 @@ class Facts:
     aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
     """Statements that name an ACTION without (), with the calls that they mean."""
+    selves: dict[tree.Expr, Pou] = field(default_factory=dict)
+    """THIS and SUPER, with the block as which they see the instance."""
+    gets: dict[tree.Expr, tree.Call] = field(default_factory=dict)
+    """Expressions that name a property, with the calls of GET that they mean."""
+    as_interfaces: set[tree.Expr] = field(default_factory=set)
+    """Instances to which an interface is made to refer."""
+    sets: dict[tree.Expr, PouCall] = field(default_factory=dict)
+    """Targets of assignments that name a property, with the calls of SET that they mean; those have no input yet."""
     text_cases: set[tree.Case] = field(default_factory=set)
     """CASE statements that choose by a STRING."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)
@@ -308,7 +383,7 @@ class Facts:
     def is_part(self, expr: tree.Expr) -> TypeGuard[PartOf]:
         """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer, nor for
         what a member that is declared REFERENCE TO is bound to."""
-        return isinstance(expr, PartOf) and expr not in self.variables and \
+        return isinstance(expr, PartOf) and expr not in self.variables and expr not in self.gets and \
             expr not in self.followed and not isinstance(self.types.get(expr.of), RefType)
 
     def root(self, expr: tree.Expr) -> tree.Expr:
@@ -316,36 +391,6 @@ class Facts:
         while self.is_part(expr):
             expr = expr.of
         return expr
-
-
-@dataclass(frozen=True, eq=False)
-class Spot:
-    """A variable that is named by a path: a program or global variable, then members and numbers of elements.
-
-    Without a root it is an address."""
-
-    root: Variable | None
-    steps: tuple[Field | int, ...]
-    type: Type
-    address: Address | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Completed:
-    """What VAR_CONFIG says about a variable: its address, or its initial bytes."""
-
-    spot: Spot
-    address: Address | None
-    initial: bytes | None
-
-
-@dataclass(frozen=True, eq=False)
-class AccessPath:
-    """What VAR_ACCESS says about a variable: another name, and whether that name can be written."""
-
-    name: str
-    spot: Spot
-    writable: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -377,27 +422,6 @@ class TaskFact:
     runs: list[Run] = field(default_factory=list)
 
 
-class Report:
-    """Collects diagnostics; one code is reported once for one place."""
-
-    def __init__(self) -> None:
-        self.diagnostics: list[Diagnostic] = []
-        self._seen: set[tuple[str, Source, int]] = set()
-
-    def add(self, code: str, source: Source, node: tree.Node, message: str, hint: str = "",
-            related: tuple[Source, int, str] | None = None) -> None:
-        key = (code, source, node.start)
-        if key not in self._seen:
-            self._seen.add(key)
-            self.diagnostics.append(Diagnostic(code, source, node.start, node.end, message, hint, related))
-
-    def refuse(self, source: Source, node: tree.Refused | tree.RefusedStatement) -> None:
-        """Report why something that was read is not executed."""
-        why = "is object-oriented text, which fbvm does not execute" if node.code == "S0902" else \
-            "is understood but not executed by this version"
-        self.add(node.code, source, node, f"{node.what} {why}")
-
-
 def is_block(kind: Type) -> bool:
     """True for the type of a function block's or program's instances."""
     return isinstance(kind, StructType) and kind.block
@@ -413,11 +437,6 @@ def is_open(location: tree.Location, kind: Type) -> bool:
 _LEVELS = re.compile(r"%[IQM](?:[BWDL]\d+(?:\.\d+){2,}|X?\d+(?:\.\d+){2,})", re.I)
 _WORD_LEVELS = re.compile(r"%[IQM][BWDL]\d+\.\d+", re.I)
 """With a BOOL it is a bit of that byte or word."""
-
-
-def list_name(source: Source) -> str:
-    """The folded name under which programs know the global variables of a source: that of its file."""
-    return fold(Path(source.name).stem)
 
 
 def holds_block(kind: Type) -> bool:

@@ -34,7 +34,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SETTINGS_BYTES, read_file, reason
 from fbvm.base.toml import TomlError, load_toml
 from fbvm.base.types import fold
-from fbvm.check.symbols.facts import Report
+from fbvm.check.symbols.report import Report
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read

@@ -10,14 +10,16 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.symbols.dependencies import Dependencies, Key
-from fbvm.check.symbols.facts import Facts, Pou, Report, Variable, list_name
+from fbvm.check.symbols.facts import Facts, Pou, Variable
 from fbvm.check.symbols.library import Libraries
+from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.check.symbols.size_limits import SizeLimits
 from fbvm.syntax import tree
@@ -175,7 +177,7 @@ class Project:
             self._found_pous.pop(key[1], None)
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
-            pou.inherits = any(refused.what == "EXTENDS" for refused in declaration.refused)
+            pou.modifiers = frozenset(word.text for word in declaration.modifiers)
             pou.failed_names |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
             pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)
@@ -305,3 +307,8 @@ def _refused_name(node: tree.Refused, source: Source) -> str:
         return fold(source.text[node.start:node.end].split(None, 1)[0].rstrip(":"))
     match = _PART.match(source.text, node.start)
     return fold(match[1]) if match else ""
+
+
+def list_name(source: Source) -> str:
+    """The folded name under which programs know the global variables of a source: that of its file."""
+    return fold(Path(source.name).stem)

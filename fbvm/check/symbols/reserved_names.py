@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ELEMENTARY, fold
-from fbvm.check.symbols.facts import Report
+from fbvm.check.symbols.report import Report
 from fbvm.syntax import tree
 
 RESERVED = frozenset(ELEMENTARY) | {"STRING", "WSTRING", "TOD", "LTOD", "DT", "LDT"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
-from fbvm.check.symbols.facts import Report
+from fbvm.check.symbols.report import Report
 from fbvm.syntax import tree
 
 MAX_SIZE = 64 << 20

@@ -9,8 +9,9 @@ from fbvm.base.areas import FLAG_AREAS, SLOTS_OFFSET, Address
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
+from fbvm.check.symbols.config_facts import Completed, Spot
 from fbvm.check.symbols.containment import Containment
-from fbvm.check.symbols.facts import Completed, Pou, Spot, Variable, holds_block
+from fbvm.check.symbols.facts import Pou, Variable, holds_block
 from fbvm.code.image import Layout, Objects, Retained
 from fbvm.code.layout.objects import Numbering
 from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
@@ -57,7 +58,7 @@ def lay_out(checker: Checker) -> Placement:
     located = [v for v in checker.global_order if v.place == "area"]
     for pou in checker.bodies:
         located += [v for v in pou.order if v.place == "area"]
-    _place_located(located, placement)
+    _place_located(list(dict.fromkeys(located)), placement)
     for pou in checker.bodies:
         _complete_type(pou)
     for row in checker.var_config.completed:

@@ -20,7 +20,10 @@ class Numbering:
     def __init__(self, checker: Checker) -> None:
         self.checker = checker
         self.extents: list[tuple[int, int]] = []
-        self._has_objects = Containment(checker, lambda pou: bool(pou.referred))
+        self._has_objects = Containment(checker, lambda pou: bool(pou.all_referred()))
+        for pou in checker.blocks():
+            for number, variable in enumerate(pou.all_referred()):
+                variable.object = number
 
     def add_single(self) -> None:
         """Number the variables that have one place."""
@@ -45,11 +48,11 @@ class Numbering:
                 self.add_instances(content, kind.element, at + index * kind.element.size, start)
         elif isinstance(kind, StructType) and kind.block:
             pou = self.checker.block_of(kind)
-            if pou.referred:
+            if referred := pou.all_referred():
                 header = at - start + OBJECTS_AT
                 content[header:header + 4] = (FIRST_OBJECT + len(self.extents)).to_bytes(4, "little")
-                for variable in pou.referred:
-                    self._add(at + variable.offset, variable.type.size)
+                for variable in referred:
+                    self._add(at + variable.offset, kind.size if variable.name == "THIS" else variable.type.size)
             for variable in pou.order:
                 if variable.place == "self" and not variable.reference:
                     self.add_instances(content, variable.type, at + variable.offset, start)

@@ -50,7 +50,7 @@ def _marked_in_members(checker: Checker, kind: StructType, content: bytes, at: i
                 yield from _marked(checker, member.type, content, at + member.offset, begin, around)
         return
     pou = checker.block_of(kind)
-    inside = {**around, pou: begin + at}
+    inside = {**around, **dict.fromkeys(pou.lineage(), begin + at)}
     for variable in pou.order:
         if variable.place == "self" and not variable.reference:
             yield from _marked(checker, variable.type, content, at + variable.offset, begin, inside)

@@ -49,7 +49,7 @@ def lower_reference(program: Program, checker: Checker, pou: Pou, expr: tree.Exp
 def _enter(body: BodyContext) -> None:
     """Emit what a body does before its first statement: initial values of the frame, edges of inputs."""
     pou = body.pou
-    start = pou.frame_inputs if pou.is_function else 0
+    start = pou.frame_inputs if pou.is_routine else 0
     initial = pou.frame_initial[start:]
     if initial:
         origin, offset = body.program.frame(pou)

@@ -10,7 +10,7 @@ from fbvm.check.symbols.facts import Guard, PouCall, StandardCall
 from fbvm.code.builder.constants import TRUE, zero
 from fbvm.code.builder.functions import FUNCTIONS
 from fbvm.code.builder.places import Place
-from fbvm.code.lowering import any_parameters, arrays, plc_addresses, pointers, pou_calls
+from fbvm.code.lowering import any_parameters, arrays, dispatch, plc_addresses, pointers, pou_calls
 from fbvm.code.lowering.context import BodyContext, PlaceRules, StatementRules, ValueRules
 from fbvm.code.lowering.variables import loaded
 from fbvm.code.operations import Node
@@ -104,6 +104,7 @@ _INTRINSICS: dict[str, Callable[[BodyContext, StandardCall], Node]] = {
     "__ISVALIDREF": lambda body, called: pointers.is_valid(body, called.arguments[0][0]),
     "SIZEOF": lambda body, called: (
         "convert", "u32", "i64", any_parameters.number(body, called.arguments[0][0], ANY_SIZE)),
+    "__QUERY": lambda body, called: dispatch.query(body, called, body.site(called.arguments[0][0])),
     "LOWER_BOUND": _bound, "UPPER_BOUND": _bound,
     "__PLC_ADDRESS": lambda body, called: plc_addresses.address_of(body, called.arguments[0][0]),
 }

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from fbvm.base.types import BOOL, Type, base, machine
+from fbvm.base.types import BOOL, UDINT, RefType, StructType, Type, base, machine
 from fbvm.check.checker import Checker
+from fbvm.check.declarations.interfaces import OBJECTS_AT
 from fbvm.check.expressions.constants import convert as convert_constant
 from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.code.builder.constants import constant
@@ -18,7 +19,7 @@ from fbvm.code.builder.emitter import Emitter
 from fbvm.code.builder.places import Place
 from fbvm.code.layout.layout import variable_bit
 from fbvm.code.lowering.program import Program
-from fbvm.code.operations import FLOATS, TEXT_UNITS, Block, Node
+from fbvm.code.operations import FLOATS, OBJECT_SHIFT, TEXT_UNITS, Block, Node
 from fbvm.code.pictures.st_rungs import Mark
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import hides_inside
@@ -81,6 +82,7 @@ class BodyContext(Emitter):
         return self._value(expr, want)
 
     def _value(self, expr: tree.Expr, want: Type | None) -> Node:
+        expr = self.facts.gets.get(expr, expr)
         kind = self.facts.types[expr]
         known = self.facts.constants.get(expr)
         if known is not None:
@@ -89,6 +91,8 @@ class BodyContext(Emitter):
             if form in FLOATS or form == "b" or form in TEXT_UNITS:
                 known = convert_constant(known, target)
             return constant(target, known)
+        if isinstance(kind, StructType) and kind.block and isinstance(want, RefType):
+            return self.cut_if_deep(self.instance_reference(self.place(expr), kind))
         node = self._values[type(expr)](self, expr)
         return self.cut_if_deep(node if want is None or want is kind else implicit(self, node, kind, base(want)))
 
@@ -116,6 +120,7 @@ class BodyContext(Emitter):
 
     def place(self, expr: tree.Expr) -> Place:
         """The place that an expression names; for a REFERENCE TO, the place that it is bound to."""
+        expr = self.facts.gets.get(expr, expr)
         reference = self.facts.followed.get(expr)
         if reference is None or isinstance(expr, tree.Call):
             return self._named(expr, self.facts.types[expr])
@@ -152,6 +157,17 @@ class BodyContext(Emitter):
         if (not isinstance(expr, tree.Call) or expr in self.facts.followed) and expr not in self.facts.aggregates:
             self.record_read(place, expr)
         return place
+
+    def instance_reference(self, place: Place, kind: StructType) -> Node:
+        """A reference to an instance at a place, in the object that the instance as a whole is."""
+        variable = self.checker.block_of(kind).refer_to_instances()
+        assert variable.object is not None
+        place = self.reusable(place)
+        first = ("convert", "u64", "u32", place.moved(OBJECTS_AT, UDINT).load())
+        number: Node = ("add", "u64", first, ("const", "u64", variable.object))
+        moved = ("mul", "u64", number, ("const", "u64", 1 << OBJECT_SHIFT))
+        position = ("and", "u64", ("bits", "u64", "ref", place.reference()), ("const", "u64", (1 << OBJECT_SHIFT) - 1))
+        return ("bits", "ref", "u64", ("or", "u64", moved, position))
 
     def reusable(self, place: Place) -> Place:
         """The same place with its subscripts and references in temporaries, so that it can be used twice."""

@@ -11,7 +11,7 @@ from fbvm.check.symbols.facts import PouCall, Variable
 from fbvm.code.builder.constants import FALSE, TRUE, zero
 from fbvm.code.builder.conversions import implicit
 from fbvm.code.builder.places import Place, is_aggregate
-from fbvm.code.lowering import pointers
+from fbvm.code.lowering import dispatch, pointers
 from fbvm.code.lowering.any_arguments import described
 from fbvm.code.lowering.arrays import bounds
 from fbvm.code.lowering.context import BodyContext
@@ -19,20 +19,19 @@ from fbvm.code.operations import INTEGERS, Block, Node
 from fbvm.syntax import tree
 
 
-def run(body: BodyContext, call: tree.Call, called: PouCall) -> None:
+def run(body: BodyContext, call: tree.Expr, called: PouCall) -> None:
     """A call whose result, if it has one, is not used.
 
     body: the caller.
-    call: the call in the tree.
+    call: the call in the tree, or the property that is assigned.
     called: what the checker found out about it."""
     if called.pou.home is None:
         _enabled(body, call, called, ())
         return
-    instance = body.place(called.instance) if called.instance is not None else Place(("self", 0, ()), BOOL)
+    instance = _instance(body, called) or Place(("self", 0, ()), BOOL)
     if called.inputs:
-        instance = body.reusable(instance)
         _inputs(body, called, instance, body.site(call))
-    body.emit(("call", body.program.number(called.pou), instance.address))
+    body.emit(dispatch.call(body, called, instance, body.site(call)))
 
 
 def value(body: BodyContext, call: tree.Call, called: PouCall) -> Node:
@@ -65,10 +64,10 @@ def aggregate(body: BodyContext, call: tree.Call, called: PouCall) -> Place:
 # --- EN and ENO -------------------------------------------------------------------------------------------------------
 
 
-def _enabled(body: BodyContext, call: tree.Call, called: PouCall, after: Block) -> None:
+def _enabled(body: BodyContext, call: tree.Expr, called: PouCall, after: Block) -> None:
     """The whole call and the statements `after` it, inside an IF where EN is given or declared."""
     site = body.site(call)
-    instance = body.reusable(body.place(called.instance)) if called.instance is not None else None
+    instance = _instance(body, called)
     eno = _parameter(called, "ENO", "VAR_OUTPUT")
     enable = _enable(body, called, instance, site)
     if enable is None:
@@ -90,6 +89,17 @@ def _enabled(body: BodyContext, call: tree.Call, called: PouCall, after: Block) 
     _report(body, called, enable, site)
 
 
+def _instance(body: BodyContext, called: PouCall) -> Place | None:
+    """The instance that is called, or whose method is; None for a function."""
+    expr = called.instance
+    if expr is None:
+        return None if called.pou.block is None else Place(("self", 0, ()), BOOL)
+    kind = body.facts.types.get(expr)
+    if isinstance(kind, RefType) and kind.interface and kind.target is not None and expr not in body.facts.selves:
+        return Place((("ref", body.to_temporary(body.value(expr)), body.site(expr)), 0, ()), kind.target)
+    return body.reusable(body.place(expr))
+
+
 def _enable(body: BodyContext, called: PouCall, instance: Place | None, site: int) -> Node | None:
     """The value of EN, which is stored if the POU declares it; None if it is neither given nor declared."""
     declared = _parameter(called, "EN", "VAR_INPUT")
@@ -99,7 +109,7 @@ def _enable(body: BodyContext, called: PouCall, instance: Place | None, site: in
     place = _slot(body, declared, instance)
     if enable is not None:
         body.write(place, enable, site)
-    elif called.pou.is_function:
+    elif called.pou.is_routine:
         body.write(place, TRUE, site)
     return place.load()
 
@@ -131,7 +141,7 @@ def _execute(body: BodyContext, called: PouCall, instance: Place | None, site: i
     _inputs(body, called, instance, site)
     if eno is not None and (called.pou.enables_itself or not called.pou.writes_eno):
         body.emit(_slot(body, eno, instance).store(TRUE, site))
-    statement: Node = ("call", body.program.number(called.pou), instance.address if instance is not None else None)
+    statement = dispatch.call(body, called, instance, site)
     if called.tasked is not None:
         statement = ("if", ((("not", "b", body.slot(called.tasked).load()), (statement,)),), ())
     body.emit(statement)
@@ -161,7 +171,7 @@ def _inputs(body: BodyContext, called: PouCall, instance: Place | None, site: in
             _bind(body, variable, place, expr, node)
         else:
             body.write(place, node, site)
-    if called.pou.is_function:
+    if called.pou.is_routine:
         given = {id(v) for v, _ in called.inputs}
         for variable in called.pou.parameters("VAR_INPUT"):
             if id(variable) not in given and variable.name.upper() != "EN":

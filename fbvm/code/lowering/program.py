@@ -74,6 +74,14 @@ class Program:
         """The number of the body of a POU."""
         return pou.number
 
+    def executed(self, pou: Pou) -> Pou:
+        """The POU whose body is executed for another one: of a block without a statement, in some dialects, that of its base."""
+        return pou
+
+    def candidates(self, pou: Pou) -> dict[Pou, list[int]]:
+        """The bodies that a call of a method or block may mean, by the numbers of the types for which each is meant."""
+        return self.checker.candidates(pou)
+
     def frame(self, pou: Pou) -> Origin:
         """Where the frame of a POU begins."""
         return "abs", pou.frame_offset

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fbvm.base.types import BOOL, machine
 from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.builder.places import is_aggregate
 from fbvm.code.image import RungPicture
-from fbvm.code.lowering import byte_order, pointers
+from fbvm.code.lowering import byte_order, dispatch, pointers, pou_calls
 from fbvm.code.lowering.context import EXIT, BodyContext, StatementRules
 from fbvm.code.operations import Block, Node
 from fbvm.code.pictures.sfc import sfc_picture
@@ -30,7 +32,10 @@ def _assign(body: BodyContext, node: tree.Assign, site: int) -> None:
         return
     value = node.value
     for target in reversed(node.targets):
-        if target in body.facts.failed:
+        if (wanted := body.facts.attempts.get(target)) is not None:
+            reference = dispatch.attempted(body, body.value(value), wanted, site)
+            body.write(body.place(target), reference, site)
+        elif target in body.facts.failed:
             body.to_temporary(body.value(value))
             body.write(body.place(target), ("const", "ref", 0), site)
         else:
@@ -41,6 +46,9 @@ def _assign(body: BodyContext, node: tree.Assign, site: int) -> None:
 def _assign_one(body: BodyContext, target: tree.Expr, value: tree.Expr, site: int) -> None:
     """`target := value`: the subscripts of the target are evaluated first, then the value."""
     kind = body.facts.types[target]
+    if (setter := body.facts.sets.get(target)) is not None:
+        pou_calls.run(body, target, replace(setter, inputs=[(setter.pou.parameters("VAR_INPUT")[0], value)]))
+        return
     if isinstance(value, tree.Call) and value in body.facts.reversed_bytes:
         called = body.facts.calls[value]
         assert isinstance(called, StandardCall)

@@ -65,7 +65,23 @@ def _part(body: BodyContext, expr: tree.Part, kind: Type) -> Place:
 
 
 def _dereferenced(body: BodyContext, expr: tree.Deref, kind: Type) -> Place:
+    if expr.of in body.facts.selves:
+        return _own_instance(body, expr.of, kind)
     return Place((("ref", body.value(expr.of), body.site(expr)), 0, ()), kind)
+
+
+def _own_instance(body: BodyContext, expr: tree.Expr, kind: Type) -> Place:
+    """The place of THIS and SUPER: the instance whose body is executed."""
+    return Place(("self", 0, ()), kind)
+
+
+def _name(body: BodyContext, expr: tree.NameRef) -> Node:
+    """The value of a variable, or THIS as a pointer."""
+    if expr not in body.facts.selves:
+        return loaded(body, expr)
+    own = body.pou.own_block
+    assert own is not None and own.type is not None
+    return body.instance_reference(Place(("self", 0, ()), own.type), own.type)
 
 
 def _index(body: BodyContext, expr: tree.Index, kind: Type) -> Place:
@@ -85,11 +101,13 @@ def _contents(body: BodyContext, expr: ladder.Contents) -> Node:
 
 
 PLACES: PlaceRules = {
+    tree.NameRef: _own_instance,
     tree.Direct: _direct, tree.Member: _member, tree.Part: _part, tree.Deref: _dereferenced, tree.Index: _index,
     ladder.Memory: plc_addresses.place_at, ladder.Words: _words, ladder.Contents: _words,
 }
 VALUES: ValueRules = {
     tree.Member: member_value,
-    **dict.fromkeys((tree.NameRef, tree.Direct, tree.Part, tree.Deref, tree.Index, ladder.Memory, ladder.Words), loaded),
+    tree.NameRef: _name,
+    **dict.fromkeys((tree.Direct, tree.Part, tree.Deref, tree.Index, ladder.Memory, ladder.Words), loaded),
     ladder.Contents: _contents,
 }

@@ -157,6 +157,9 @@ class _RelocatableProgram(Program):
     def number(self, pou: Pou) -> int:
         return self.bodies.setdefault(self._key(pou), _BodySymbol(len(self.bodies)))
 
+    def candidates(self, pou: Pou) -> dict[Pou, list[int]]:
+        raise _NotRelocatable(pou.name)
+
     def frame(self, pou: Pou) -> Origin:
         return self._base("frame", self._key(pou)), 0
 

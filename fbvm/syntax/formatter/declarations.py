@@ -50,7 +50,7 @@ class DeclarationLayout(TypeLayout, SfcLayout):
         phrase = Phrase(word.start, self.leaf(word), " ", head)
         if colon and result:
             phrase.parts += (" ", self.leaf(colon), " ", result.doc)
-        declared, body = self.rows(sections), self.rows(items)
+        declared, body = self.rows(sections), self.with_methods(items)
         if not actions:
             body += self.before_end(end)
         more = self.apart(actions)
@@ -61,6 +61,36 @@ class DeclarationLayout(TypeLayout, SfcLayout):
             phrase.parts.append(Indent(lines(self.before_end(end))))
         phrase.parts += (HARD, self.leaf(end))
         return phrase
+
+    def with_methods(self, items: list[Phrase]) -> list[Row]:
+        """The items of a body, with an empty line around each method."""
+        rows: list[Row] = []
+        for before, item in zip([None, *items], items, strict=False):
+            new = self.rows([item])
+            if "method" in (item.level, before.level if before else ""):
+                new[0] = new[0]._replace(blank=True)
+            rows += new
+        return rows
+
+    def interface(self, word: Token, head: Doc, members: list[Phrase], end: Token) -> Phrase:
+        return Phrase(word.start, self.leaf(word), " ", head, Indent(lines(self.with_methods(members) + self.before_end(end))),
+                      HARD, self.leaf(end))
+
+    def method(self, word: Token, head: Doc, colon: Token | None, result: Phrase | None, sections: list[Phrase],
+               items: list[Phrase], end: Token) -> Phrase:
+        made = self.function(word, head, colon, result, sections, items, [], end)
+        made.level = "method"
+        return made
+
+    def property(self, word: Token, head: Doc, colon: Token, spec: Phrase, accessors: list[Phrase], end: Token) -> Phrase:
+        return Phrase(word.start, self.leaf(word), " ", head, " ", self.leaf(colon), " ", spec.doc, self.block(accessors, end),
+                      HARD, self.leaf(end), level="method")
+
+    def accessor(self, modifiers: list[Leaf], word: Token, sections: list[Phrase], items: list[Phrase], end: Token) -> Phrase:
+        words = tuple(part for each in modifiers for part in (each, " "))
+        made = self.function(word, (), None, None, sections, items, [], end)
+        made.parts[:2] = (*words, made.parts[0])
+        return made
 
     def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None,
                items: list[Phrase], end: Token) -> Phrase:

@@ -126,6 +126,9 @@ class StatementLayout(ExpressionLayout):
     def jump(self, word: Token, target: Token) -> Phrase:
         return Phrase(word.start, self.leaf(word), " ", self.leaf(target))
 
+    def method_among_statements(self, method: Phrase) -> Phrase:
+        return method
+
     def refused_statement(self, token: Token) -> Phrase:
         return self.refused(token)
 

@@ -17,7 +17,9 @@ ENDS = {
     "VAR": "END_VAR", "VAR_GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE",
     "FUNCTION": "END_FUNCTION", "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM",
     "CONFIGURATION": "END_CONFIGURATION", "RESOURCE": "END_RESOURCE", "ACTION": "END_ACTION", "ACTIONS": "END_ACTIONS",
-    "VAR_ACCESS": "END_VAR", "VAR_CONFIG": "END_VAR", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION"}
+    "VAR_ACCESS": "END_VAR", "VAR_CONFIG": "END_VAR", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION",
+    "CLASS": "END_CLASS", "INTERFACE": "END_INTERFACE", "METHOD": "END_METHOD", "PROPERTY": "END_PROPERTY",
+    "ACCESSOR": "END_ACCESSOR"}
 """Word that opens -> word that ends it."""
 
 OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}
@@ -25,7 +27,7 @@ OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL"
 for _opener, _end in ENDS.items():
     OPENERS.setdefault(_end, set()).add(_opener)
 
-UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "$END"}
+UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "CLASS", "INTERFACE", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "$END"}
 """Tokens that begin a declaration at the outermost level, and the end of the text."""
 
 POUS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM"}
@@ -34,7 +36,7 @@ HEADS = {"IF": "THEN", "ELSIF": "THEN", "WHILE": "DO", "FOR": "DO", "CASE": "OF"
 """Word that begins a head -> the word that ends the head."""
 
 LISTS = ("ended_list", "var_decls", "type_decls", "declarations", "config_items", "resource_items", "some_actions",
-         "access_decls", "config_decls", "associations")
+         "access_decls", "config_decls", "associations", "prototypes", "accessors")
 STATEMENT_LISTS = {"ended_list", "open_list", "statement_list"}
 
 

@@ -143,7 +143,7 @@ def _access_in_front(automaton: Automaton, token: Token, following: list[Token])
     access, word = automaton.before, token.text.upper()
     if word not in ("METHOD", "PROPERTY", "ACTION") or access.text.upper() not in ACCESS or len(following) < 2:
         return None
-    return Repair([Token("REFUSED_BLOCK", token.text, token.start, token.end)], access.start, access.end,
+    return Repair([Token(word, token.text, token.start, token.end)], access.start, access.end,
                   f"{found(access)} stands in front of {word}", f"write {word} {access.text.upper()} {following[1].text}",
                   cut=True, lossless=True)
 

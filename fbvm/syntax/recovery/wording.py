@@ -10,14 +10,15 @@ from fbvm.syntax.st.tables import tables
 GROUPS = (
     ("a declaration (FUNCTION, FUNCTION_BLOCK, PROGRAM, TYPE, VAR_GLOBAL, CONFIGURATION)", {"FUNCTION", "TYPE"}, {
         "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "REFUSED_SECTION",
-        "REFUSED_BLOCK", "ACTION", "ACTIONS", "VAR_CONFIG", "SEMICOLON", "$END"}),
+        "REFUSED_BLOCK", "CLASS", "INTERFACE", "ACTION", "ACTIONS", "VAR_CONFIG", "SEMICOLON", "$END"}),
     ("a statement", {"IF", "FOR", "SEMICOLON"}, {
         "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK",
+        "METHOD", "PROPERTY",
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
-        "NOT", "DIRECT", "SELF", "LADDER", "INSTRUCTION_LIST"}),
+        "NOT", "DIRECT", "LADDER", "INSTRUCTION_LIST"}),
     ("an expression", {"NAME", "NUMBER", "LPAR"}, {
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS",
-        "MINUS", "NOT", "DIRECT", "SELF"}),
+        "MINUS", "NOT", "DIRECT"}),
     ("a type", {"NAME", "ARRAY"}, {
         "NAME", "ARRAY", "STRING", "WSTRING", "STRUCT", "UNION", "REF_TO", "POINTER", "REFERENCE", "LPAR"}),
     ("a name", {"NAME"}, {"NAME", "POU_MODIFIER", "QUALIFIER", "AT"}),
@@ -36,8 +37,8 @@ STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "DIRECT"}
 LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
-UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE",
-          "OVERLAP", "ACTION", "DIRECTION", "STEP", "TRANSITION"}
+UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "JMP", "QUALIFIER", "EDGE",
+          "OVERLAP", "ACTION", "DIRECTION", "STEP", "TRANSITION", "METHOD", "PROPERTY", "ACCESSOR", "CLASS", "INTERFACE"}
 """Terminals that are allowed and never mentioned: they would be refused later, or are seldom meant."""
 
 FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPAR", "RSQB")

@@ -23,7 +23,6 @@ class SfcElements(Declarations):
         the POU is complete, since they need to know all its actions."""
 
     def step(self, word: Token, token: Token, colon: Token, associations: list[Association], end: Token) -> Step:
-        self.refuse_self_references()
         return Step(word.start, end.end, self.declared(token), word.text.upper() == "INITIAL_STEP", tuple(associations))
 
     def association(self, token: Token, opener: Token | None, given: list[Expr] | None, closer: Token | None,
@@ -83,7 +82,6 @@ class SfcElements(Declarations):
 
     def _transition(self, word: Token, token: Token | None, priority: int | None, sources: list[Name],
                     targets: list[Name], condition: Expr, body: Block | None, end: Token) -> Transition:
-        self.refuse_self_references()
         return Transition(word.start, end.end, self.declared(token) if token else None, priority, tuple(sources),
                           tuple(targets), condition, body)
 

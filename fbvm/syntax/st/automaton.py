@@ -23,7 +23,8 @@ NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "ST
                      "POINTER", "REFERENCE"))
 REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK", "TRY"))
 DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
-                      "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION", "END_TRANSITION"))
+                      "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION", "END_TRANSITION", "END_CLASS",
+                      "END_METHOD", "END_ACCESSOR"))
 """Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the
 wrong one; the recovery needs the stacks as they are before that."""
 

@@ -51,8 +51,6 @@ class Builder:
         """Whether a comment or pragma without end reaches to the end of the text."""
         self.full = False
         """Whether ERROR_LIMIT is reached."""
-        self.self_references: list[Token] = []
-        """THIS and SUPER seen since the last statement."""
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""
         self.lists: list[InstructionList] = []
@@ -150,7 +148,7 @@ class Builder:
         return names
 
     def refused(self, token: Token) -> Refused:
-        """A whole METHOD .. END_METHOD and its like."""
+        """A whole NAMESPACE .. END_NAMESPACE and its like."""
         what, code = refused_what(token.text)
         return Refused(token.start, token.end, what, code)
 

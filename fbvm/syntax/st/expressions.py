@@ -85,10 +85,6 @@ class Expressions(Builder):
     def direct(self, token: Token) -> Direct:
         return Direct(token.start, token.end, token.text)
 
-    def self_reference(self, token: Token) -> NameRef:
-        self.self_references.append(token)
-        return NameRef(token.start, token.end, token.text)
-
     def member(self, of: Expr, dot: Token, token: Token) -> Member:
         node = Member(of.start, token.end, of, Name(token.start, token.end, token.text))
         self.deepen(node, of)

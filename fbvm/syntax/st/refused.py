@@ -1,4 +1,4 @@
-"""Texts that are read as one token and refused: METHOD .. END_METHOD and the like.
+"""Texts that are read as one token and refused: NAMESPACE .. END_NAMESPACE and the like.
 
 `whole` takes the tokens behind such a word, so that an END in a comment or a string does not count."""
 
@@ -8,13 +8,12 @@ from collections.abc import Callable
 
 from fbvm.syntax.st.lexer import Token
 
-OBJECT_ORIENTED = {"CLASS", "INTERFACE", "NAMESPACE", "METHOD", "PROPERTY", "USING", "EXTENDS", "IMPLEMENTS", "THIS",
-                   "SUPER", "ABSTRACT", "FINAL", "PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
+OBJECT_ORIENTED = {"NAMESPACE", "USING", "EXTENDS"}
 ENDS = {"USING": ";", "__TRY": "__ENDTRY"}
 """Word -> the end of its refused text, if that is not END_ and the word."""
 
-HOUSES = {"CLASS", "INTERFACE", "NAMESPACE"}
-"""Words of texts that may contain whole POUs or methods; other texts end at the latest with their POU."""
+HOUSES = {"NAMESPACE"}
+"""Words of texts that may contain whole POUs; other texts end at the latest with their POU."""
 
 LIMITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "CONFIGURATION", "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM",
           "END_CONFIGURATION", "END_RESOURCE", "TYPE", "$END"}

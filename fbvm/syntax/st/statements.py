@@ -23,6 +23,7 @@ from fbvm.syntax.tree import (
     If,
     NameRef,
     Node,
+    Pou,
     RefusedStatement,
     Repeat,
     Return,
@@ -44,7 +45,17 @@ class Label(Node):
         self.values = values
 
 
-Items = list[Statement | Label]
+class Members(Node):
+    """A METHOD, or a PROPERTY with its accessors; stands in a list of statements until its POU takes it."""
+
+    __slots__ = ("methods",)
+
+    def __init__(self, start: int, end: int, methods: tuple[Pou, ...]) -> None:
+        super().__init__(start, end)
+        self.methods = methods
+
+
+Items = list[Statement | Label | Members]
 
 
 class Statements(Expressions):
@@ -68,13 +79,16 @@ class Statements(Expressions):
         """The statements of a list outside CASE: a label of one name is a label for JMP, another one is reported."""
         made: list[Statement] = []
         for item, behind in zip_longest(items, items[1:]):
-            if not isinstance(item, Label):
+            if isinstance(item, Members):
+                self.report("S0101", item.start, item.end, "a METHOD or PROPERTY stands inside a statement",
+                            "it stands in its block, in front of the statements or behind them", False)
+            elif not isinstance(item, Label):
                 made.append(item)
             elif not self._no_label(item, behind):
                 made.append(self._outside_case(item))
         return tuple(made)
 
-    def _no_label(self, label: Label, behind: Label | Statement | None) -> bool:
+    def _no_label(self, label: Label, behind: Label | Statement | Members | None) -> bool:
         """Whether a label is none, since `a : INT;` or `a : 5;` is written; that is reported."""
         value, high = label.values[0]
         first = behind.targets[0] if isinstance(behind, Assign) else behind.call if isinstance(behind, CallStatement) else None
@@ -102,21 +116,6 @@ class Statements(Expressions):
             self.report("S0101", label.start, label.end, "label of CASE outside of a CASE statement", "")
         return Empty(label.start, label.end)
 
-    def checked(self, statement: Statement) -> Statement:
-        """The statement itself, or its refusal if it contains THIS or SUPER."""
-        mine = [token for token in self.self_references if token.start >= statement.start] if self.self_references else None
-        if not mine:
-            return statement
-        del self.self_references[-len(mine):]
-        return RefusedStatement(statement.start, statement.end, mine[0].text.upper(), "S0902")
-
-    def refuse_self_references(self) -> None:
-        """Report THIS and SUPER outside of statements, which have no statement to refuse."""
-        for token in self.self_references:
-            word = token.text.upper()
-            self.report("S0902", token.start, token.end, f"{word} is object-oriented text, which is refused", "")
-        self.self_references.clear()
-
     # --- simple statements ---
 
     def one_target(self, target: Expr, sign: Token) -> list[Expr]:
@@ -127,13 +126,13 @@ class Statements(Expressions):
         return targets
 
     def assignment(self, targets: list[Expr], value: Expr) -> Statement:
-        return self.checked(Assign(targets[0].start, value.end, tuple(targets), ":=", value))
+        return Assign(targets[0].start, value.end, tuple(targets), ":=", value)
 
     def assignment_other(self, target: Expr, sign: Token, value: Expr) -> Statement:
-        return self.checked(Assign(target.start, value.end, (target,), sign.text.upper(), value))
+        return Assign(target.start, value.end, (target,), sign.text.upper(), value)
 
     def call_statement(self, call: Expr) -> Statement:
-        return self.checked(CallStatement(call.start, call.end, call))
+        return CallStatement(call.start, call.end, call)
 
     def exit_statement(self, word: Token) -> Exit:
         return Exit(word.start, word.end)
@@ -142,15 +141,18 @@ class Statements(Expressions):
         return Continue(word.start, word.end)
 
     def return_statement(self, word: Token, value: Expr | None) -> Statement:
-        return self.checked(Return(word.start, value.end if value else word.end, value))
+        return Return(word.start, value.end if value else word.end, value)
 
     def jump(self, word: Token, target: Token) -> RefusedStatement:
         made = RefusedStatement(word.start, target.end, "JMP")
         self.targets[made] = target.text
         return made
 
+    def method_among_statements(self, members: Members) -> Members:
+        return members
+
     def refused_statement(self, token: Token) -> RefusedStatement:
-        """A METHOD, STEP ... among statements; directly in a body its POU takes it."""
+        """A NAMESPACE, __TRY ... among statements; directly in a body its POU takes it."""
         return RefusedStatement(token.start, token.end, *refused_what(token.text))
 
     # --- compound statements ---
@@ -158,7 +160,7 @@ class Statements(Expressions):
     def if_statement(self, word: Token, condition: Expr, then: Token, items: Items, more: list[Branch],
                      other: Token | None, otherwise: Items | None, end: Token) -> Statement:
         branches = ((condition, self.block(items)), *more)
-        return self.checked(If(word.start, end.end, branches, None if otherwise is None else self.block(otherwise)))
+        return If(word.start, end.end, branches, None if otherwise is None else self.block(otherwise))
 
     def add_elsif(self, branches: list[Branch], word: Token, condition: Expr, then: Token,
                   items: Items) -> list[Branch]:
@@ -184,7 +186,7 @@ class Statements(Expressions):
                         "write `value:` in front of it")
         branches = tuple(self._branch(items[at:until]) for at, until in pairwise([*starts, len(items)]))
         rest = None if otherwise is None else self.block(otherwise)
-        return self.checked(Case(word.start, end.end, selector, branches, rest))
+        return Case(word.start, end.end, selector, branches, rest)
 
     def _branch(self, items: Items) -> CaseBranch:
         label = items[0]
@@ -193,11 +195,11 @@ class Statements(Expressions):
 
     def for_statement(self, word: Token, variable: Expr, sign: Token, first: Expr, to: Token, last: Expr,
                       by: Token | None, step: Expr | None, do: Token, items: Items, end: Token) -> Statement:
-        return self.checked(For(word.start, end.end, variable, first, last, step, self.block(items)))
+        return For(word.start, end.end, variable, first, last, step, self.block(items))
 
     def while_statement(self, word: Token, condition: Expr, do: Token, items: Items, end: Token) -> Statement:
-        return self.checked(While(word.start, end.end, condition, self.block(items)))
+        return While(word.start, end.end, condition, self.block(items))
 
     def repeat_statement(self, word: Token, items: Items, until: Token, condition: Expr, semicolon: Token | None,
                          end: Token) -> Statement:
-        return self.checked(Repeat(word.start, end.end, self.block(items), condition))
+        return Repeat(word.start, end.end, self.block(items), condition)

@@ -17,7 +17,6 @@ from fbvm.syntax.tree import (
     NamedType,
     NameRef,
     RefSpec,
-    Refused,
     StringSpec,
     StructSpec,
     SubrangeSpec,
@@ -44,8 +43,12 @@ class Types(Statements):
         return TypeDecl(token.start, end.end if end else spec.end, self.declared(token), spec, None)
 
     def type_decl_extends(self, token: Token, word: Token, bases: list[NamedType], colon: Token, spec: TypeSpec,
-                          end: Token | None) -> Refused:
-        return Refused(token.start, end.end if end else spec.end, f"{word.text.upper()} of a structure", "S0902")
+                          end: Token | None) -> TypeDecl:
+        if isinstance(spec, StructSpec) and word.text.upper() == "EXTENDS":
+            spec = StructSpec(bases[0].start, spec.end, spec.members, spec.overlap, tuple(bases))
+        else:
+            self.report("S0101", word.start, word.end, f"{word.text} belongs to a block", "a structure EXTENDS another one")
+        return TypeDecl(token.start, end.end if end else spec.end, self.declared(token), spec, None)
 
     # --- names and strings ---
 

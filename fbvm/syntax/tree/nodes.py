@@ -58,8 +58,11 @@ class ArraySpec(TypeSpec):
 
 @_node
 class StructSpec(TypeSpec):
+    """`STRUCT .. END_STRUCT`, of a type that EXTENDS `bases` behind the members of these."""
+
     members: tuple[VarDecl, ...]
     overlap: bool = False
+    bases: tuple[NamedType, ...] = ()
 
 
 @_node
@@ -217,7 +220,7 @@ class Empty(Statement):
 
 @_node
 class RefusedStatement(Statement):
-    """Understood but never executed (a JMP into a block, SUPER() ...): `what` names it, `code` is S0901 or S0902."""
+    """Understood but never executed (a JMP into a block, NAMESPACE ...): `what` names it, `code` is S0901 or S0902."""
 
     what: str
     code: str = "S0901"
@@ -233,7 +236,7 @@ class Declaration(Node):
 
 @_node
 class Refused(Declaration):
-    """Understood but not executed: CLASS, INTERFACE, METHOD, NAMESPACE ...; code S0901 or S0902."""
+    """Understood but not executed: NAMESPACE, USING, VAR_ACCESS of a block ...; code S0901 or S0902."""
 
     what: str
     code: str
@@ -248,7 +251,11 @@ class TypeDecl(Declaration):
 
 @_node
 class Pou(Declaration):
-    """FUNCTION, FUNCTION_BLOCK or PROGRAM.  `refused` are METHODs, EXTENDS ... found in it."""
+    """FUNCTION, FUNCTION_BLOCK, PROGRAM, CLASS or INTERFACE, and a METHOD of one of these.
+
+    `modifiers` are the words of its head (ABSTRACT, FINAL, OVERRIDE, PUBLIC ...) in capitals, `bases` and `interfaces` what
+    stands behind EXTENDS and IMPLEMENTS.  A PROPERTY is up to two of its `methods`, of the kinds GET and SET; SET has an input
+    with the name of the property.  `refused` are parts that are not executed."""
 
     kind: str
     name: Name
@@ -258,6 +265,10 @@ class Pou(Declaration):
     refused: tuple[Refused, ...] = ()
     actions: tuple[Action, ...] = ()
     accesses: tuple[AccessVars, ...] = ()
+    modifiers: tuple[Name, ...] = ()
+    bases: tuple[NamedType, ...] = ()
+    interfaces: tuple[NamedType, ...] = ()
+    methods: tuple[Pou, ...] = ()
 
 
 @_node

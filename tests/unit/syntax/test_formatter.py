@@ -229,8 +229,8 @@ def test_lines_of_a_comment_keep_their_places_to_one_another() -> None:
 
 
 def test_what_is_refused_is_not_touched() -> None:
-    method = "METHOD  m:INT\n   x:=1 ;\nEND_METHOD"
-    assert body(method + "\na;") == method + "\na;\n"
+    refused = "NAMESPACE  m\n   x:=1 ;\nEND_NAMESPACE"
+    assert body(refused + "\na;") == refused + "\na;\n"
 
 
 # --- names ---

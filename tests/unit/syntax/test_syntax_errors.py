@@ -146,7 +146,8 @@ def test_a_comment_without_end_is_the_only_message() -> None:
 
 def test_a_method_without_end_stops_at_its_pou() -> None:
     errors = wrong("FUNCTION_BLOCK f METHOD m x := 1; END_FUNCTION_BLOCK PROGRAM p END_PROGRAM")
-    assert [d.message for d in errors] == ["METHOD has no end before `END_FUNCTION_BLOCK`"]
+    assert [d.message for d in errors] == [
+        "END_METHOD expected before `END_FUNCTION_BLOCK`: the METHOD of line 1 is still open"]
 
 
 @pytest.mark.slow
