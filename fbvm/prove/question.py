@@ -29,8 +29,12 @@ class Question:
     free: tuple[str, ...] = ()
     prefix: str = ""
     """The path of an instance, with a dot, whose variables are named without it."""
+    title: str = ""
+    """What is asked, in words, where the condition is too long."""
 
     def __str__(self) -> str:
+        if self.title:
+            return self.title
         return self.kind if self.kind == NO_TRAP else f"{self.kind} {self.text}"
 
     @property

@@ -181,13 +181,23 @@ END_RESOURCE END_CONFIGURATION
     assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 11)
 
 
-def test_a_comparison_of_reals_is_taken_for_any_value() -> None:
-    image = program("Q := r > 10.0 AND In; Z := Q AND NOT In;", "r AT %ID4 : REAL; Q, Z : BOOL;")
-    verdict = asked(image, NEVER, "Main.Q AND NOT Main.In")
-    assert verdict.word == "proved"
+@pytest.mark.parametrize(("kind", "address"), [("REAL", "%ID4"), ("LREAL", "%IL1")])
+def test_reals_are_compared_exactly(kind: str, address: str) -> None:
+    image = program("Q := r > 10.0 AND r < 11.0; n := SEL(r = -r, 0, 1);", f"r AT {address} : {kind}; Q : BOOL; n : INT;")
+    assert asked(image, NEVER, "Main.Q AND Main.r <= 10.0").word == "proved"
+    assert asked(image, NEVER, "Main.n = 1 AND Main.r <> 0.0").word == "proved"
+    found = asked(image, REACH, "Main.Q AND Main.r > 10.25")
+    assert found.run is not None
+    [(place, value)] = found.run.writes[0].items()
+    assert place.name == "Main.r" and isinstance(value, float) and 10.25 < value < 11.0
+
+
+def test_arithmetic_of_reals_is_taken_for_any_value() -> None:
+    image = program("r := r + 1.0; Q := r > 10.0 AND In;", "r : REAL; Q : BOOL;")
+    assert asked(image, NEVER, "Main.Q AND NOT Main.In").word == "proved"
     broken = asked(program("Q := r * 0.0 > 1.0;", "r AT %ID4 : REAL; Q : BOOL;"), NEVER, "Main.Q")
     assert broken.word == "undecided"
-    assert broken.notes[0].startswith("taken for any value: ")
+    assert broken.notes[0] == "taken for any value: mul of REAL (text.st:6:1 in Main)"
 
 
 def test_a_program_in_the_loop_of_a_pointer_to_a_local_is_refused_with_its_line() -> None:
