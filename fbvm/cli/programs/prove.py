@@ -89,13 +89,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
             _print(image, verdict)
     if as_json:
         say_json({"cycle_ns": options["cycle_ns"], "properties": [_as_dict(verdict) for verdict in verdicts]})
-    found = [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]
-    chosen = ({"program": program} if program else {}) | compile_options()
-    if options["test_file"] and found:
-        with writing(options["test_file"]):
-            write_file(options["test_file"], pytest_text(found, files, chosen))
-    if options["trace"] and found:
-        _record(asked[-1][0], found[0], options, files, libraries, program)
+    if found := [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]:
+        _keep(asked[-1][0], found, options, files, libraries, program)
     sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
 
 
@@ -158,6 +153,17 @@ def _as_dict(verdict: Verdict) -> dict[str, object]:
                        for number, writes in enumerate(run.writes) if writes],
         }  # fmt: skip
     return found
+
+
+def _keep(image: Image, found: Sequence[Verdict], options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],
+          program: str | None) -> None:  # fmt: skip
+    """Writes the runs that were found into the files that --test and --trace name."""
+    if options["test_file"]:
+        chosen = ({"program": program} if program else {}) | compile_options()
+        with writing(options["test_file"]):
+            write_file(options["test_file"], pytest_text(found, files, chosen))
+    if options["trace"]:
+        _record(image, found[0], options, files, libraries, program)
 
 
 def _record(image: Image, verdict: Verdict, options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],

@@ -425,10 +425,6 @@ def _operation(name: str) -> Row:
     return row
 
 
-def _enum_text(x: Execution, state: State, machine: str, names: Any, a: Node) -> Term:
-    return folded(x, state, "enum_text", machine, [a], before=(names,))
-
-
 EXPRESSION_ROWS: dict[str, Row] = {
     "const": lambda x, state, machine, value: constant_term(x, machine, value),
     "tmp": lambda x, state, machine, number: state.temporaries[number],
@@ -442,7 +438,8 @@ EXPRESSION_ROWS: dict[str, Row] = {
     "convert": _convert, "nearest": _to_integer("nearest"), "truncate": _to_integer("truncate"), "bits": _bits,
     "is_set": _is_set, "select": _select, "mux": _mux, "min": _extreme("min"), "max": _extreme("max"),
     "check": _check, "within": _within, "floor_div": _floor_div, "now": lambda x, state, machine: x.now,
-    "from_bcd": _from_bcd, "to_bcd": _to_bcd, "enum_text": _enum_text,
+    "from_bcd": _from_bcd, "to_bcd": _to_bcd,
+    "enum_text": lambda x, state, machine, names, a: folded(x, state, "enum_text", machine, [a], before=(names,)),
     "reference": _reference, "bit_behind": _bit_behind,
     **{name: _operation(name) for name in (
         "pow", "math", "atan2", "length", "left", "right", "mid", "concat", "insert", "delete", "replace", "find", "to_text",
