@@ -27,7 +27,7 @@ from fbvm.prove import equality
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, Prover, SpuriousRun
 from fbvm.prove.pytest_text import pytest_text
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
 from fbvm.prove.report import details, headline
 from fbvm.prove.runs import repeated
 from fbvm.prove.solver import SolverMissing
@@ -47,6 +47,8 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--always", multiple=True, metavar="EXPRESSION", help="It holds behind every scan.")
 @click.option("--reach", multiple=True, metavar="EXPRESSION", help="Find the shortest run to a scan behind which it holds.")
 @click.option("--no-trap", is_flag=True, help="No scan ends in a trap.")
+@click.option("--within", nargs=3, multiple=True, metavar="TRIGGER EXPRESSION TIME",
+              help="When TRIGGER becomes true, EXPRESSION holds behind a scan that begins TIME later at most.")
 @click.option("--equal", "pairs", nargs=2, multiple=True, metavar="BLOCK BLOCK",
               help="Two function blocks or functions give the same outputs for the same inputs.")
 @click.option("--assume", multiple=True, metavar="EXPRESSION", help="Look only at runs in which it holds behind every scan.")
@@ -74,9 +76,11 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     followed."""
     kinds = [(NEVER, never), (ALWAYS, always), (REACH, reach)]
     questions = [Question(kind, text, options["assume"], options["free"]) for kind, texts in kinds for text in texts]
+    questions += [Question(WITHIN, text, options["assume"], options["free"], trigger=trigger, within_ns=time_ns(limit))
+                  for trigger, text, limit in options["within"]]  # fmt: skip
     questions += [Question(NO_TRAP, "", options["assume"], options["free"])] * no_trap
     if not questions and not pairs:
-        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap or --equal")
+        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within or --equal")
     asked = [_equality(pair, files, libraries, options["assume"]) for pair in pairs]
     if questions:
         image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)

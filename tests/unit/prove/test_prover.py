@@ -10,7 +10,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, prove
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
 from fbvm.prove.runs import repeated
 
 FEW = Limits(simulated_scans=200, scans=120)
@@ -223,3 +223,28 @@ END_PROGRAM
     verdict = prove(image, Question(NEVER, "Main.n = 99"), FEW)
     assert verdict.word == "proved"
     assert verdict.notes and "executes" in verdict.notes[0]
+
+
+WAITING = "t(IN := In AND NOT Other, PT := T#30ms); Q := t.Q;"
+
+
+def answered(image: Image, within_ms: int, *assumed: str) -> Verdict:
+    return prove(image, Question(WITHIN, "Main.Q", assumed, trigger="Main.In", within_ns=within_ms * 1_000_000), FEW)
+
+
+def test_an_answer_within_a_time_is_proved() -> None:
+    image = program(WAITING, "t : TON; Q : BOOL;")
+    assert answered(image, 30, "Main.In", "NOT Main.Other").word == "proved"
+
+
+def test_an_answer_that_comes_too_late_is_shown() -> None:
+    image = program(WAITING, "t : TON; Q : BOOL;")
+    verdict = answered(image, 20, "NOT Main.Other")
+    assert verdict.run is not None
+    assert (verdict.word, verdict.run.scans, str(verdict.question)) == ("broken", 3, "Main.Q within 20ms of Main.In")
+
+
+def test_an_answer_that_somebody_prevents_is_shown() -> None:
+    image = program(WAITING, "t : TON; Q : BOOL;")
+    verdict = answered(image, 50)
+    assert (verdict.word, verdict.run and verdict.run.scans) == ("broken", 6)
