@@ -25,6 +25,7 @@ from fbvm.prove.question import (
     REACHED,
     UNDECIDED,
     UNREACHABLE,
+    WITHIN,
     Names,
     Question,
     Run,
@@ -95,8 +96,25 @@ class Prover:
         if self.question.kind == NO_TRAP:
             return Goal(stop, stop, given)
         condition = condition_term(summary.contents, names.condition(self.question.text).term)
+        if self.question.kind == WITHIN:
+            condition = self._awaited(condition, condition_term(summary.contents, names.condition(self.question.trigger).term))
         hit = terms.not_(condition) if self.question.kind == ALWAYS else condition
         return Goal(terms.and_(hit, terms.not_(stop)), stop, given)
+
+    def _awaited(self, answer: Term, trigger: Term) -> Term:
+        """The condition that an answer is late.
+
+        Adds two variables to the state: whether the trigger held behind the scan before, and for how many scans the answer is
+        awaited."""
+        terms, summary = self.summary.terms, self.summary
+        before, waited = terms.variable(("trigger", "before"), 0), terms.variable(("answer", "awaited"), 32)
+        none, one = terms.constant(32, 0), terms.constant(32, 1)
+        waits = terms.not_(terms.eq(waited, none))
+        begins = terms.all_of(trigger, terms.not_(before), terms.not_(waits))
+        longer = terms.ite(terms.or_(waits, begins), terms.add(waited, one), none)
+        summary.initial |= {before: terms.false, waited: none}
+        summary.next |= {before: trigger, waited: terms.ite(answer, none, longer)}
+        return terms.eq(summary.next[waited], terms.constant(32, self.question.waiting_scans(self.limits.cycle_ns) + 1))
 
     def _types(self) -> Iterable[Term]:
         """What the types of inputs say: enumerations have their members, subranges their limits."""
@@ -124,7 +142,7 @@ class Prover:
             lambda: self._induced([], 1),
             self._simulated,
             lambda: self._searched(deeper),
-            lambda: self._induced([], MOST_INDUCTION),
+            lambda: self._induced([], self._deepest()),
             self._with_invariants,
             lambda: self._searched(self.limits.scans),
         )
@@ -152,9 +170,7 @@ class Prover:
         return self._verdict(UNDECIDED, how)
 
     def _verdict(self, word: str, how: str, run: Run | None = None) -> Verdict:
-        condition = self.judge.condition
-        named = tuple(dict.fromkeys(condition.places)) if condition else ()
-        return Verdict(self.question, word, how, self.search.cleared, run, named, tuple(self.notes))
+        return Verdict(self.question, word, how, self.search.cleared, run, self.judge.places, tuple(self.notes))
 
     def _note_limits(self) -> None:
         """Notes what makes an answer worth less: variables that never change, operations of which nothing is known."""
@@ -167,9 +183,7 @@ class Prover:
 
     def _constants(self) -> list[Place]:
         """The variables in the property that nothing can change."""
-        condition = self.judge.condition
-        named = dict.fromkeys(condition.places) if condition else {}
-        return [place for place in named if place_term(self.summary.contents, place).is_constant]
+        return [place for place in self.judge.places if place_term(self.summary.contents, place).is_constant]
 
     def _unknowns(self) -> list[str]:
         """Operations of which nothing is known and on which the answer depends, with their places."""
@@ -252,7 +266,12 @@ class Prover:
         self.tell(f"trying {len(found)} invariants")
         invariants = Invariants(self.summary, state, self.goal.stop, self.goal.given, self.clock, self.limits.expired)
         kept = invariants.kept(found)
-        return self._induced(kept, MOST_INDUCTION) if kept else None
+        return self._induced(kept, self._deepest()) if kept else None
+
+    def _deepest(self) -> int:
+        """The scans that induction looks back: those in which an answer is awaited, if there are not too many."""
+        awaited = self.question.waiting_scans(self.limits.cycle_ns) + 2 if self.question.kind == WITHIN else 0
+        return max(MOST_INDUCTION, min(awaited, DEPTHS[-1]))
 
 
 class SpuriousRun(Exception):

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from fbvm.prove.question import ALWAYS, NO_TRAP, REACH, Run, Verdict
+from fbvm.prove.question import ALWAYS, NO_TRAP, REACH, WITHIN, Run, Verdict
 
 
 def pytest_text(verdicts: Sequence[Verdict], files: Sequence[Path], options: dict[str, str]) -> str:
@@ -37,6 +37,8 @@ def _test_name(verdict: Verdict, used: set[str]) -> str:
 
 def _statements(verdict: Verdict, run: Run) -> list[str]:
     """The writes of each scan and the scans between them; the last scan is asked for the property."""
+    if verdict.question.kind == WITHIN:
+        return _awaiting(verdict, run)
     lines: list[str] = []
     waiting = 0
     for number, writes in enumerate(run.writes):
@@ -52,3 +54,15 @@ def _statements(verdict: Verdict, run: Run) -> list[str]:
         return [*lines, "    assert plc.scan() is None"]
     sign = "==" if question.kind in (ALWAYS, REACH) else "!="
     return [*lines, f"    assert plc.run(scans=1, until={question.text!r}) {sign} 'until'"]
+
+
+def _awaiting(verdict: Verdict, run: Run) -> list[str]:
+    """The scans of a run in which an answer is awaited, with what each of the last ones is asked."""
+    question = verdict.question
+    first = run.scans - 1 - question.waiting_scans(run.cycle_ns)
+    lines = ["    answers = []"]
+    for number, writes in enumerate(run.writes):
+        lines += [f"    plc.write({place.name!r}, {value!r})" for place, value in writes.items()]
+        ended = f"plc.run(scans=1, until={question.text!r})"
+        lines.append(f"    answers.append({ended})" if number >= first else "    plc.scan()")
+    return [*lines, "    assert 'until' in answers"]

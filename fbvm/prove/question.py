@@ -9,16 +9,18 @@ from fbvm.engine.trap import Trap
 from fbvm.watch.conditions import Condition, parse_condition
 from fbvm.watch.paths import Place, Span, UnknownPlace, find
 from fbvm.watch.scopes import Scope
-from fbvm.watch.values import Value
+from fbvm.watch.values import Value, show_time
 
-NEVER, ALWAYS, REACH, NO_TRAP = "never", "always", "reach", "no trap"
+NEVER, ALWAYS, REACH, NO_TRAP, WITHIN = "never", "always", "reach", "no trap", "within"
 
 PROVED, BROKEN, REACHED, UNREACHABLE, UNDECIDED = "proved", "broken", "reached", "unreachable", "undecided"
 
 
 @dataclass(frozen=True)
 class Question:
-    """A property: `kind` is NEVER, ALWAYS, REACH (of `text`, a condition behind a scan) or NO_TRAP.
+    """A property: `kind` is NEVER, ALWAYS, REACH (of `text`, a condition behind a scan), NO_TRAP or WITHIN.
+
+    WITHIN: when the condition `trigger` becomes TRUE, `text` holds behind that scan or one that begins `within_ns` later at most.
 
     Each of `assumptions` holds behind each scan that is looked at; `free` are names and addresses that are inputs, besides those
     that `summary.input_places` finds."""
@@ -29,9 +31,21 @@ class Question:
     free: tuple[str, ...] = ()
     prefix: str = ""
     """The path of an instance, with a dot, whose variables are named without it."""
+    title: str = ""
+    """What is asked, in words, where the condition is too long."""
+    trigger: str = ""
+    within_ns: int = 0
 
     def __str__(self) -> str:
+        if self.title:
+            return self.title
+        if self.kind == WITHIN:
+            return f"{self.text} within {show_time(self.within_ns)[2:]} of {self.trigger}"
         return self.kind if self.kind == NO_TRAP else f"{self.kind} {self.text}"
+
+    def waiting_scans(self, cycle_ns: int) -> int:
+        """Scans after the trigger behind one of which WITHIN wants the condition to hold."""
+        return self.within_ns // cycle_ns
 
     @property
     def is_reach(self) -> bool:

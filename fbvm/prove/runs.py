@@ -4,7 +4,7 @@ solver says."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from random import Random
 
 from fbvm.base.types import BOOL, EnumType, SubrangeType, base
@@ -14,7 +14,7 @@ from fbvm.prove.bounded import Inputs
 from fbvm.prove.encoding.cells import BIT, Cell
 from fbvm.prove.encoding.terms import Term
 from fbvm.prove.invariants import Sample, Values
-from fbvm.prove.question import ALWAYS, NO_TRAP, Question, Run
+from fbvm.prove.question import ALWAYS, NO_TRAP, WITHIN, Question, Run
 from fbvm.prove.question import Names as QuestionNames
 from fbvm.watch.conditions import Condition
 from fbvm.watch.names import Names
@@ -35,19 +35,41 @@ class Judge:
     question: Question
     condition: Condition | None
     assumptions: tuple[Condition, ...]
+    trigger: Condition | None = None
+    waited: list[int] = field(default_factory=lambda: [0, 0])
+    """Of WITHIN: whether the trigger held behind the scan before, and for how many scans its answer is awaited."""
 
     @classmethod
     def of(cls, image: Image, question: Question) -> Judge:
         """Raises ConditionError for conditions that do not fit the program."""
         names = QuestionNames(image, question.prefix)
         condition = None if question.kind == NO_TRAP else names.condition(question.text)
-        return cls(question, condition, tuple(names.condition(text) for text in question.assumptions))
+        trigger = names.condition(question.trigger) if question.kind == WITHIN else None
+        return cls(question, condition, tuple(names.condition(text) for text in question.assumptions), trigger)
+
+    def begun(self) -> Judge:
+        """The judge of a new run."""
+        return replace(self, waited=[0, 0])
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """What the property names."""
+        conditions = [each for each in (self.trigger, self.condition) if each is not None]
+        return tuple(dict.fromkeys(place for condition in conditions for place in condition.places))
 
     def met(self, plc: Plc) -> bool:
-        """True if the last scan of a PLC met the goal."""
+        """True if the last scan of a PLC met the goal.  To be asked once behind each scan of a run."""
         if self.condition is None:
             return plc.trap is not None
+        if self.trigger is not None:
+            return plc.trap is None and self._is_late(plc, self.condition.holds(plc.read), self.trigger.holds(plc.read))
         return plc.trap is None and self.condition.holds(plc.read) != (self.question.kind == ALWAYS)
+
+    def _is_late(self, plc: Plc, answered: bool, triggered: bool) -> bool:
+        before, waited = self.waited
+        begins = triggered and not before and not waited
+        self.waited[:] = [triggered, 0 if answered else waited + 1 if waited or begins else 0]
+        return self.waited[1] == self.question.waiting_scans(plc.cycle_ns) + 1
 
     def kept(self, plc: Plc) -> bool:
         """True if the assumptions hold now."""
@@ -126,6 +148,7 @@ def simulated(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], 
               budget: int) -> Iterator[Found | None]:  # fmt: skip
     """Runs with random inputs, some scans each; yields None now and then, and the run that met the goal, at last."""
     for number, hold_scans in enumerate(HOLD_SCANS):
+        judge = judge.begun()
         plc = Plc(image, cycle_ns, budget=budget, engine="python")
         random = Random(f"{seed} {number}")
         writer = InputWriter(plc, cells)
@@ -175,6 +198,7 @@ def sampled(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], st
 def replayed(image: Image, cycle_ns: int, judge: Judge, inputs: Inputs, is_shortest: bool, *, budget: int,
              plc: Plc | None = None) -> Run | None:  # fmt: skip
     """The run with these inputs, done on the engine; None if it does not meet the goal in its last scan, or earlier only."""
+    judge = judge.begun()
     plc = plc or Plc(image, cycle_ns, budget=budget, engine="python")
     writer = InputWriter(plc, list(inputs[0]) if inputs else [])
     writes: list[dict[Place, Value]] = []

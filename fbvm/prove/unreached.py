@@ -60,9 +60,21 @@ def _own_files(image: Image) -> set[str]:
     return {site.file for site in image.sites if not (library / site.file).is_file()}
 
 
+def _called(image: Image) -> set[int]:
+    """The numbers of the bodies that programs call, or would on paths that are impossible."""
+    found: set[int] = set()
+    waiting = [run.body for task in image.tasks for run in task.programs]
+    while waiting:
+        number = waiting.pop()
+        if number not in found:
+            found.add(number)
+            waiting += [node[1] for node in statements(image.bodies[number].code) if node[0] == "call"]
+    return found
+
+
 def _never_called(summary: Summary) -> Iterable[int]:
     """The sites of statements at which the execution never came by, not even on a path that is impossible."""
-    for body in summary.image.bodies:
-        for node in statements(body.code):
+    for number in _called(summary.image):
+        for node in statements(summary.image.bodies[number].code):
             if node[0] == "observe" and node[1] in ("statement", "rung") and node[2] not in summary.reached:
                 yield node[2]

@@ -13,18 +13,21 @@ import click
 from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.given_sources import inputs, sources_of
 from fbvm.cli.shared.options import CYCLE_NS, time_ns
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.run_recording import described, program_text, record_run
 from fbvm.cli.shared.run_result import chart_width
-from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_arguments
+from fbvm.cli.shared.sources import compile_options, compile_or_exit, report_diagnostics, source_arguments
 from fbvm.cli.shared.terminal import say, say_json
+from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
+from fbvm.prove import equality
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, Prover, SpuriousRun
 from fbvm.prove.pytest_text import pytest_text
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
 from fbvm.prove.report import details, headline
 from fbvm.prove.runs import repeated
 from fbvm.prove.solver import SolverMissing
@@ -44,6 +47,10 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--always", multiple=True, metavar="EXPRESSION", help="It holds behind every scan.")
 @click.option("--reach", multiple=True, metavar="EXPRESSION", help="Find the shortest run to a scan behind which it holds.")
 @click.option("--no-trap", is_flag=True, help="No scan ends in a trap.")
+@click.option("--within", nargs=3, multiple=True, metavar="TRIGGER EXPRESSION TIME",
+              help="When TRIGGER becomes true, EXPRESSION holds behind a scan that begins TIME later at most.")
+@click.option("--equal", "pairs", nargs=2, multiple=True, metavar="BLOCK BLOCK",
+              help="Two function blocks or functions give the same outputs for the same inputs.")
 @click.option("--assume", multiple=True, metavar="EXPRESSION", help="Look only at runs in which it holds behind every scan.")
 @click.option("--free", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST",
               help="Takes any value in each scan, as inputs do.")
@@ -58,7 +65,8 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--test", "test_file", type=_FILE, metavar="FILE", help="Write each run that is found as a test of pytest.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], never: tuple[str, ...],
-            always: tuple[str, ...], reach: tuple[str, ...], no_trap: bool, as_json: bool, **options: Any) -> None:  # fmt: skip
+            always: tuple[str, ...], reach: tuple[str, ...], no_trap: bool, pairs: tuple[tuple[str, str], ...], as_json: bool,
+            **options: Any) -> None:  # fmt: skip
     """Prove properties of a program for all inputs and all scans, or draw the shortest run that breaks one.
 
     Conditions are written as for `fbvm run --until`.  Inputs are free in each scan: %I, CIO that the program reads and never
@@ -68,26 +76,42 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     followed."""
     kinds = [(NEVER, never), (ALWAYS, always), (REACH, reach)]
     questions = [Question(kind, text, options["assume"], options["free"]) for kind, texts in kinds for text in texts]
+    questions += [Question(WITHIN, text, options["assume"], options["free"], trigger=trigger, within_ns=time_ns(limit))
+                  for trigger, text, limit in options["within"]]  # fmt: skip
     questions += [Question(NO_TRAP, "", options["assume"], options["free"])] * no_trap
-    if not questions:
-        raise click.UsageError("say what to prove: --never, --always, --reach or --no-trap")
-    image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
+    if not questions and not pairs:
+        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within or --equal")
+    asked = [_equality(pair, files, libraries, options["assume"]) for pair in pairs]
+    if questions:
+        image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
+        asked += [(image, question) for question in questions]
     verdicts = []
-    for question in questions:
+    for image, question in asked:
         verdict = _answered(image, question, options)
         verdicts.append(verdict)
         if not as_json:
             _print(image, verdict)
     if as_json:
         say_json({"cycle_ns": options["cycle_ns"], "properties": [_as_dict(verdict) for verdict in verdicts]})
-    found = [verdict for verdict in verdicts if verdict.run is not None]
-    chosen = ({"program": program} if program else {}) | compile_options(files)
-    if options["test_file"] and found:
-        with writing(options["test_file"]):
-            write_file(options["test_file"], pytest_text(found, files, chosen))
-    if options["trace"] and found:
-        _record(image, found[0], options, files, libraries, program)
+    if found := [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]:
+        _keep(asked[-1][0], found, options, files, libraries, program)
     sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
+
+
+def _equality(pair: tuple[str, str], files: Sequence[Path], libraries: Sequence[Path],
+              assumed: tuple[str, ...]) -> tuple[Image, Question]:  # fmt: skip
+    """The program that calls two blocks, and the question whether they are equal.  Ends the verb for blocks that cannot be
+    compared."""
+    try:
+        caller = equality.pair(sources_of(files), pair, libraries)
+        made = compile_files([*inputs(files)[0], caller], program=equality.PROGRAM, libraries=libraries, runnable=True,
+                             lint=False, **compile_options(files))
+        if made.image is None:
+            report_diagnostics(made.diagnostics, False)
+            sys.exit(status.PROGRAM_ERRORS)
+        return made.image, equality.equality(made.image, pair, assumed)
+    except equality.Unlike as error:
+        raise click.UsageError(str(error)) from None
 
 
 def _answered(image: Image, question: Question, options: dict[str, Any]) -> Verdict:
@@ -133,6 +157,17 @@ def _as_dict(verdict: Verdict) -> dict[str, object]:
                        for number, writes in enumerate(run.writes) if writes],
         }  # fmt: skip
     return found
+
+
+def _keep(image: Image, found: Sequence[Verdict], options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],
+          program: str | None) -> None:  # fmt: skip
+    """Writes the runs that were found into the files that --test and --trace name."""
+    if options["test_file"]:
+        chosen = ({"program": program} if program else {}) | compile_options(files)
+        with writing(options["test_file"]):
+            write_file(options["test_file"], pytest_text(found, files, chosen))
+    if options["trace"]:
+        _record(image, found[0], options, files, libraries, program)
 
 
 def _record(image: Image, verdict: Verdict, options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],

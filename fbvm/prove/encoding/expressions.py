@@ -23,6 +23,7 @@ from fbvm.code.operations import (
     Address,
     Node,
 )
+from fbvm.prove.encoding import reals
 from fbvm.prove.encoding.addresses import cases, targets
 from fbvm.prove.encoding.cells import Contents
 from fbvm.prove.encoding.execution import Execution, Refused, Row, State
@@ -70,8 +71,6 @@ def folded(x: Execution, state: State, name: str, machine: str, nodes: list[Node
     if all(value.is_constant for value in values):
         known = [("const", node[1], constant_value(node[1], value)) for node, value in zip(nodes, values, strict=True)]
         try:
-            if name == "neg":
-                return constant_term(x, machine, -known[0][2])
             return constant_term(x, machine, value_of((name, machine, *before, *known, *rest)))
         except Undefined as undefined:
             x.trap(state, x.terms.true, undefined.code, rest[-1])
@@ -209,13 +208,14 @@ def _real_quotient(x: Execution, state: State, machine: str, a: Node, b: Node, s
 
 
 def _neg(x: Execution, state: State, machine: str, a: Node) -> Term:
-    return folded(x, state, "neg", machine, [a]) if machine in FLOATS else x.terms.neg(x.value(state, a))
+    value = x.value(state, a)
+    return reals.negated(x.terms, value) if machine in FLOATS else x.terms.neg(value)
 
 
 def _abs(x: Execution, state: State, machine: str, a: Node) -> Term:
-    if machine in FLOATS:
-        return folded(x, state, "abs", machine, [a])
     value = x.value(state, a)
+    if machine in FLOATS:
+        return reals.magnitude(x.terms, value)
     if not is_signed(machine):
         return value
     return x.terms.ite(x.terms.bit(value, value.width - 1), x.terms.neg(value), value)
@@ -275,16 +275,18 @@ def _shifted(name: str) -> Row:
 
 def _compared(name: str) -> Row:
     def row(x: Execution, state: State, machine: str, kind: str, a: Node, b: Node) -> Term:
-        if kind in FLOATS or kind in TEXT_UNITS:
+        if kind in TEXT_UNITS:
             return folded(x, state, name, machine, [a, b], before=(kind,))
         terms, left, right = x.terms, x.value(state, a), x.value(state, b)
         if name in ("eq", "ne"):
-            equal = terms.eq(left, right)
+            equal = reals.equal(terms, left, right) if kind in FLOATS else terms.eq(left, right)
             return equal if name == "eq" else terms.not_(equal)
         if left.width == 0:
             left, right = (terms.of_boolean(each, 1) for each in (left, right))
         if name[0] == "g":
             left, right = right, left
+        if kind in FLOATS:
+            return reals.less(terms, left, right, name[1] == "e")
         return terms.less(left, right, is_signed(kind), name[1] == "e")
 
     return row
@@ -334,9 +336,11 @@ def _mux(x: Execution, state: State, machine: str, k: Node, choices: tuple[Node,
 
 def _extreme(name: str) -> Row:
     def row(x: Execution, state: State, machine: str, a: Node, b: Node) -> Term:
-        if machine in FLOATS or machine in TEXT_UNITS:
+        if machine in TEXT_UNITS:
             return folded(x, state, name, machine, [a, b])
         left, right = x.value(state, a), x.value(state, b)
+        if machine in FLOATS:
+            return reals.extreme(x.terms, left, right, name == "min")
         if machine == "b":
             return x.terms.and_(left, right) if name == "min" else x.terms.or_(left, right)
         low, high = (left, right) if name == "min" else (right, left)
@@ -421,10 +425,6 @@ def _operation(name: str) -> Row:
     return row
 
 
-def _enum_text(x: Execution, state: State, machine: str, names: Any, a: Node) -> Term:
-    return folded(x, state, "enum_text", machine, [a], before=(names,))
-
-
 EXPRESSION_ROWS: dict[str, Row] = {
     "const": lambda x, state, machine, value: constant_term(x, machine, value),
     "tmp": lambda x, state, machine, number: state.temporaries[number],
@@ -438,7 +438,8 @@ EXPRESSION_ROWS: dict[str, Row] = {
     "convert": _convert, "nearest": _to_integer("nearest"), "truncate": _to_integer("truncate"), "bits": _bits,
     "is_set": _is_set, "select": _select, "mux": _mux, "min": _extreme("min"), "max": _extreme("max"),
     "check": _check, "within": _within, "floor_div": _floor_div, "now": lambda x, state, machine: x.now,
-    "from_bcd": _from_bcd, "to_bcd": _to_bcd, "enum_text": _enum_text,
+    "from_bcd": _from_bcd, "to_bcd": _to_bcd,
+    "enum_text": lambda x, state, machine, names, a: folded(x, state, "enum_text", machine, [a], before=(names,)),
     "reference": _reference, "bit_behind": _bit_behind,
     **{name: _operation(name) for name in (
         "pow", "math", "atan2", "length", "left", "right", "mid", "concat", "insert", "delete", "replace", "find", "to_text",

@@ -1,15 +1,17 @@
 """Conditions of users as terms: the same expressions as `--until` takes, over what memory holds behind a scan.
 
-Integers are exact as in `watch.conditions`: they are computed in as many bits as the result needs.  What is compared as a REAL
-is a free value, the same one for the same bits."""
+Integers are exact as in `watch.conditions`: they are computed in as many bits as the result needs.  REALs are compared, and not
+computed with."""
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import REAL, base, machine
 from fbvm.code.operations import BIT_MASK, OFFSET_MASK, OFFSET_SHIFT
+from fbvm.prove.encoding import reals
 from fbvm.prove.encoding.addresses import cases
 from fbvm.prove.encoding.cells import Contents
 from fbvm.prove.encoding.execution import Refused, State
@@ -52,15 +54,23 @@ class _Property:
         return self._ordered(term.sign, *self._alike(*(self.number(each) for each in term.parts)))
 
     def _compared_reals(self, term: watched.Term) -> Term:
-        """A comparison of REALs: anything, but the same for the same bits."""
-        operands = []
-        for part in term.parts:
-            if part.constant is None and part.place is None:
-                raise Refused(f"{part.text} is arithmetic of REAL, of which nothing is known: compare a variable with a number")
-            if part.place is not None:
-                operands.append(self.place(part.place))
-        key = ("REAL", term.sign, *(repr(part.constant) for part in term.parts))
-        return self.terms.unknown(key, 0, *operands)
+        """A comparison of REALs and LREALs, as numbers of 64 bits; whole numbers are compared with constants only."""
+        widest = max(_real_bits(part) for part in term.parts)
+        left, right = (self._real(part, widest) for part in term.parts)
+        if term.sign in ("=", "<>"):
+            equal = reals.equal(self.terms, left, right)
+            return equal if term.sign == "=" else self.terms.not_(equal)
+        if term.sign[0] == ">":
+            left, right = right, left
+        return reals.less(self.terms, left, right, term.sign.endswith("="))
+
+    def _real(self, term: watched.Term, bits: int) -> Term:
+        if isinstance(term.constant, int | float):
+            data = struct.pack("<f" if bits == 32 else "<d", term.constant)
+            return self.terms.constant(bits, int.from_bytes(data, "little"))
+        if term.place is None or _real_bits(term) != bits:
+            raise Refused(f"{term.text} cannot be followed: compare a REAL with one of its type, or with a number")
+        return self.place(term.place)
 
     def _ordered(self, sign: str, left: Term, right: Term) -> Term:
         terms = self.terms
@@ -131,6 +141,12 @@ class _Property:
         if kind == "b":
             return self.contents.boolean(offset) if bit is None else self.contents.bit(offset, bit)
         return self.contents.number(offset, _BYTES[kind])
+
+
+def _real_bits(term: watched.Term) -> int:
+    """The bits of a REAL or LREAL variable; 0 for anything else."""
+    kind = machine(base(term.place.type)) if term.place else ""
+    return {"f32": 32, "f64": 64}.get(kind, 0)
 
 
 def _is_real(term: watched.Term) -> bool:

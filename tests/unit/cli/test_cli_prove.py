@@ -53,6 +53,32 @@ def test_the_test_that_is_written_fails_until_the_program_keeps_the_property(tmp
     assert proved(str(program), "--no-trap").exit_code == 0
 
 
+def test_an_answer_that_comes_too_late_is_written_as_a_test(tmp_path: Path) -> None:
+    program, test = tmp_path / "program.st", tmp_path / "test_late.py"
+    text = "PROGRAM Main\nVAR In AT %IX0.0 : BOOL; t : TON; END_VAR\n    t(IN := In, PT := T#50ms);\nEND_PROGRAM\n"
+    program.write_text(text, encoding="utf-8")
+    result = proved(str(program), "--within", "Main.In", "Main.t.Q", "30ms", "--test", str(test))
+    assert (result.exit_code, result.stdout.splitlines()[0]) == (
+        1, "Main.t.Q within 30ms of Main.In: BROKEN in scan 4, by the shortest run")
+    late = runpy.run_path(str(test))["test_main_t_q_within_30ms_of_main_in"]
+    with pytest.raises(AssertionError):
+        late()
+    program.write_text(text.replace("50ms", "20ms"), encoding="utf-8")
+    late()
+
+
+def test_two_blocks_are_compared(tmp_path: Path) -> None:
+    program = tmp_path / "blocks.st"
+    block = "FUNCTION {} : INT\nVAR_INPUT a : INT; END_VAR\n    {} := {};\nEND_FUNCTION\n"
+    rows = (("Twice", "a + a"), ("Shifted", "2 * a"), ("Thrice", "3 * a"))
+    program.write_text("".join(block.format(name, name, value) for name, value in rows), encoding="utf-8")
+    good, wrong = (proved(str(program), "--equal", "Twice", other) for other in ("Shifted", "Thrice"))
+    assert (good.exit_code, good.stdout) == (0, "Twice and Shifted are equal: PROVED by induction over 1 scan\n")
+    assert (wrong.exit_code, wrong.stdout.splitlines()[0]) == (
+        1, "Twice and Thrice are equal: BROKEN in scan 1, by the shortest run")
+    assert proved(str(program), "--equal", "Twice", "Nobody").exit_code == 2
+
+
 def test_the_run_is_recorded(tmp_path: Path) -> None:
     trace = tmp_path / "found.fbtrace"
     assert proved(INTERLOCK, "--never", "Main.Left", "--trace", str(trace)).exit_code == 1

@@ -10,7 +10,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, prove
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Question, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
 from fbvm.prove.runs import repeated
 
 FEW = Limits(simulated_scans=200, scans=120)
@@ -181,13 +181,23 @@ END_RESOURCE END_CONFIGURATION
     assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 11)
 
 
-def test_a_comparison_of_reals_is_taken_for_any_value() -> None:
-    image = program("Q := r > 10.0 AND In; Z := Q AND NOT In;", "r AT %ID4 : REAL; Q, Z : BOOL;")
-    verdict = asked(image, NEVER, "Main.Q AND NOT Main.In")
-    assert verdict.word == "proved"
+@pytest.mark.parametrize(("kind", "address"), [("REAL", "%ID4"), ("LREAL", "%IL1")])
+def test_reals_are_compared_exactly(kind: str, address: str) -> None:
+    image = program("Q := r > 10.0 AND r < 11.0; n := SEL(r = -r, 0, 1);", f"r AT {address} : {kind}; Q : BOOL; n : INT;")
+    assert asked(image, NEVER, "Main.Q AND Main.r <= 10.0").word == "proved"
+    assert asked(image, NEVER, "Main.n = 1 AND Main.r <> 0.0").word == "proved"
+    found = asked(image, REACH, "Main.Q AND Main.r > 10.25")
+    assert found.run is not None
+    [(place, value)] = found.run.writes[0].items()
+    assert place.name == "Main.r" and isinstance(value, float) and 10.25 < value < 11.0
+
+
+def test_arithmetic_of_reals_is_taken_for_any_value() -> None:
+    image = program("r := r + 1.0; Q := r > 10.0 AND In;", "r : REAL; Q : BOOL;")
+    assert asked(image, NEVER, "Main.Q AND NOT Main.In").word == "proved"
     broken = asked(program("Q := r * 0.0 > 1.0;", "r AT %ID4 : REAL; Q : BOOL;"), NEVER, "Main.Q")
     assert broken.word == "undecided"
-    assert broken.notes[0].startswith("taken for any value: ")
+    assert broken.notes[0] == "taken for any value: mul of REAL (text.st:6:1 in Main)"
 
 
 def test_a_program_in_the_loop_of_a_pointer_to_a_local_is_refused_with_its_line() -> None:
@@ -213,3 +223,28 @@ END_PROGRAM
     verdict = prove(image, Question(NEVER, "Main.n = 99"), FEW)
     assert verdict.word == "proved"
     assert verdict.notes and "executes" in verdict.notes[0]
+
+
+WAITING = "t(IN := In AND NOT Other, PT := T#30ms); Q := t.Q;"
+
+
+def answered(image: Image, within_ms: int, *assumed: str) -> Verdict:
+    return prove(image, Question(WITHIN, "Main.Q", assumed, trigger="Main.In", within_ns=within_ms * 1_000_000), FEW)
+
+
+def test_an_answer_within_a_time_is_proved() -> None:
+    image = program(WAITING, "t : TON; Q : BOOL;")
+    assert answered(image, 30, "Main.In", "NOT Main.Other").word == "proved"
+
+
+def test_an_answer_that_comes_too_late_is_shown() -> None:
+    image = program(WAITING, "t : TON; Q : BOOL;")
+    verdict = answered(image, 20, "NOT Main.Other")
+    assert verdict.run is not None
+    assert (verdict.word, verdict.run.scans, str(verdict.question)) == ("broken", 3, "Main.Q within 20ms of Main.In")
+
+
+def test_an_answer_that_somebody_prevents_is_shown() -> None:
+    image = program(WAITING, "t : TON; Q : BOOL;")
+    verdict = answered(image, 50)
+    assert (verdict.word, verdict.run and verdict.run.scans) == ("broken", 6)

@@ -1,0 +1,63 @@
+"""Two blocks beside each other: equal for all inputs, or the shortest run in which they are not."""
+
+from __future__ import annotations
+
+import pytest
+from rows import each_of
+
+from fbvm.base.diagnostics import Source
+from fbvm.code.compiler import compile_sources
+from fbvm.prove.equality import PROGRAM, Unlike, equality, pair
+from fbvm.prove.prover import Limits, prove
+from fbvm.prove.question import Verdict
+
+BLOCKS = """
+FUNCTION_BLOCK Latch VAR_INPUT S, R1 : BOOL; END_VAR VAR_OUTPUT Q1 : BOOL; END_VAR
+IF R1 THEN Q1 := FALSE; ELSIF S THEN Q1 := TRUE; END_IF
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Dominant VAR_INPUT S, R1 : BOOL; END_VAR VAR_OUTPUT Q1 : BOOL; END_VAR
+Q1 := S OR Q1 AND NOT R1;
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Adding VAR_INPUT n : INT; END_VAR VAR_OUTPUT sum : DINT; END_VAR sum := sum + n; END_FUNCTION_BLOCK
+FUNCTION_BLOCK Subtracting VAR_INPUT n : INT; END_VAR VAR_OUTPUT sum : DINT; END_VAR
+sum := sum - (0 - INT_TO_DINT(n));
+END_FUNCTION_BLOCK
+FUNCTION Larger : INT VAR_INPUT a, b : INT; END_VAR Larger := MAX(a, b); END_FUNCTION
+FUNCTION Chosen : INT VAR_INPUT a, b : INT; END_VAR Chosen := SEL(a < b, a, b); END_FUNCTION
+FUNCTION Smaller : INT VAR_INPUT a, b : INT; END_VAR Smaller := MIN(a, b); END_FUNCTION
+FUNCTION_BLOCK Filled VAR_INPUT i : BYTE; END_VAR VAR_OUTPUT a : ARRAY [0..3] OF BOOL; r : REAL; END_VAR
+a[BYTE_TO_INT(i AND 3)] := TRUE; r := SEL(i > 100, 1.5, 2.5);
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Listed VAR_INPUT i : BYTE; END_VAR VAR_OUTPUT a : ARRAY [0..3] OF BOOL; r : REAL; END_VAR
+CASE BYTE_TO_INT(i) MOD 4 OF 0: a[0] := TRUE; 1: a[1] := TRUE; 2: a[2] := TRUE; ELSE a[3] := TRUE; END_CASE
+IF i > 100 THEN r := 2.5; ELSE r := 1.5; END_IF
+END_FUNCTION_BLOCK
+"""
+
+
+def compared(left: str, right: str) -> Verdict:
+    sources = [Source("blocks.st", BLOCKS)]
+    made = compile_sources([*sources, pair(sources, (left, right))], PROGRAM, runnable=True, lint=False)
+    assert made.image is not None, made.diagnostics
+    return prove(made.image, equality(made.image, (left, right)), Limits(simulated_scans=100))
+
+
+@each_of("left, right", [("Adding", "Subtracting"), ("Larger", "Chosen"), ("Filled", "Listed"), ("Latch", "RS")])
+def test_what_is_equal_is_proved(left: str, right: str) -> None:
+    verdict = compared(left, right)
+    assert (verdict.word, verdict.notes) == ("proved", ()), verdict
+
+
+def test_the_shortest_difference_is_found() -> None:
+    verdict = compared("Latch", "Dominant")
+    assert verdict.run is not None
+    assert [{place.name: value for place, value in scan.items()} for scan in verdict.run.writes] == [
+        {"Equal.S": True, "Equal.R1": True}]
+    assert compared("Larger", "Smaller").word == "broken"
+
+
+@each_of("left, right, said", [("Latch", "Adding", "have other inputs"), ("Latch", "Nobody", "there is no Nobody"),
+                               ("Larger", "Latch", "have other inputs")])  # fmt: skip
+def test_blocks_that_cannot_be_compared_are_refused(left: str, right: str, said: str) -> None:
+    with pytest.raises(Unlike, match=said):
+        compared(left, right)
