@@ -30,7 +30,9 @@ _UNNAMED = frozenset((
     "unknown", "unnamed", "unbekannt", "unbenannt", "desconocido", "sin nombre", "desconhecido", "sem nome", "inconnu", "sansnom",
     "sans nom", "sconosciuto", "senza nome", "неизвестно", "неизвестный", "безымянный", "未知", "未命名", "不明", "名称未設定"))
 """What Beremiz and OpenPLC Editor write as company and product, in the language of the desktop."""
-_CODESYS = ("codesys", "e!cockpit", "machine expert", "somachine")
+_NAMED = {"twincat": ("twincat",), "codesys": ("codesys", "e!cockpit", "machine expert", "somachine"),
+          "beremiz": ("beremiz", "openplc")}
+"""Families, and words of headers that name one of their tools."""
 _GENERATION_2, _GENERATION_3 = "2022-06", "2025-10-03"
 """Dates from which documents were probably meant for the second and third generation of the generator."""
 
@@ -66,12 +68,9 @@ def _family(root: Element) -> tuple[str, str]:
     header = root.one("fileHeader")
     company, product = ((header.get(name).strip() for name in ("companyName", "productName")) if header else ("", ""))
     said = f"{company} {product}".casefold()
-    if "twincat" in said:
-        return "twincat", f"the header names {product or company}"
-    if any(word in said for word in _CODESYS):
-        return "codesys", f"the header names {product or company}"
-    if "beremiz" in said or "openplc" in said:
-        return "beremiz", f"the header names {product or company}"
+    for family, words in _NAMED.items():
+        if any(word in said for word in words):
+            return family, f"the header names {product or company}"
     if company.casefold() in _UNNAMED and product.casefold() in _UNNAMED:
         return "beremiz", f"the header says {company} and {product}, as Beremiz and OpenPLC Editor write it"
     return "", "the header names no known tool"
