@@ -11,8 +11,8 @@ from pathlib import Path
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, StructType, Type, fold
-from fbvm.check.symbols.facts import Report
 from fbvm.check.symbols.library import Libraries
+from fbvm.check.symbols.report import Report
 from fbvm.code.image import Image
 from fbvm.prove.question import ALWAYS, Question
 from fbvm.syntax import tree
