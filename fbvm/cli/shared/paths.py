@@ -10,8 +10,9 @@ from typing import Any
 import click
 
 _HEAD_BYTES = 4_000
-_DOCUMENT = b"plcopen.org/xml/tc6"
-"""What a document in PLCopen XML has among its first bytes: it is taken as the sources within it."""
+_SOURCES = (b"plcopen.org/xml/tc6", b"<tcplcobject", b"developer/msbuild")
+"""What documents in PLCopen XML, objects and projects of TwinCAT have among their first bytes, in lower case: they are taken as
+the sources within them."""
 _FORMS = (
     ((b"fbvmrec",), "a recording", "`fbvm chart`, `table`, `why` and `step` look at it, `fbvm replay` does its run again"),
     ((b"fbvmtrc",), "a trace", "`fbvm chart`, `fbvm table` and `fbvm why` look at it"),
@@ -73,7 +74,7 @@ def foreign(path: Path) -> str:
     except OSError:
         return ""
     start = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
-    if start.startswith(b"<") and _DOCUMENT in start:
+    if start.startswith(b"<") and any(mark in start for mark in _SOURCES):
         return ""
     row = next((row for row in _FORMS if start.startswith(row[0])), None)
     if row is None and path.suffix.lower() in _SUFFIXES:

@@ -1,0 +1,57 @@
+"""Programs of TwinCAT run as they are, and are spoken of by the lines of their files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from twincat_files import COUNTER, MAIN, write_project
+
+from fbvm.cli.main import main
+from fbvm.code.compiler import compile_files
+from fbvm.interchange.formats.given import inputs
+from fbvm.machine.plc import Plc
+
+
+def test_a_project_runs_with_its_task(tmp_path: Path) -> None:
+    sources, said = inputs([write_project(tmp_path)])
+    made = compile_files(sources, dialect="twincat", runnable=True)
+    assert made.image is not None, [message.render() for message in made.diagnostics]
+    assert [message.code for message in said] == ["X0190"]
+    plc = Plc(made.image)
+    plc.run(scans=5)  # of 10 ms, and the task's are 20 ms
+    names = ("MAIN.nSeen", "MAIN.fbCounter.nCount", "MAIN.stPoint.nX", "GVL_Plant.nScans")
+    assert [plc.read(name) for name in names] == [3, 3, 3, 3]
+
+
+def test_an_object_runs_by_itself(tmp_path: Path) -> None:
+    file = tmp_path / "FB_Counter.TcPOU"
+    file.write_text(COUNTER, encoding="utf-8")
+    program = tmp_path / "main.st"
+    program.write_text("PROGRAM Main VAR b : FB_Counter; n : INT; END_VAR b(); b.Reset(n := 7); n := b.Count; END_PROGRAM")
+    made = compile_files(inputs([file, program])[0], dialect="twincat", runnable=True)
+    assert made.image is not None, [message.render() for message in made.diagnostics]
+    plc = Plc(made.image)
+    plc.scan()
+    assert plc.read("Main.n") == 7
+
+
+@pytest.mark.slow
+def test_a_mistake_is_shown_at_its_line_of_the_file(tmp_path: Path) -> None:
+    project = write_project(tmp_path)
+    file = tmp_path / "POUs" / "MAIN.TcPOU"
+    file.write_text(MAIN.replace("nSeen + 1", "nSen + 1"), encoding="utf-8")
+    done = CliRunner().invoke(main, ["check", str(project), "--dialect", "auto"])
+    assert done.exit_code == 3
+    assert f"{file}:13:10: error S0201: nSen is not declared" in done.output
+    assert "dialect twincat: Plant.plcproj is a project of TwinCAT" in done.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", [["check"], ["run", "--scans", "1"]])
+def test_files_that_are_none_are_named(tmp_path: Path, verb: list[str]) -> None:
+    for name, text in (("a.plcproj", '<Project xmlns="http://schemas.microsoft.com/developer/msbuild/2003">'), ("b.TcPOU", "hello")):
+        (tmp_path / name).write_text(text)
+        done = CliRunner().invoke(main, [*verb, str(tmp_path / name)])
+        assert (done.exit_code, "X0101" in done.output) == (3, True), done.output
