@@ -149,7 +149,9 @@ class Debugger:
 
     def choose(self, name: str) -> None:
         """Steps through another PLC from now on, from the position at which it is at this time."""
-        self.focus = name
+        if name != self.focus:
+            self.focus = name
+            self.follow_focus()
 
     # --- inside a scan
 
