@@ -51,7 +51,8 @@ def test_a_mistake_is_shown_at_its_line_of_the_file(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", [["check"], ["run", "--scans", "1"]])
 def test_files_that_are_none_are_named(tmp_path: Path, verb: list[str]) -> None:
-    for name, text in (("a.plcproj", '<Project xmlns="http://schemas.microsoft.com/developer/msbuild/2003">'), ("b.TcPOU", "hello")):
+    unclosed = '<Project xmlns="http://schemas.microsoft.com/developer/msbuild/2003">'
+    for name, text in (("a.plcproj", unclosed), ("b.TcPOU", "hello")):
         (tmp_path / name).write_text(text)
         done = CliRunner().invoke(main, [*verb, str(tmp_path / name)])
         assert (done.exit_code, "X0101" in done.output) == (3, True), done.output
