@@ -106,6 +106,8 @@ def test_options_and_arguments(fbvm: Fbvm) -> None:
         ("run", "counter.st", "--scans", "1", "--program", EVIL), ("check", "counter.st", "--no-warn", EVIL),
         ("run", "trapped.st", "--scans", "1"), ("run", "trapped.st", "--scans", "1", "--show", "Main.s", "--json"),
         ("run", "trapped.st", "--scans", "1", "--show", "Main.s"), ("learn", EVIL), ("test", EVIL),
+        ("prove", "counter.st", "--never", EVIL), ("prove", "counter.st", "--always", f"Main.{EVIL} = 1"),
+        ("prove", f"no{EVIL}.st"),
     ):  # fmt: skip
         fbvm(*arguments)
 
