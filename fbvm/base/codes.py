@@ -3,7 +3,7 @@
 Each has a page in `pages/` and a test.
 
 Ranges: S01 text and syntax, S02 names and declarations, S03 types, S04 calls, S05 statements, S06 addresses and memory,
-S07 constants and initial values, S08 configuration and tasks, S09 understood but refused, P01 the project file,
+S07 constants and initial values, S08 configuration and tasks, S09 understood but refused, S10 objects, P01 the project file,
 X01 XML and its frame, X02 diagrams, X03 export, X04 CX-Programmer, R01 traps.
 """
 

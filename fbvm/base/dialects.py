@@ -47,6 +47,7 @@ class Dialect:
     no_open_inputs: bool = False
     instances_are_values: bool = False
     action_inputs: bool = False
+    empty_bodies: bool = False
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
@@ -102,6 +103,8 @@ QUESTIONS = {
                              "the body"),
     "action_inputs": ("motor.Stop(now := TRUE): an ACTION of an instance, called with inputs of the instance", "an error",
                       "the inputs are written, then the action is called"),
+    "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
+                     "runs nothing"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
                   "an error that names the conversion",
                   "cut to the width; without its fraction, the nearest number that there is; 1 and 0; as it is"),
@@ -126,7 +129,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
                    bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
-                   instances_are_values=True, action_inputs=True)
+                   instances_are_values=True, action_inputs=True, empty_bodies=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

@@ -40,6 +40,8 @@ _LOCATED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
 """Sections of blocks and programs whose variables may lie AT an address."""
 _WITH_BOUNDS = (OpenArrayType, AnyType)
 """Types of parameters whose slot holds a reference, and the bounds or the type of the argument."""
+_CALLED_BY_RUNTIME = ("FB_INIT", "FB_EXIT", "FB_REINIT")
+"""Methods that CODESYS calls by itself."""
 _NOT_EXECUTED = ("VAR_INST", "VAR_GENERIC", "VAR_ACCESS", "VAR_CONFIG")
 
 
@@ -142,6 +144,10 @@ class _Interface:
                 self._error("S1005", written.name, f"{written.name.text} is declared twice in {pou.name}",
                             "variables, actions, methods and properties of a block share their names")
                 continue
+            if name in _CALLED_BY_RUNTIME:
+                self._error("S0901", written.name, f"{written.name.text} is called by the runtime system of CODESYS: it is "
+                            "understood but not executed",
+                            "give initial values, or call a method of another name in the first scan")
             made = Pou(shown if written.kind == "METHOD" else f"{shown}.{written.kind.capitalize()}", written.kind, pou.source,
                        written, block=pou, modifiers=frozenset(word.text for word in written.modifiers))
             pou.methods[key] = made

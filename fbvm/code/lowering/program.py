@@ -76,7 +76,10 @@ class Program:
 
     def executed(self, pou: Pou) -> Pou:
         """The POU whose body is executed for another one: of a block without a statement, in some dialects, that of its base."""
-        return pou
+        if pou.base is None or pou.kind not in ("FUNCTION_BLOCK", "CLASS") or self.checker.project.dialect.empty_bodies:
+            return pou
+        empty = all(isinstance(each, tree.Empty) for each in pou.tree.body)
+        return self.executed(pou.base) if empty else pou
 
     def candidates(self, pou: Pou) -> dict[Pou, list[int]]:
         """The bodies that a call of a method or block may mean, by the numbers of the types for which each is meant."""
