@@ -144,6 +144,16 @@ def test_lines_meet_and_rails_are_straight(seed: int, width: int) -> None:
 
 
 @pytest.mark.slow
+@settings(deadline=None, max_examples=times(30))
+@given(st.integers(0, 2**32), st.integers(24, 160))
+def test_a_drawing_that_is_wider_than_it_must_be_says_the_same(seed: int, least: int) -> None:
+    said = texts(Maker(Random(seed)).bar())
+    lines = rung_surface(said, 60, least=least).rows()
+    assert {len(line) >= least for line in lines} == {True} and len(set(map(len, lines))) == 1
+    assert read(lines)[0] == said, "\n".join(lines)
+
+
+@pytest.mark.slow
 @settings(deadline=None, max_examples=times(60))
 @given(st.integers(0, 2**32))
 def test_a_diagram_is_what_its_instructions_say(seed: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from pathlib import Path
 
 import click
@@ -37,12 +38,9 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
             write_file(svg, ladder_svg(drawn))
         return
     known = contents(sources_of(files)) if commented else None
-    body = -1
-    for rung in image.rungs:
-        if rung.body != body:
-            body = rung.body
-            say(f"{image.bodies[body].kind} {image.bodies[body].name}")
-        lines = rung_lines(image, rung, width or chart_width())
-        if known:
-            lines += comment_lines(rung, image.bodies[body].name, symbol_addresses(image, body), known)
-        print_lines(lines)
+    for body, group in groupby(image.rungs, lambda rung: rung.body):
+        rungs = list(group)
+        say(f"{image.bodies[body].kind} {image.bodies[body].name}")
+        for rung, lines in zip(rungs, rung_lines(image, rungs, width or chart_width()), strict=True):
+            remarks = comment_lines(rung, image.bodies[body].name, symbol_addresses(image, body), known) if known else []
+            print_lines([*lines, *remarks])

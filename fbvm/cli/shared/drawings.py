@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 
@@ -64,9 +64,12 @@ def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
     return address
 
 
-def rung_lines(image: Image, rung: RungPicture, width: int) -> list[str]:
-    """The lines of a rung that is not executed, at most `width` columns wide, with addresses of its variables."""
-    return ladder_text(rung, width, Annotations(None, symbol_addresses(image, rung.body)))
+def rung_lines(image: Image, rungs: Sequence[RungPicture], width: int) -> list[list[str]]:
+    """The lines of the rungs of a POU that are not executed, at most `width` columns wide, with addresses of the variables.
+    All right rails stand in one column."""
+    annotations = Annotations(None, symbol_addresses(image, rungs[0].body))
+    widest = max(len(row) for rung in rungs for row in ("", *ladder_text(rung, width, annotations)[1:]) if row[:1] != " ")
+    return [ladder_text(rung, width, annotations, widest) for rung in rungs]
 
 
 def comment_lines(rung: RungPicture, pou: str, address: Callable[[str], str], known: Contents) -> list[str]:

@@ -41,8 +41,9 @@ class Within:
 
 
 def is_cx_project(path: Path) -> bool:
-    """Whether a file is a project of CX-Programmer, or is called so.  Raises OSError if it cannot be read."""
-    return path.suffix.lower() in CX_SUFFIXES or is_project(read_file(path, SOURCE_BYTES))
+    """Whether a file is a project of CX-Programmer, or is called so; devices and pipes are none.  Raises OSError if the
+    file cannot be read."""
+    return path.suffix.lower() in CX_SUFFIXES or path.is_file() and is_project(read_file(path, SOURCE_BYTES))
 
 
 def within(path: Path, resource: str | None = None) -> Within | None:

@@ -10,15 +10,16 @@ from fbvm.syntax.ladder.drawing.widths import Annotations
 AT_REST = Annotations()
 
 
-def ladder_text(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST) -> list[str]:
-    """The lines of a rung."""
-    head, surface = ladder_surface(picture, width, annotations)
+def ladder_text(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST, least: int = 0) -> list[str]:
+    """The lines of a rung, whose right rail stands in column `least` or behind it."""
+    head, surface = ladder_surface(picture, width, annotations, least)
     return [head, *surface.rows()]
 
 
-def ladder_surface(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST) -> tuple[str, Surface]:
+def ladder_surface(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST,
+                   least: int = 0) -> tuple[str, Surface]:
     """The headline of a rung and its drawing."""
     head = " ".join(filter(None, (f"RUNG {picture.number}", picture.comment)))
     if not picture.steps:
         return head, Surface()
-    return head, rung_surface([step[1:] for step in picture.steps], width, annotations)
+    return head, rung_surface([step[1:] for step in picture.steps], width, annotations, least)

@@ -38,6 +38,16 @@ def test_rungs_are_drawn_with_addresses(file: Path) -> None:
     assert "│  100.00" in result.output
 
 
+def test_the_right_rails_of_a_program_stand_in_one_column(file: Path) -> None:
+    more = "RUNG 2\n    LD Start\n    ANDNOT 0.05\n    AND W0.07\n    MOV #1234 D100\nRUNG 3\n    LD Start\n    OUT 100.01\n"
+    apart = "RUNG 4\n    LD Start\n    OUT 100.02\n    OR 0.06\n    OUT 100.03\n"
+    file.write_text(PROGRAM.replace("END_LADDER", more + apart + "END_LADDER"), encoding="utf-8")
+    rows = CliRunner().invoke(main, ["ladder", str(file), "--width", "70"]).output.splitlines()
+    drawn = [row for row in rows if row[:1] in "│├" and row]
+    assert len(drawn) > 8 and len(set(map(len, drawn))) == 1
+    assert "    OUT 100.02" in rows, "a rung without a drawing"
+
+
 def test_rungs_of_subroutines_are_drawn_once(file: Path) -> None:
     rungs = "LD P_On\nSBS 5\nSBN 5\nLD P_On\nMOV A262 D230\nRET\nEND"
     file.write_text(f"PROGRAM Main\nLADDER\n{rungs}\nEND_LADDER\nEND_PROGRAM", encoding="utf-8")

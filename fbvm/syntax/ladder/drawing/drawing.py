@@ -25,10 +25,10 @@ def rung_text(steps: Sequence[StepText], width: int = 80, annotations: Annotatio
     return rung_surface(steps, width, annotations).rows()
 
 
-def rung_surface(steps: Sequence[StepText], width: int = 80, annotations: Annotations = AT_REST) -> Surface:
+def rung_surface(steps: Sequence[StepText], width: int = 80, annotations: Annotations = AT_REST, least: int = 0) -> Surface:
     """The drawing of a rung; see `ladder.text`."""
     try:
-        return drawn(diagram(steps), width, annotations)
+        return drawn(diagram(steps), width, annotations, least)
     except Undrawable:
         surface = Surface()
         for row, (prefix, mnemonic, operands) in enumerate(steps):
@@ -36,17 +36,17 @@ def rung_surface(steps: Sequence[StepText], width: int = 80, annotations: Annota
         return surface
 
 
-def drawn(bar: Point, width: int = 80, annotations: Annotations = AT_REST) -> Surface:
-    """The drawing of a diagram.  It is wider than `width` only if a single element is."""
+def drawn(bar: Point, width: int = 80, annotations: Annotations = AT_REST, least: int = 0) -> Surface:
+    """The drawing of a diagram.  It is wider than `width` only if a single element is, and never narrower than `least`."""
     widths = Widths(annotations)
     reach = max(LEAST, widths.reach(bar))
-    width = max(LEAST, min(width, reach))
+    width = max(LEAST, least, min(width, reach))
     while True:
         drawing = _Drawing(width, widths)
         surface = drawing.drawn(bar)
         if drawing.need <= width:
             return surface
-        width = max(drawing.need, min(width + STEP, reach))
+        width = max(drawing.need, least, min(width + STEP, reach))
 
 
 class _Rest(NamedTuple):
