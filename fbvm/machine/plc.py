@@ -144,9 +144,9 @@ class Plc(NamedValues):
         return self.trap
 
     @property
-    def is_recorded(self) -> bool:
-        """True if somebody is told the inputs."""
-        return self._recorder is not None
+    def input_recorder(self) -> InputRecorder | None:
+        """Who is told the inputs, if anybody."""
+        return self._recorder
 
     def record_inputs(self, recorder: InputRecorder | None) -> None:
         """Tells `recorder` every input from now on, None ends that.  Fast paths stay possible but for bursts."""

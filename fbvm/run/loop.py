@@ -14,6 +14,7 @@ from fbvm.base.areas import NEVER
 from fbvm.base.host import monotonic_clock
 from fbvm.engine.clock import Clock
 from fbvm.machine.plc import Plc
+from fbvm.machine.scan.inputs import InputRecorder
 from fbvm.run.host_clock import function_at
 from fbvm.run.host_date import local_date_ns
 from fbvm.run.interrupts import Interrupts
@@ -73,7 +74,9 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
         _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
     told_ns = time.monotonic_ns()
+    recorders = _recorders(runs)
     try:
+        _begin(recorders)
         with interrupts:
             while (due_ns := queue.next_ns()) is not None:
                 now_ns, woken = clock.reach(due_ns)
@@ -83,14 +86,35 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
                     break
                 if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                     told_ns = time.monotonic_ns()
+                    _end(recorders)
                     progress()
+                    _begin(recorders)
     except KeyboardInterrupt:
         for run in runs:
             run.reason = run.reason or "interrupted"
     finally:
+        _end(recorders)
         clock.stop()
         for watchdog in watchdogs:
             watchdog.stop()
+
+
+def _recorders(runs: Sequence[Running]) -> list[InputRecorder]:
+    """The recorders of the PLCs, if nobody outside has a turn between two scans of any of them."""
+    recorders = [run.plc.input_recorder for run in runs]
+    return [] if any(run.calls_out for run in runs) else [recorder for recorder in recorders if recorder]
+
+
+def _begin(recorders: Sequence[InputRecorder]) -> None:
+    """From here on nobody outside has a turn between two scans."""
+    for recorder in recorders:
+        recorder.run_begins()
+
+
+def _end(recorders: Sequence[InputRecorder]) -> None:
+    """Up to here nobody outside had a turn."""
+    for recorder in recorders:
+        recorder.run_ends()
 
 
 def _prepare(runs: Sequence[Running]) -> None:

@@ -70,6 +70,11 @@ class Running:
         """What is still to be written, in order of time."""
         return tuple(self._writes)
 
+    @property
+    def calls_out(self) -> bool:
+        """True if something is written, or somebody outside has a turn, between scans."""
+        return bool(self._writes or self.plc.watchers) or self._goal.calls_out
+
     def begin(self, start_ns: int, clock: Callable[[int], Clock] | None = None) -> None:
         """Called when the loop starts: the PLC's first scan is at `start_ns` of the loop's time.
 

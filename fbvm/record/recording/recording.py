@@ -95,7 +95,7 @@ class PlcRecording(RecordedPlc):
     into a file."""
 
     def __init__(self, plc: Plc, grown: Callable[[int], None], written: PlcWriter | None = None) -> None:
-        if plc.is_recorded:
+        if plc.input_recorder:
             raise ValueError("this PLC is recorded already")
         self._plc, self._grown, self._written = plc, grown, written
         self._chunks: list[Chunk] = []

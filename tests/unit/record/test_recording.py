@@ -18,6 +18,8 @@ from fbvm.record.recording import recording as module
 from fbvm.record.recording.chunks import Times
 from fbvm.record.recording.recording import PlcRecording, Recording
 from fbvm.record.trace.observing import observing
+from fbvm.run import loop
+from fbvm.run.running import TimedWrite
 from fbvm.wire.link import Peer
 from fbvm.wire.registers import server
 
@@ -97,6 +99,24 @@ def test_memory_that_is_written_during_a_run_is_an_input(image: Image, when: str
     if when == "watcher":
         plc.watchers.append(write)
     plc.run(scans=10, until=write if when == "until" else None)
+    assert [row.read("D77") for row in map(kept.at, range(4, 8))] == [0, 0, 5, 5]
+
+
+@pytest.mark.parametrize("when", ["until", "writes", "progress"])
+def test_memory_that_is_written_while_the_loop_runs_is_an_input(
+    image: Image, when: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "PROGRESS_NS", 0)
+    plc = Plc(image)
+    kept = recorded(plc)
+
+    def write(*_: object) -> bool:
+        if plc.scans == 5:
+            plc.memory.words("D")[77] = 5
+        return False
+
+    loop.run(plc, scans=10, until=write if when == "until" else None, progress=write if when == "progress" else None,  # type: ignore[arg-type]
+             writes=[TimedWrite(plc.find("D77"), 5, 5 * plc.cycle_ns)] if when == "writes" else ())
     assert [row.read("D77") for row in map(kept.at, range(4, 8))] == [0, 0, 5, 5]
 
 
