@@ -48,6 +48,7 @@ class Dialect:
     instances_are_values: bool = False
     action_inputs: bool = False
     empty_bodies: bool = False
+    in_outs_are_read: bool = False
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
@@ -101,6 +102,8 @@ QUESTIONS = {
                              "read where the argument lies: its outputs are read, it is not called",
                              "an instance of the block's own, which may be called; an argument is copied into it in front of "
                              "the body"),
+    "in_outs_are_read": ("an in-out of a function block, read through an instance", "an error",
+                         "the variable that the last call passed; in front of the first call the program stops (R0110)"),
     "action_inputs": ("motor.Stop(now := TRUE): an ACTION of an instance, called with inputs of the instance", "an error",
                       "the inputs are written, then the action is called"),
     "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
@@ -136,7 +139,8 @@ _ROWS = (
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does"),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
-            no_open_inputs=True, instances_are_values=True),
+            no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,
+            locals_are_written=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,

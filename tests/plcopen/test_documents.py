@@ -86,3 +86,55 @@ def test_no_list_of_globals_is_lost_when_files_of_two_would_have_one_name() -> N
     assert not made.errors
     declared = {name: [variable for variable in "abcde" if f"{variable} : INT" in text] for name, text in made.files.items()}
     assert declared == {"types.st": [], "Line_1.st": ["a", "d"], "Line_1_2.st": ["b"], "line_1_3.st": ["c"], "Types_2.st": ["e"]}
+
+
+def project(declared: str, text: str, *, header: str = "", version: str = "tc6_0201", kind: str = "program",
+            more: str = "") -> bytes:
+    """A document with the POU Main in Structured Text."""
+    return (f'<project xmlns="http://www.plcopen.org/xml/{version}">{header}<types><pous><pou name="Main" pouType="{kind}">'
+            f"<interface>{declared}</interface><body><ST>{text}</ST></body></pou></pous></types>{more}</project>").encode()
+
+
+def variable(name: str, kind: str, value: str = "") -> str:
+    initial = f'<initialValue><simpleValue value="{value}"/></initialValue>' if value else ""
+    return f'<variable name="{name}"><type>{kind}</type>{initial}</variable>'
+
+
+def test_tc6_of_its_first_version_names_types_and_intervals_otherwise() -> None:
+    task = '<task name="Fast" interval="00:00:00.100000" priority="0"><pouInstance name="one" type="Main"/></task>'
+    declared = f"<localVars>{variable('n', '<INT/>')}</localVars>"
+    made = import_xml(project(declared, "n := n + 1;", version="tc6.xsd", kind="PROGRAM",
+                              more=f'<instances><configurations><configuration name="C"><resource name="R">{task}</resource>'
+                              "</configuration></configurations></instances>"))
+    assert made.errors == []
+    assert "INTERVAL := T#100ms" in made.files["C.st"]
+    assert "PROGRAM one WITH Fast : Main;" in made.files["C.st"]
+
+
+def test_globals_of_other_files_of_a_beremiz_project_are_declared_and_told() -> None:
+    declared = f"<externalVars>{variable('Level', '<INT/>')}</externalVars>" \
+        f"""<localVars>{variable('py', '<derived name="python_eval"/>')}</localVars>"""
+    made = import_xml(project(declared, "Level := Level + 1; py(TRIG := TRUE, CODE := '1');",
+                              header='<fileHeader companyName="Beremiz" productName="Beremiz"/>'))
+    assert [d.code for d in made.diagnostics] == ["X0292"] * 2
+    assert all("Level" in d.message or "never acknowledges" in d.message for d in made.diagnostics)
+    sources = [Source(name, text) for name, text in made.files.items()]
+    compiled = compile_sources(sources, runnable=True, dialect="matiec", lint=False)
+    assert compiled.image is not None, [d.render() for d in compiled.diagnostics]
+    plc = Plc(compiled.image)
+    plc.scan()
+    assert (plc.read("Level"), plc.read("Main.py.ACK")) == (1, False)
+
+
+def test_texts_get_the_quotes_that_their_tool_leaves_out() -> None:
+    given = (("a", "42 pcs"), ("b", "&quot;it's&quot;"), ("c", "'done'"), ("d", "Name"))
+    declared = "".join(variable(name, "<string/>", value) for name, value in given)
+    made = import_xml(project(f"<localVars>{declared}</localVars>", "a := b;"))
+    values = [line.split(" := ")[1] for line in made.files["Main.st"].splitlines() if "STRING" in line]
+    assert values == ["'42 pcs';", "'it$'s';", "'done';", "Name;"]
+
+
+@pytest.mark.slow
+def test_a_document_is_run_as_it_is() -> None:
+    done = CliRunner().invoke(main, ["run", str(DOCUMENTS / "beremiz.xml"), "--scans", "3", "--show", "Instance0.n"])
+    assert (done.exit_code, done.stdout) == (0, "Instance0.n = 17\n")

@@ -85,7 +85,10 @@ def _field(scope: Scope, expr: tree.Member, whole: StructType) -> Type | None:
 
 
 def _is_readable_local(scope: Scope, whole: StructType, field: Field) -> bool:
-    """True for a VAR of an instance that others may read: of a program, or in a dialect that lets them."""
+    """True for a VAR of an instance that others may read: of a program, or in a dialect that lets them; for an in-out, too, in a
+    dialect that has it stand for the argument of the last call."""
+    if field.kind == "VAR_IN_OUT":
+        return scope.dialect.in_outs_are_read
     return field.kind == "VAR" and (scope.dialect.locals_are_read or scope.context.block_of(whole).kind == "PROGRAM")
 
 

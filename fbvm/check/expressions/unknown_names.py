@@ -45,7 +45,7 @@ def report_internal(scope: Scope, name: tree.Name, member: Field, block: StructT
     """Report that a member of an instance cannot be named from outside."""
     what, hint = "internal to", f"make it a VAR_OUTPUT, or take {takers('locals_are_read')}"
     if member.kind != "VAR":
-        what, hint = "an in-out of", ""
+        what, hint = "an in-out of", f"read the variable that is passed, or take {takers('in_outs_are_read')}"
     scope.error("S0210", name, f"{member.name} is {what} {block} and cannot be reached from outside", hint)
 
 
