@@ -42,8 +42,8 @@ class Reshape(Exception):
 class Partition:
     """Which cell each byte belongs to.
 
-    `used` is told every use (offset, size, kind); `numbers` are bytes at which no BOOL may be assumed; in the bytes `bitwise` each
-    bit is a cell wherever a bit of them is used, since some bits of a word may be inputs and others not."""
+    `used` is told every use (offset, size, kind); `numbers` are bytes at which no BOOL may be assumed; in the bytes `bitwise`
+    each bit is a cell wherever a bit of them is used, since some bits of a word may be inputs and others not."""
 
     def __init__(self, numbers: frozenset[int] = frozenset(), bitwise: range = range(0)) -> None:
         self.at: dict[int, tuple[Cell, ...]] = {}
