@@ -17,7 +17,7 @@ from fbvm.prove.unrolling import Unrolling, from_power_on
 
 FIRST_BLOCK = 16
 MOST_IN_BLOCK = 512
-MOST_SIMPLER = 300
+MOST_SIMPLER = 120
 """Questions that may be asked to find a run with fewer changes."""
 
 Inputs = list[dict[Cell, int]]

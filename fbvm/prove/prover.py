@@ -85,7 +85,7 @@ class Prover:
         self.notes: list[str] = []
         relevant = leaves([*self.goal.terms, *self.summary.next.values()])
         self.inputs = [cell for variable, cell in self.summary.inputs.items() if variable in relevant]
-        self.search = BoundedSearch(self.summary, self.goal, self.clock, limits.expired)
+        self.search = BoundedSearch(self.summary, self._whole_goal(), self.clock, limits.expired)
 
     def _goal(self, names: Names) -> Goal:
         terms, summary = self.summary.terms, self.summary
@@ -225,6 +225,9 @@ class Prover:
         if run is not None:
             word = REACHED if self.question.is_reach else BROKEN
             return self._verdict(word, f"in scan {run.scans}, by {'the shortest run' if is_shortest else 'a random run'}", run)
+        if self.unwound:
+            site = self.image.sites[self.unwound[0].site]
+            return self._verdict(UNDECIDED, f"a loop goes on for longer than it can be followed ({site})")
         if self._unknowns():
             how = f"a run of {len(inputs)} scans may get there, but does not on the engine: it depends on values of which the " \
                   "solver knows nothing"  # fmt: skip
@@ -245,7 +248,7 @@ class Prover:
         return None
 
     def _whole_goal(self) -> Goal:
-        """The goal of a proof, which loops that were not followed to their end are part of."""
+        """The goal with loops that were not followed to their end as part of it: nothing is known of the scans behind."""
         if not self.unwound:
             return self.goal
         terms = self.summary.terms

@@ -61,7 +61,7 @@ class Maker:
         if kind < 6:
             otherwise = f"ELSE\n{self.statement(depth - 1)}" if self.random.random() < 0.5 else ""
             return f"IF {self.condition(1)} THEN\n{self.statement(depth - 1)}{otherwise}END_IF\n"
-        index = f"LIMIT(0, {self.number(0)}, {self.random.choice([3, 3, 4])})"
+        index = f"LIMIT(0, {self.random.choice([*NUMBERS, 'In'])}, {self.random.choice([3, 3, 4])})"
         return self.random.choice([
             f"t(IN := {self.condition(1)}, PT := T#{self.random.randint(1, 4)}0ms);\n",
             f"c(CU := {self.condition(1)}, R := {self.condition(0)}, PV := {self.random.randint(1, 4)});\n",

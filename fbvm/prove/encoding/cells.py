@@ -42,22 +42,27 @@ class Reshape(Exception):
 class Partition:
     """Which cell each byte belongs to.
 
-    `used` is told every use (offset, size, kind); `numbers` are bytes at which no BOOL may be assumed."""
+    `used` is told every use (offset, size, kind); `numbers` are bytes at which no BOOL may be assumed; in the bytes `bitwise`
+    each bit is a cell wherever a bit of them is used, since some bits of a word may be inputs and others not."""
 
-    def __init__(self, numbers: frozenset[int] = frozenset()) -> None:
+    def __init__(self, numbers: frozenset[int] = frozenset(), bitwise: range = range(0)) -> None:
         self.at: dict[int, tuple[Cell, ...]] = {}
         """The cell of a byte, or the eight bits of it."""
-        self.numbers = numbers
+        self.numbers, self.bitwise = numbers, bitwise
         self.used: set[tuple[int, int, int]] = set()
 
     def shaped(self) -> Partition:
         """A new partition with the cells that fit what was used: numbers first, the largest first."""
-        made = Partition(self.numbers)
-        for offset, size, kind in sorted(self.used, key=lambda use: (use[2], -use[1], use[0])):
+        made = Partition(self.numbers, self.bitwise)
+        for offset, size, kind in sorted(self.used, key=self._rank):
             if all(at not in made.at for at in range(offset, offset + size)):
                 made._create(offset, size, kind)
         made.used = self.used
         return made
+
+    def _rank(self, use: tuple[int, int, int]) -> tuple[int, int, int]:
+        offset, size, kind = use
+        return (-1 if kind == BIT and offset in self.bitwise else kind), -size, offset
 
     def cells(self, offset: int, size: int, kind: int) -> tuple[Cell, ...]:
         """The cells of some bytes, from low to high; where there are none yet they are made."""

@@ -61,7 +61,8 @@ def summarize(image: Image, budget: int, free: Iterable[tuple[int, int, int | No
 
 
 def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None]]) -> Summary:
-    partition = Partition()
+    area = AREAS["CIO"]
+    partition = Partition(bitwise=range(area.offset, area.offset + area.size_bytes))
     numbers: frozenset[int] = frozenset()
     for _ in range(MOST_ROUNDS):
         try:
@@ -72,7 +73,7 @@ def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None
             partition = partition.shaped()
         except Reshape as reshape:
             numbers |= {reshape.offset}
-            fresh = Partition(numbers)
+            fresh = Partition(numbers, partition.bitwise)
             fresh.used = partition.used
             partition = fresh.shaped()
     raise Refused("its memory is used in too many shapes")

@@ -19,8 +19,11 @@ from rows import go_through
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_files, compile_sources, compile_text
+from fbvm.code.operations import EXPRESSIONS, STATEMENTS
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.encoding.expressions import EXPRESSION_ROWS
+from fbvm.prove.encoding.statements import BRANCHES, LEAVES, STATEMENT_ROWS
 
 CLASSICS = sorted((data_folder("examples") / "classics").glob("*.st"))
 CYCLE_NS, BUDGET = 10_000_000, 20_000
@@ -85,6 +88,12 @@ def test_random_programs() -> None:
             except Refused:
                 refused += 1
     assert refused <= 4 * times(20)
+
+
+def test_every_operation_has_its_row() -> None:
+    assert set(EXPRESSION_ROWS) == set(EXPRESSIONS)
+    made_for_others = {"count", "mark"}  # by engines, of an image that has none
+    assert {*STATEMENT_ROWS, *BRANCHES, *LEAVES} | made_for_others == set(STATEMENTS)
 
 
 def test_an_interlock_with_random_inputs() -> None:

@@ -42,6 +42,7 @@ def compared(left: str, right: str) -> Verdict:
     return prove(made.image, equality(made.image, (left, right)), Limits(simulated_scans=100))
 
 
+@pytest.mark.slow
 @each_of("left, right", [("Adding", "Subtracting"), ("Larger", "Chosen"), ("Filled", "Listed"), ("Latch", "RS")])
 def test_what_is_equal_is_proved(left: str, right: str) -> None:
     verdict = compared(left, right)

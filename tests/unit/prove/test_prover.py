@@ -181,6 +181,7 @@ END_RESOURCE END_CONFIGURATION
     assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "address"), [("REAL", "%ID4"), ("LREAL", "%IL1")])
 def test_reals_are_compared_exactly(kind: str, address: str) -> None:
     image = program("Q := r > 10.0 AND r < 11.0; n := SEL(r = -r, 0, 1);", f"r AT {address} : {kind}; Q : BOOL; n : INT;")
@@ -232,6 +233,7 @@ def answered(image: Image, within_ms: int, *assumed: str) -> Verdict:
     return prove(image, Question(WITHIN, "Main.Q", assumed, trigger="Main.In", within_ns=within_ms * 1_000_000), FEW)
 
 
+@pytest.mark.slow
 def test_an_answer_within_a_time_is_proved() -> None:
     image = program(WAITING, "t : TON; Q : BOOL;")
     assert answered(image, 30, "Main.In", "NOT Main.Other").word == "proved"
@@ -248,3 +250,23 @@ def test_an_answer_that_somebody_prevents_is_shown() -> None:
     image = program(WAITING, "t : TON; Q : BOOL;")
     verdict = answered(image, 50)
     assert (verdict.word, verdict.run and verdict.run.scans) == ("broken", 6)
+
+
+def test_bits_of_a_word_are_inputs_unless_the_program_writes_them() -> None:
+    image = image_of("""PROGRAM Main
+VAR w AT CIO 0 : WORD; First AT CIO 0.00 : BOOL; Busy AT CIO 0.15 : BOOL; n : WORD; END_VAR
+n := w AND 16#00FF; Busy := First;
+END_PROGRAM
+""")
+    verdict = prove(image, Question(REACH, "Main.n = 16#0081"), FEW)
+    assert verdict.word == "reached"
+    assert prove(image, Question(ALWAYS, "Main.Busy = Main.First"), FEW).word == "proved"
+
+
+@pytest.mark.slow
+def test_a_loop_that_cannot_be_followed_to_its_end_leaves_it_undecided() -> None:
+    image = program("n := 0; WHILE n * n <> Level DO n := n + 1; IF n > 1000 THEN EXIT; END_IF END_WHILE; Q := In;",
+                    "n : DINT; Q : BOOL;")  # fmt: skip
+    verdict = asked(image, NEVER, "Main.Q AND NOT Main.In")
+    assert verdict.word == "undecided"
+    assert verdict.how.startswith("a loop goes on for longer than it can be followed (text.st:6:")
