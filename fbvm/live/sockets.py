@@ -76,6 +76,14 @@ class LiveServer:
                 browser.connection.send(text)
                 self._write(browser)
 
+    def renew_sessions(self) -> None:
+        """Gives each page a new session, and lets it begin again."""
+        for browser in self._browsers:
+            if browser.session:
+                browser.session.end()
+                browser.session = self._new_session()
+                browser.session.begin_again()
+
     def close(self) -> None:
         """Ends all connections."""
         for browser in list(self._browsers):
