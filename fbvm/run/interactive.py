@@ -134,9 +134,9 @@ class _Loop:
         self._advance(stands or control_stands, due_ns)
         for network in self._networks:
             network.serve(self._now_ns)
-        self._audience.update(self._monotonic_ns())
         if due_ns is not None and not control_stands and not control.has_ended:
             self._scan_due()
+        self._audience.update(self._monotonic_ns())  # behind the scans, so that the next ones begin in time
 
     def _advance(self, stands: bool, due_ns: int | None) -> None:
         """Lets the PLCs' time pass as far as the host's time says; it stands during a pause."""
