@@ -188,6 +188,11 @@ def test_the_script_pages(load: Load, capsys: pytest.CaptureFixture[str]) -> Non
     assert "a page of 200 scans of 6 variables" in capsys.readouterr().out
 
 
+def test_the_script_live(load: Load) -> None:
+    slices, scans = load("live").measured(2, 3, True)
+    assert len(slices) == 6 and len(scans) == 30 and min(slices) > 0
+
+
 def test_the_script_run(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     script = load("run")
     monkeypatch.setattr(script, "SCANS", 200)

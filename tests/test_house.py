@@ -63,10 +63,10 @@ ORDERS = {
     "prove": ("encoding", ""),
     "testing": ("", "course"),
     "record": ("trace", "recording", "draw", "export", "page"),
-    "cli": ("shared", "shared/debug", "programs", "running", "recordings", "projects", "editors", ""),
+    "cli": ("shared", "shared/debug", "shared/live", "programs", "running", "recordings", "projects", "editors", ""),
 }
 """The folders of a room, the lowest first; "" is the room itself.  A folder imports from those before it."""
-_VERBS = ORDERS["cli"][2:-1]
+_VERBS = ORDERS["cli"][3:-1]
 UNRELATED = {("syntax/ladder/drawing", "syntax/st"), ("syntax/sfc", "syntax/ladder"), ("syntax/recovery", "syntax/ladder"),
              ("syntax/recovery", "syntax/sfc"), ("interchange/plcopen/write", "interchange/plcopen/read"),
              ("units/port", "units/etn21"), *((f"cli/{one}", f"cli/{other}") for one in _VERBS for other in _VERBS)}  # fmt: skip

@@ -37,7 +37,7 @@ VERB_GROUPS = {
     "projects": ("Projects and lessons", {
         "new": "Make a project with a block and its test.",
         "test": "Run the tests of a project.",
-        "learn": "Learn in thirteen lessons what a scan cycle really does.",
+        "learn": "Learn in sixteen lessons what a scan cycle really does.",
     }),
     "programs": ("Look at programs", {
         "check": "Say what is wrong with a program; silent when nothing is.",

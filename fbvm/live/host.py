@@ -6,7 +6,11 @@ from collections.abc import Callable
 
 from fbvm.live.session import UPDATE_NS, Session
 from fbvm.live.sockets import LiveServer
+from fbvm.live.stops import forget_statement
 from fbvm.live.workbench import Workbench
+
+LOOK_TICKS = 3
+"""The files of a run are looked at every 300 ms."""
 
 
 class LiveHost:
@@ -15,9 +19,14 @@ class LiveHost:
 
     def __init__(self, workbench: Workbench, bind: str = "127.0.0.1", port: int = 0, token: str | None = None,
                  tick: Callable[[], None] = lambda: None) -> None:  # fmt: skip
-        self.workbench, self._tick, self._ticked_ns = workbench, tick, 0
+        self.workbench, self._tick, self._ticked_ns, self._ticks = workbench, tick, 0, 0
         self._plcs = list(workbench.plcs.values())
-        self.server = LiveServer(lambda: Session(workbench), bind, port, token)
+        self.server = LiveServer(lambda: Session(self.workbench), bind, port, token)
+
+    def show(self, workbench: Workbench) -> None:
+        """Shows other PLCs on the pages that are open."""
+        self.workbench, self._plcs = workbench, list(workbench.plcs.values())
+        self.server.renew_sessions()
 
     @property
     def address(self) -> str:
@@ -25,19 +34,29 @@ class LiveHost:
         return self.server.guard.address()
 
     def serve(self, wait_ns: int) -> bool:
+        if self.workbench.changes:
+            self.workbench.changes.step()
         return self.server.serve(wait_ns)
 
     def before_scan(self, number: int, now_ns: int) -> None:
         self._plcs[number].before_scan()
 
     def after_scan(self, number: int, now_ns: int) -> None:
-        self._plcs[number].after_scan()
+        live = self._plcs[number]
+        live.after_scan()
+        if live.plc.halted:
+            forget_statement(live)
 
     def update(self, now_ns: int) -> None:
         self.server.update(now_ns)
         if now_ns - self._ticked_ns >= UPDATE_NS:
             self._ticked_ns = now_ns
             self._tick()
+            self._ticks += 1
+            if self._ticks % LOOK_TICKS == 0:
+                for looked_at in (self.workbench.changes, self.workbench.pictures):
+                    if looked_at:
+                        looked_at.look()
 
     def close(self) -> None:
         """Ends all connections."""

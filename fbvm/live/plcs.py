@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from io import BytesIO
 from typing import Any
 
 from fbvm.live.program import Drawn, ScanView, instances
 from fbvm.machine.plc import Plc
+from fbvm.record.export.pcapng import Capture
 from fbvm.record.recording.recording import PlcRecording
 from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.observing import observing
@@ -19,12 +21,16 @@ from fbvm.wire.tap import TapEvent
 
 MOST_PACKETS = 2000
 """Frames that are kept of a PLC, the latest ones."""
+MOST_CAPTURE_BYTES = 2 << 20
 
 
 class LivePlc:
     """A PLC under the name that pages know, with `texts`, its sources by name, and its recording."""
 
-    def __init__(self, name: str, plc: Plc, recorded: PlcRecording, texts: Mapping[str, str]) -> None:
+    def __init__(self, name: str, plc: Plc, recorded: PlcRecording, texts: Mapping[str, str],
+                 ended: Callable[[], bool] = lambda: False) -> None:  # fmt: skip
+        self.ended = ended
+        """True when the run has come to the end that was said for it."""
         self.name, self.plc, self.recorded, self.texts = name, plc, recorded, texts
         self.names = Names.of(plc.image, plc.memory.areas)
         self.described, self.meanings = descriptions(plc), meanings(plc)
@@ -39,6 +45,7 @@ class LivePlc:
         self.packets: deque[tuple[int, int, Packet]] = deque(maxlen=MOST_PACKETS)
         """Number, scan and content of frames; numbers count on."""
         self.frames = 0
+        self._events: deque[tuple[int, int, str, TapEvent]] = deque(maxlen=MOST_PACKETS)
         self._addresses = {attached.unit.address for attached in plc.units}
         self._dissector = Dissector()
         for network in {id(attached.network): attached.network for attached in plc.units}.values():
@@ -56,15 +63,20 @@ class LivePlc:
 
     def before_scan(self) -> None:
         """Observes the next scan if somebody wants to see inside."""
-        if self.wants_view and not self.plc.trap and not self.plc.halted:
+        if self.wants_view and not self.plc.trap and not self.plc.breakpoints.armed:
             self.wants_view = False
             view = ScanView(self.plc.image, self.plc.memory.areas, self.names, self._drawn)
             self._observing.enter_context(observing(self.plc, view))
             self.view = view
 
     def after_scan(self) -> None:
-        """The scan has ended: it is observed no longer."""
+        """The scan has ended: it is observed no longer.  One with breakpoints was not, and is executed again for the view."""
         self._observing.close()
+        plc = self.plc
+        stands = plc.halted or self.is_real or plc.scans - 1 not in self.recorded.scans
+        if self.wants_view and plc.breakpoints.armed and not stands:
+            self.wants_view = False
+            self.view = self.past_view(plc.scans - 1)
 
     def past_view(self, scan: int) -> ScanView:
         """What happened inside a recorded scan, which is executed again."""
@@ -79,9 +91,25 @@ class LivePlc:
                  "info": packet.info, "data": packet.data[:1500].hex(),
                  "out": packet.source.host in self._addresses} for number, at, packet in rows[-most:]]  # fmt: skip
 
+    def capture(self) -> bytes:
+        """The last events of the network as a pcapng file, with the numbers of their scans as comments."""
+        kept: list[tuple[int, int, str, TapEvent]] = []
+        size = 0
+        for row in reversed(self._events):
+            size += len(row[3].data) + 200
+            if size > MOST_CAPTURE_BYTES:
+                break
+            kept.insert(0, row)
+        file, scan = BytesIO(), [0]
+        capture = Capture(file, comment=lambda address: f"scan {scan[0]}")
+        for scan[0], now_ns, unit, event in kept:
+            capture.tap(now_ns, unit, event)
+        return file.getvalue()
+
     def _passed(self, now_ns: int, unit: str, event: TapEvent) -> None:
         """Keeps what passes at a unit of this PLC, with the number of the scan that it belongs to."""
         if unit in self._addresses:
+            self._events.append((self.plc.scans, now_ns, unit, event))
             for packet in self._dissector.dissect(now_ns, event):
                 self.packets.append((self.frames, self.plc.scans, packet))
                 self.frames += 1

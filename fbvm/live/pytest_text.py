@@ -10,7 +10,8 @@ from fbvm.live.plcs import LivePlc
 from fbvm.live.workbench import Act
 from fbvm.machine.plc import Plc
 
-_CALLS = {"write": "plc.write({name!r}, {value})", "force": "plc.force({name!r}, {value})", "mode": "plc.mode = Mode({value!r})",
+_CALLS = {"write": "plc.write({name!r}, {value})", "keep": "plc.write({name!r}, {value})",
+          "force": "plc.force({name!r}, {value})", "mode": "plc.mode = Mode({value!r})",
           "start": "plc.{value}_start()"}  # fmt: skip
 """The statement of an act by its kind, after which it takes place before the next scan."""
 
@@ -60,5 +61,6 @@ def _statement(act: Act) -> str:
     if act.what == "release":
         return f"plc.unforce({act.name!r})" if act.name else "plc.unforce()"
     if act.what in _CALLS:
-        return _CALLS[act.what].format(name=act.name, value=_literal(act.value) if act.what in ("write", "force") else act.value)
+        value = _literal(act.value) if act.what in ("write", "keep", "force") else act.value
+        return _CALLS[act.what].format(name=act.name, value=value)
     return f"# not repeated: {act.text.splitlines()[0] if act.text else act.what}"

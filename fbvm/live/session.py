@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import FLAG_AREAS
+from fbvm.live.futures import REPEATED, order_of
+from fbvm.live.lesson import LiveLesson
 from fbvm.live.messages import ACTIONS, MOST_NAMES, VERSION, MessageError, dump, message_id, parse
 from fbvm.live.plcs import LivePlc
 from fbvm.live.program import ScanView, source_of
+from fbvm.live.stops import halt_row, shown_breakpoints
 from fbvm.live.symbols import parts, row, search
 from fbvm.live.workbench import REFUSED, Workbench, fault_rows
 from fbvm.machine.plc import Plc
@@ -42,21 +46,27 @@ class Session:
         self._names: dict[str, Place | Span] = {}
         self._instance = ""
         self._memory: tuple[str, int] | None = None
-        self._units = self._network = False
+        self._units = self._network = self._pictures = self._times = False
         self._past: tuple[int, Plc] | None = None
         self._past_view: ScanView | None = None
+        self._other: LivePlc | None = None
+        """The PLC in another future, if that is looked at."""
         self._ready = False
         self._told_ns = self._viewed_ns = -VIEW_NS
+        self._begins = False
+        """True if the next update says that the page has to begin again."""
         self._known: dict[str, Any] = {}
         """What the page knows: values by name, other parts by theirs."""
         self._frames = self._acts = 0
         self._actions: dict[str, Callable[..., Any]] = {
             "hello": self._hello, "ready": self._take, "look": self._look, "program": self._program, "source": self._source,
             "search": self._search, "parts": self._parts, "history": self._history, "why": self._why, "test": self._test,
-            "view": self._view, "write": self._write, "force": workbench.force, "release": workbench.release,
-            "run": self._run, "pause": workbench.pause, "step": self._step, "speed": workbench.speed,
-            "mode": workbench.set_mode, "start": workbench.start, "cable": workbench.cable, "fault": workbench.add_fault,
-            "mend": workbench.mend,
+            "capture": self._capture, "view": self._view, "branch": self._branch, "write": self._write,
+            "force": workbench.force, "release": workbench.release, "run": self._run, "pause": workbench.pause,
+            "step": self._step, "statement": self._statement, "break": workbench.set_breakpoint,
+            "unbreak": workbench.remove_breakpoint, "speed": workbench.speed, "mode": workbench.set_mode,
+            "start": workbench.start, "cable": workbench.cable, "fault": workbench.add_fault, "mend": workbench.mend,
+            "restart": workbench.restart, "predict": self._predict, "check": self._check, "solution": self._solution,
         }  # fmt: skip
 
     # --- messages -----------------------------------------------------------------------------------------------------
@@ -76,17 +86,25 @@ class Session:
             if ACTIONS[action].changes and self._bench.held_by:
                 raise MessageError(f"{self._bench.held_by} has the PLC: this page looks on meanwhile")
             if self._past and action in ("write", "force", "release"):
-                raise MessageError(f"this is scan {self._past[0]}, which is past: go back to now first")
-            done = self._actions[action](**{name: value for name, value in message.items() if value is not None})
+                raise MessageError(f"this is scan {self._past[0]}, which is past: go back to now, or on from here, first")
+            fields = {name: value for name, value in message.items() if value is not None}
+            order = order_of(self._bench, action, fields)
+            done = self._actions[action](**fields)
+            if action in REPEATED:
+                self._bench.orders.append(order)
         except MessageError as error:
             return dump({"re": number if number is not None else message_id(text), "error": str(error)})
         except REFUSED as error:
             return dump({"re": number, "error": str(error)})
         return dump({"re": number, "ok": done if done is not None else {}})
 
+    def begin_again(self) -> None:
+        """Tells the page, which was in the session before this one, that other PLCs run now: it says hello once more."""
+        self._begins = self._ready = True
+
     def end(self) -> None:
         """The page has gone."""
-        self._ready, self._past = False, None
+        self._ready, self._past, self._other = False, None, None
 
     def _hello(self, version: int = VERSION) -> dict[str, Any]:
         if version != VERSION:
@@ -97,6 +115,9 @@ class Session:
         return {
             "version": VERSION, "read_only": bench.read_only, "writable": bench.writable,
             "real": any(live.is_real for live in bench.plcs.values()), "tests": bench.make_test is not None,
+            "branches": bench.can_branch, "futures": [future.name for future in bench.futures],
+            "lesson": bench.lesson.about() if bench.lesson else None,
+            "pictures": bench.pictures is not None and bool(bench.pictures.shown),
             "modes": [mode.value for mode in Mode], "faults": {name: kind.meaning for name, kind in NAMED.items()},
             "plcs": [{"name": live.name, "cycle": live.plc.cycle_ns, "instances": live.instances,
                       "areas": {name: area.size_bytes // 2 for name, area in live.plc.memory.areas.items()
@@ -109,7 +130,8 @@ class Session:
         self._ready = True
 
     def _look(self, plc: str, names: list[str] | None = None, instance: str | None = None, memory: str | None = None,
-              first: int = 0, units: bool = False, network: bool = False, scan: bool = False) -> dict[str, Any]:  # fmt: skip
+              first: int = 0, units: bool = False, network: bool = False, scan: bool = False,
+              pictures: bool = False, times: bool = False) -> dict[str, Any]:  # fmt: skip
         """From now on the page sees these names and panels, and nothing else; `scan` wants to see inside scans."""
         live = self._bench.plc(plc)
         found: dict[str, Place | Span] = {}
@@ -122,11 +144,11 @@ class Session:
         if memory is not None and memory not in live.plc.memory.areas:
             raise MessageError(f"this PLC has no area {memory[:10]!r}")
         if live is not self._live:
-            self._past = self._past_view = None
+            self._past = self._past_view = self._other = None
             self._frames = 0
         self._live, self._names, self._instance = live, found, (instance or "") if scan else ""
         self._memory = (memory, max(0, first)) if memory else None
-        self._units, self._network = units, network
+        self._units, self._network, self._pictures, self._times = units, network, pictures, times
         self._known, self._viewed_ns = {}, -VIEW_NS
         if not network:
             self._frames = 0
@@ -195,33 +217,70 @@ class Session:
             raise MessageError("pause first: while real connections are served no scan is executed again")
         return live
 
+    # --- a lesson -----------------------------------------------------------------------------------------------------
+
+    @property
+    def _lesson(self) -> LiveLesson:
+        if self._bench.lesson is None:
+            raise MessageError("this page has no lesson: fbvm learn --live has one")
+        return self._bench.lesson
+
+    def _predict(self, names: list[str], values: list[str]) -> dict[str, Any]:
+        return self._lesson.take_prediction(names, values)
+
+    def _check(self) -> dict[str, Any]:
+        return self._lesson.take_check()
+
+    def _solution(self) -> dict[str, Any]:
+        return {"text": self._lesson.solution()}
+
     # --- the scan -----------------------------------------------------------------------------------------------------
 
-    def _view(self, plc: str, scan: int | None = None) -> dict[str, Any]:
-        """Looks at the end of a recorded scan, or, without one, at the present again."""
+    def _branch(self, plc: str) -> None:
+        """Goes on from the scan that is looked at, as if nothing had come behind it."""
+        if self._past is None or self._other is not None:
+            raise MessageError("look at a scan of the present run first: another future begins behind it")
+        self._bench.branch(plc, self._past[0] + 1)
+
+    def _capture(self, plc: str) -> dict[str, Any]:
+        """What has passed the network last, as a file for Wireshark."""
+        return {"pcapng": b64encode(self._bench.plc(plc).capture()).decode()}
+
+    def _view(self, plc: str, scan: int | None = None, future: int | None = None) -> dict[str, Any]:
+        """Looks at the end of a recorded scan, also of another future, or, without one, at the present again."""
         if scan is None:
-            self._past = self._past_view = None
+            self._past = self._past_view = self._other = None
             self._known = {}
             return {}
         live = self._quiet(plc)
-        held = live.recorded.scans
+        other = None
+        if future is not None:
+            if not 0 <= future < len(self._bench.futures):
+                raise MessageError(f"there is no future {future}")
+            other = self._bench.futures[future].plcs.get(plc)
+        seen = other or live
+        held = seen.recorded.scans
         if scan not in held:
             raise MessageError(f"scan {scan} is not recorded; recorded are {held.start} to {held.stop - 1}" if held
                                else "no scan has been recorded yet")  # fmt: skip
-        self._live, self._known = live, {}
-        self._past = scan, live.recorded.at(scan + 1)
-        self._past_view = live.past_view(scan) if self._instance else None
+        self._live, self._known, self._other = live, {}, other
+        self._past = scan, seen.recorded.at(scan + 1)
+        self._past_view = seen.past_view(scan) if self._instance else None
         return {"scan": scan}
 
     def _write(self, plc: str, name: str, value: str) -> dict[str, Any]:
         return {"value": self._bench.write(plc, name, value)}
 
     def _run(self) -> None:
-        self._past = self._past_view = None
+        self._past = self._past_view = self._other = None
         self._bench.go_on()
 
+    def _statement(self, plc: str) -> None:
+        self._past = self._past_view = self._other = None
+        self._bench.step_statement(plc)
+
     def _step(self, scans: int) -> None:
-        self._past = self._past_view = None
+        self._past = self._past_view = self._other = None
         self._bench.step(scans)
         if self._instance:
             self._live.wish_view(True)
@@ -233,6 +292,9 @@ class Session:
         if that is less than 100 ms ago.  `now_ns` is the host's time."""
         if not self._ready or now_ns - self._told_ns < UPDATE_NS:
             return None
+        if self._begins:
+            self._begins = False
+            return dump({"update": {"restarted": True}})
         changed = {**self._state(), **self._panels(now_ns)}
         changed = {name: value for name, value in changed.items() if self._is_new(name, value)}
         values = {name: text for name, place in self._names.items()
@@ -263,12 +325,15 @@ class Session:
 
     def _state(self) -> dict[str, Any]:
         live, control = self._live, self._bench.control
-        plc, held = live.plc, live.recorded.scans
-        state = "past" if self._past else "trap" if plc.trap else "pause" if control.is_paused and not control.steps else "run"
+        plc, held = live.plc, (self._other or live).recorded.scans
+        state = "past" if self._past else "trap" if plc.trap else "halt" if plc.halted else "ended" if live.ended() else \
+            "pause" if control.is_paused and not control.steps else "run"
         trap = plc.trap.told(live.names.instance) if plc.trap else ""
         return {
             "plc": live.name, "state": state, "mode": plc.mode.value, "speed": control.speed, "trap": trap,
             "scan": self._past[0] if self._past else plc.scans - 1, "ns": self._past[1].now_ns if self._past else plc.now_ns,
+            "halt": halt_row(live, plc.halted) if plc.halted and not self._past else None,
+            "breaks": [f"{row.kind} {row}" + (f" at passes {row.hits}" if row.hits else "") for row in shown_breakpoints(live)],
             "held": [held.start, held.stop - 1], "taken": str(plc.scan_times),
             "forces": {name: _plain(live, name, value) for name, value in self._seen.forces.items()},
         }  # fmt: skip
@@ -294,9 +359,16 @@ class Session:
             if rows:
                 made["frames"], self._frames = rows, rows[-1]["number"] + 1
             made["faults"] = fault_rows(bench.faults)
+        if self._pictures and bench.pictures:
+            made["pictures"] = bench.pictures.shown
+            made["picture"] = dict(bench.pictures.values(live if self._past else None, lambda place: self._seen.read(place)))
+        if self._times:
+            made["times"] = live.plc.scan_times.bins
+        if bench.changes:
+            made["change"] = bench.changes.state
         acts = bench.acts[self._acts :][-ACTS:]
         if acts:
-            made["acts"] = [[act.plc, act.scan, act.text] for act in acts]
+            made["acts"] = [[act.plc, act.scan, act.text] for act in acts if act.what != "keep"]
             self._acts = len(bench.acts)
         return made
 

@@ -69,12 +69,24 @@ class LiveServer:
         return bool(ready)
 
     def update(self, now_ns: int) -> None:
-        """Sends each page what has changed, if it has taken the update before."""
+        """Sends one page what has changed, if it has taken the update before; the others have their turn at further calls."""
         for browser in list(self._browsers):
             ready = browser.session if not browser.connection.has_output else None
             if ready and (text := ready.update(now_ns)) is not None:
                 browser.connection.send(text)
                 self._write(browser)
+                if browser in self._browsers:  # behind all others
+                    self._browsers.remove(browser)
+                    self._browsers.append(browser)
+                return
+
+    def renew_sessions(self) -> None:
+        """Gives each page a new session, and lets it begin again."""
+        for browser in self._browsers:
+            if browser.session:
+                browser.session.end()
+                browser.session = self._new_session()
+                browser.session.begin_again()
 
     def close(self) -> None:
         """Ends all connections."""

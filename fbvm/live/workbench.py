@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fbvm.live.changes import SourceChanges
+from fbvm.live.lesson import LiveLesson
 from fbvm.live.messages import MessageError
+from fbvm.live.pictures import Pictures
 from fbvm.live.plcs import LivePlc
+from fbvm.live.stops import set_breakpoint, shown_breakpoints, stop_at_next_statement
 from fbvm.machine.plc import Mode
 from fbvm.net.faults import KINDS, NAMED, Fault, fault
 from fbvm.run.interactive import Control
@@ -39,6 +43,15 @@ class Act:
     """As `Plc.write` takes it."""
 
 
+@dataclass(frozen=True)
+class Order:
+    """An action as it was asked for, and how many scans each PLC had done."""
+
+    action: str
+    fields: dict[str, Any]
+    scans: dict[str, int]
+
+
 class Workbench:
     """All PLCs of a run, their `control`, and the faults of their networks.
 
@@ -47,7 +60,8 @@ class Workbench:
 
     def __init__(self, plcs: Sequence[LivePlc], control: Control, *, read_only: bool = False,
                  writable: Collection[str] | None = None,
-                 test: Callable[[Sequence[Act], LivePlc, Sequence[str]], str] | None = None) -> None:  # fmt: skip
+                 test: Callable[[Sequence[Act], LivePlc, Sequence[str]], str] | None = None,
+                 changes: SourceChanges | None = None, pictures: Pictures | None = None) -> None:  # fmt: skip
         self.plcs = {plc.name: plc for plc in plcs}
         self.control, self.read_only = control, read_only
         self.held_by = ""
@@ -55,6 +69,21 @@ class Workbench:
         self.writable = None if writable is None else [self._checked(name) for name in writable]
         self.make_test = test
         """Writes the acts as a pytest; None where a run cannot be repeated by one."""
+        self.pictures = pictures
+        """Drawings of the machine; None without a project."""
+        self.changes = changes
+        """What has become of the sources meanwhile; None where nobody can begin a changed program."""
+        self.wants_restart = False
+        """True if the run is to end, and the changed program to begin."""
+        self.branch_at: tuple[str, int] | None = None
+        """The PLC and the number of scans from which another future is to begin."""
+        self.can_branch = False
+        """True if new PLCs can do the past again: in virtual time, from power-on."""
+        self.futures: Sequence[Any] = ()
+        """What the PLCs did before another future was begun (`futures.Future`)."""
+        self.lesson: LiveLesson | None = None
+        """What the page teaches; None for a page that only shows."""
+        self.orders: list[Order] = []
         self.acts: list[Act] = []
         networks: dict[int, Any] = {id(unit.network): unit.network for live in plcs for unit in live.plc.units}
         self.networks = list(networks.values())
@@ -83,7 +112,9 @@ class Workbench:
         found = self._to_change(live, name)
         given = parse_for(found, value)
         live.plc.write(found, given)
-        self._note(live, "write", f"{found.name} := {_text(found, given)}", found.name, given)
+        if live.plc.halted:
+            live.recorded.changed()
+        self._note(live, "inside" if live.plc.halted else "write", f"{found.name} := {_text(found, given)}", found.name, given)
         return _text(found, live.plc.read(found))
 
     def force(self, plc: str, name: str, value: str) -> None:
@@ -135,6 +166,30 @@ class Workbench:
             raise MessageError(f"a step has 1 to {MOST_STEPS:,} scans, not {scans}")
         self.control.step(scans)
 
+    def step_statement(self, plc: str) -> None:
+        """Executes one statement of a PLC, and stands before the next one."""
+        live = self._to_control(plc)
+        if live.is_real:
+            raise MessageError("with real connections time does not stand still inside a scan: step whole scans")
+        stop_at_next_statement(live)
+        self.control.go_on()
+
+    def set_breakpoint(self, plc: str, kind: str, where: str, when: str = "", hits: str = "") -> None:
+        """Lets scans of a PLC stand at a line, behind a change, or where a condition holds."""
+        live = self._to_control(plc)
+        found = set_breakpoint(live, kind, where, when, hits)
+        self._note(live, "break", f"breakpoint at {found.kind} {found}")
+
+    def remove_breakpoint(self, plc: str, number: int | None = None) -> None:
+        """Removes the breakpoint with this number, or all."""
+        live = self._to_control(plc)
+        rows = shown_breakpoints(live)
+        if number is not None and not 0 <= number < len(rows):
+            raise MessageError(f"there is no breakpoint {number}")
+        for row in rows if number is None else [rows[number]]:
+            live.plc.breakpoints.remove(row)
+        self._note(live, "break", "all breakpoints removed" if number is None else f"breakpoint {rows[number]} removed")
+
     def speed(self, factor: float) -> None:
         """Sets how fast virtual time passes."""
         if any(live.is_real for live in self.plcs.values()):
@@ -161,6 +216,43 @@ class Workbench:
             raise MessageError("the scan stands at a breakpoint: let it go on first")
         live.plc.warm_start() if kind == "warm" else live.plc.cold_start()
         self._note(live, "start", f"{kind} start", value=kind)
+
+    def restart(self) -> None:
+        """Ends the run, so that the changed program begins with what is retained."""
+        if self.writable is not None:
+            raise MessageError("with --allow-write only values can be changed")
+        if self.changes is None or self.changes.state is None:
+            raise MessageError("the program has not changed")
+        if not self.changes.compile():
+            raise MessageError("the changed program cannot run yet: it is checked, or it has errors")
+        self.wants_restart = True
+        self.control.end()
+
+    def branch(self, plc: str, scans: int) -> None:
+        """Ends the run, so that another future begins behind so many scans of a PLC."""
+        if self.writable is not None:
+            raise MessageError("with --allow-write only values can be changed")
+        if not self.can_branch:
+            raise MessageError("the past of these PLCs cannot be done again: connections are real, or the program has changed")
+        self.branch_at = plc, scans
+        self.control.end()
+
+    def do(self, action: str, fields: Mapping[str, Any]) -> None:
+        """Does again what an order says."""
+        names: dict[str, Callable[..., object]] = {
+            "write": self.write, "force": self.force, "release": self.release, "mode": self.set_mode, "start": self.start,
+            "cable": self.cable, "fault": self.add_fault, "mend": self.mend,
+        }  # fmt: skip
+        names[action](**fields)
+
+    def note_restart(self, old: Workbench, kept: Mapping[str, Sequence[Place]]) -> None:
+        """Notes what the PLCs of this workbench have kept of those before them, as values that were written."""
+        files = ", ".join(old.changes.state["files"]) if old.changes and old.changes.state else ""
+        for name, places in kept.items():
+            live = self.plcs[name]
+            self._note(live, "restart", f"restart with the changed {files}; {len(places)} retained variables kept their values")
+            for place in places:
+                self.acts.append(Act(live.name, 0, 0, "keep", f"{place.name} kept", place.name, live.plc.read(place)))
 
     def _to_control(self, plc: str) -> LivePlc:
         if self.writable is not None:

@@ -52,7 +52,7 @@ class Breakpoint:
     """What stops a scan: a line of a source, a change of a variable or address, or a condition; `when` is a further condition."""
 
     kind: str
-    """"line", "change" or "condition"."""
+    """"line", "change", "condition" or "statement"."""
     where: str
     """The line ("main.st:12"), the variable or address, or the condition."""
     when: str = ""
@@ -158,10 +158,17 @@ class BreakpointRows:
         row = Watchpoint(extents, test=self._test(condition), edge=True, wanted=parse_passes(hits))
         return self._put(Breakpoint("condition", when, "", hits), row)
 
+    def statement(self) -> Breakpoint:
+        """Stops before every statement and rung of every POU."""
+        row = LineStop(frozenset(range(len(self._image.sites))))
+        return self._put(Breakpoint("statement", "the next statement"), row)
+
     def put(self, breakpoint: Breakpoint) -> Breakpoint:
         """Sets the same breakpoint as on another PLC with this image.  Raises as the method for its kind."""
         if breakpoint.kind == "line":
             return self.line(breakpoint.where, breakpoint.when, breakpoint.hits, breakpoint.message)
+        if breakpoint.kind == "statement":
+            return self.statement()
         if breakpoint.kind == "change":
             return self.change(breakpoint.where, breakpoint.when, breakpoint.hits)
         return self.condition(breakpoint.where, breakpoint.hits)

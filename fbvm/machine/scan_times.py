@@ -108,6 +108,12 @@ class Times:
             begin = end
         recent_ns.clear()
 
+    @property
+    def bins(self) -> list[tuple[int, int]]:
+        """The histogram: lower bounds in ns, and how many there were from there up to the next bound of `SIZES_NS`."""
+        self._settle()
+        return [(SIZES_NS[size - 1] if size else 0, times) for size, times in sorted(self._sorted.items())]
+
     def within_ns(self, share: float) -> int:
         """The time in ns that this share of all scans (0.99: 99 of 100) did not exceed, to 3 %."""
         missing = share * self.count

@@ -71,8 +71,9 @@ def run_interactive(runs: Sequence[Running], control: Control, audience: Audienc
                     monotonic_ns: Callable[[], int] = time.monotonic_ns) -> None:  # fmt: skip
     """Runs PLCs until each has its `reason`: its own end, "stopped" after `control.end`, or "interrupted" after Ctrl-C.
 
-    A PLC with a trap ends for itself and can still be looked at: the loop goes on until `control.end`.  When `until` returns True
-    between two turns, the loop is left; called again after `Running.resume` of each PLC, it goes on."""
+    A PLC with a trap ends for itself and can still be looked at: the loop goes on until `control.end`.  One that meets a
+    breakpoint pauses the run, and its scan goes on with the next one that is executed.  When `until` returns True between two
+    turns, the loop is left; called again after `Running.resume` of each PLC, it goes on."""
     interrupts = Interrupts()
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     loop = _Loop(runs, control, audience, [cast(RealNetwork, network) for network in networks.values()], monotonic_ns)
@@ -133,9 +134,9 @@ class _Loop:
         self._advance(stands or control_stands, due_ns)
         for network in self._networks:
             network.serve(self._now_ns)
-        self._audience.update(self._monotonic_ns())
         if due_ns is not None and not control_stands and not control.has_ended:
             self._scan_due()
+        self._audience.update(self._monotonic_ns())  # behind the scans, so that the next ones begin in time
 
     def _advance(self, stands: bool, due_ns: int | None) -> None:
         """Lets the PLCs' time pass as far as the host's time says; it stands during a pause."""
@@ -175,8 +176,8 @@ class _Loop:
                     self._scan(number, run, self._now_ns if self._networks else due_ns)
             if control.steps:
                 control.steps -= 1
-                if not control.steps:
-                    return
+            if control.is_paused and not control.steps:
+                return
             if self._networks or control.has_ended or self._monotonic_ns() >= until_ns:
                 return
 
@@ -189,6 +190,9 @@ class _Loop:
         run.scan(now_ns)
         if self._watchdogs:
             self._watchdogs[number].end()
+        if plc.halted:  # it goes on with the next scan that is due
+            run.reason = ""
+            self._control.pause()
         ended_ns = self._monotonic_ns()
         if scans := plc.scans - scan:
             plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)

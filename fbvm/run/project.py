@@ -35,6 +35,7 @@ from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
 from fbvm.net.faults import Fault
 from fbvm.run.fault_rows import FAULT, check_faults, fault_of, impossible_on_the_host
+from fbvm.run.picture_rows import PICTURE, Picture, check_pictures, pictures_of
 from fbvm.run.project_reader import (
     Key,
     Keys,
@@ -134,6 +135,7 @@ PROJECT: Keys = {
     "server": Key(SERVER, "A Modbus TCP server that programs talk to.", (), many=True),
     "door": Key(DOOR, "Where others reach a unit with real connections.", (), many=True),
     "fault": Key(FAULT, "What goes wrong on the network; of several rows that fit the first counts.", (), many=True),
+    "picture": Key(PICTURE, "A drawing of the machine on the page of `fbvm live`.", (), many=True),
     "plc": Key(PLC, "A PLC, or several equal ones, by name.", named=True),
 }
 
@@ -202,6 +204,8 @@ class Project:
     """What goes wrong on a network in memory."""
     plcs: tuple[PlcRow, ...]
     """The PLCs, in the order of the file."""
+    pictures: tuple[Picture, ...] = ()
+    """Drawings of the machine."""
 
     def wrong_on(self, net: str) -> list[Diagnostic]:
         """What the file says and cannot be done on this network, "loop" or "tcp"."""
@@ -239,6 +243,7 @@ def read_project(path: Path, *, allow_outside: bool = False, text: str | None = 
         _check_paths(reading, table["plc"], path.parent)
         _check_endpoints(reading, table)
         check_faults(reading, table["fault"])
+        check_pictures(reading, table, path.parent, allow_outside=allow_outside)
         if not allow_outside:
             _check_inside(reading, table["plc"], path.parent)
     if errors(reading.diagnostics):
@@ -251,6 +256,7 @@ def read_project(path: Path, *, allow_outside: bool = False, text: str | None = 
         frozenset(row["address"] for row in table["door"] if row["backlog"]),
         tuple(fault_of(row) for row in table["fault"]),
         tuple(_plc(name, row, path.parent) for name, row in table["plc"].items()),
+        pictures_of(table["picture"], path.parent, table["plc"]),
     )  # fmt: skip
     return made.wrong_on(made.net) or made
 

@@ -51,14 +51,15 @@ def browser() -> Iterator[Any]:
 class Live:
     """`fbvm live` in a process of its own, and its page in windows."""
 
-    def __init__(self, browser: Any, folder: Path, text: str, *options: str) -> None:
-        file = folder / "pump.st"
+    def __init__(self, browser: Any, folder: Path, text: str, *options: str, verb: str = "live") -> None:
+        self.file = file = folder / "pump.st"
         file.write_text(text)
         self._browser = browser
-        self.process = subprocess.Popen([sys.executable, "-m", "fbvm", "live", str(file), *options], stdout=subprocess.PIPE,
+        given = [] if verb in ("serve", "demo") or options and options[-1].startswith(str(folder)) else [str(file)]
+        self.process = subprocess.Popen([sys.executable, "-m", "fbvm", verb, *given, *options], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True)  # fmt: skip
         assert self.process.stdout is not None
-        self.url = self.process.stdout.readline().strip()
+        self.url = next((line.strip() for line in self.process.stdout if line.startswith("http:")), "")
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#token=[\w-]{32,}", self.url), self.process.stderr
         self.complaints: list[str] = []
 
@@ -82,8 +83,8 @@ class Live:
 def live(browser: Any, tmp_path: Path) -> Iterator[Any]:
     made: list[Live] = []
 
-    def start(*options: str, text: str = PUMP) -> Live:
-        made.append(Live(browser, tmp_path, text, *options))
+    def start(*options: str, text: str = PUMP, verb: str = "live") -> Live:
+        made.append(Live(browser, tmp_path, text, *options, verb=verb))
         return made[-1]
 
     yield start
@@ -230,4 +231,138 @@ def test_a_thousand_signals_are_watched(live: Any) -> None:
     row.get_by_role("button", name="Watch the parts of").click()
     page.locator("#watched tr").nth(500).wait_for()
     page.locator("#where", has_text=re.compile(r"scan \d{4,}")).wait_for()
+    assert run.complaints == []
+
+
+KEPT = "PROGRAM Main VAR RETAIN n : INT; END_VAR VAR m : INT; END_VAR\nn := n + 1;\nm := m + 1;\nEND_PROGRAM\n"
+
+
+def test_a_file_that_changes_is_begun_again_with_what_is_retained(live: Any) -> None:
+    page = (run := live("--paused", text=KEPT)).window()
+    watch(page, "Main.n")
+    page.locator("#where").click()
+    page.keyboard.press("S")
+    value(page.locator("#watched tr[data-name='Main.n']"), "10")
+    run.file.write_text(KEPT.replace("n + 1;", "n + k;"))
+    page.locator("#mistakes td", has_text="n := n + k;").wait_for()
+    page.locator("#source .mistake").first.wait_for()
+    assert page.locator("#restart").is_hidden()
+    page.keyboard.press("s")
+    value(page.locator("#watched tr[data-name='Main.n']"), "11")
+    run.file.write_text(KEPT.replace("VAR m : INT;", "VAR first, m : INT;").replace("n + 1;", "n + 100;"))
+    page.locator("#restart").click()
+    page.locator("#change").wait_for(state="hidden")
+    value(page.locator("#watched tr[data-name='Main.n']"), "11")
+    page.keyboard.press("s")
+    value(page.locator("#watched tr[data-name='Main.n']"), "111")
+    page.locator("#log li", has_text="restart with the changed pump.st; 1 retained").wait_for()
+    assert run.complaints == []
+
+
+@pytest.mark.parametrize(("verb", "options"), [("run", ["--live"]), ("serve", ["--port", "0", "--live"]), ("demo", ["--live"])])
+def test_other_verbs_open_the_page_on_what_they_run(live: Any, verb: str, options: list[str]) -> None:
+    page = (run := live(*options, verb=verb)).window()
+    state(page, "pause" if verb == "demo" else "run")
+    if verb == "demo":
+        page.click("#run")
+        row = watch(page, "Main.Done")
+        value(row, "TRUE")
+    page.locator("#source tr").nth(3).wait_for()
+    assert run.complaints == []
+
+
+def test_a_run_with_an_end_stays_on_its_page(live: Any) -> None:
+    page = live("--live", "--scans", "25", verb="run").window()
+    state(page, "ended")
+    page.locator("#where", has_text="scan 24,").wait_for()
+
+
+CONVEYOR = Path(__file__).parents[2] / "examples" / "conveyor"
+
+
+def test_a_picture_moves_with_the_machine_and_its_buttons_are_pressed(live: Any, tmp_path: Path) -> None:
+    shutil.copytree(CONVEYOR, tmp_path / "machine")
+    page = (run := live(str(tmp_path / "machine"))).window()
+    state(page, "run")
+    motor, box = page.locator("#m-motor"), page.locator("#m-box")
+    page.locator("#m-box[style*='visible']").wait_for()
+    page.locator("#m-start").focus()
+    page.keyboard.down("Enter")
+    page.locator("#bound tr", has_text="Main.Start").locator("td", has_text="TRUE").first.wait_for()
+    page.keyboard.up("Enter")
+    page.locator("#m-motor[style*='rgb(27, 127, 77)']").wait_for()
+    before = box.bounding_box()["x"]
+    page.wait_for_function("x => document.querySelector('#m-box').getBoundingClientRect().x > x + 20", arg=before)
+    page.locator("#m-stop").click()
+    page.locator("#m-motor[style*='rgb(138, 145, 156)']").wait_for()
+    assert motor.count() == 1
+    drawing = tmp_path / "machine" / "conveyor.svg"
+    more = "<text id='new' x='9' y='20'>changed</text><script>0</script></svg>"
+    drawing.write_text(drawing.read_text().replace("</svg>", more))
+    page.locator("#m-new").wait_for()
+    page.locator("#wrong", has_text="left out, since it does more than draw: <script>").wait_for()
+    assert page.locator("#change").is_hidden()
+    assert run.complaints == []
+
+
+def test_a_breakpoint_is_set_beside_a_line_and_left_by_statements(live: Any) -> None:
+    page = (run := live()).window()
+    state(page, "run")
+    row = watch(page, "Main.Level")
+    page.locator("#source tr", has_text="Level := Level + 1;").locator("td.line").click()
+    state(page, "halt")
+    page.locator("#source tr.halted.breakpoint", has_text="Level := Level + 1;").wait_for()
+    before = int(row.locator(".value").inner_text())
+    page.locator("#where").click()
+    page.keyboard.press("n")
+    value(row, str(before + 1))
+    page.locator("#halt", has_text="at the end of Main").or_(page.locator("#halt", has_text="stands before")).wait_for()
+    page.get_by_role("button", name="Remove the breakpoint").click()
+    page.locator("#breaks li").wait_for(state="detached")
+    page.keyboard.press("r")
+    state(page, "run")
+    assert page.locator("#source tr.halted").count() == 0
+    assert run.complaints == []
+
+
+def test_a_new_future_begins_in_the_past_and_the_old_one_is_kept(live: Any) -> None:
+    page = (run := live("--paused")).window()
+    row = watch(page, "Main.Level")
+    page.locator("#where").click()
+    page.keyboard.press("S")
+    value(row, "30")
+    page.keyboard.press("Shift+ArrowLeft")
+    value(row, "21")
+    page.keyboard.press("ArrowRight")
+    value(row, "22")
+    page.click("#branch")
+    state(page, "pause")
+    value(row, "22")
+    row.locator("input").fill("50")
+    row.locator("input").press("Enter")
+    page.locator("#where").click()
+    page.keyboard.press("s")
+    value(row, "51")
+    page.select_option("#future", "0")
+    state(page, "past")
+    page.locator("#slider").fill("9")
+    value(row, "30")
+    page.click("#now")
+    value(row, "51")
+    assert run.complaints == []
+
+
+def test_frames_are_saved_and_a_word_says_who_wrote_it(live: Any) -> None:
+    page = (run := live()).window()
+    state(page, "run")
+    page.click("[data-panel=network]")
+    with page.expect_download() as saved:
+        page.click("#pcapng")
+    assert Path(saved.value.path()).read_bytes()[:4] == bytes.fromhex("0a0d0d0a")
+    page.click("[data-panel=memory]")
+    page.fill("#first", "10")
+    page.locator("#words button", has_text="005A").first.click()
+    page.locator("#cause:not([hidden])").wait_for()
+    page.click("[data-panel=times]")
+    page.locator("#histogram rect").first.wait_for()
     assert run.complaints == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -11,8 +12,21 @@ import click
 from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.live.origins import FileOrigin, project_origin
+from fbvm.cli.shared.live.page import PageOptions, check_installed, serve_page
+from fbvm.cli.shared.networks import mailbox_names
+from fbvm.cli.shared.options import CYCLE_NS
 from fbvm.cli.shared.paths import ExistingPath
+from fbvm.cli.shared.sources import compile_or_exit
 from fbvm.cli.shared.terminal import named, say
+from fbvm.code.image import Image
+from fbvm.machine.backplane import usual_units
+from fbvm.machine.plc import Plc
+from fbvm.net.loop import LoopNetwork
+from fbvm.run.interactive import Control
+from fbvm.run.plant import ENDLESS
+from fbvm.run.running import Running
+from fbvm.testing.course.lessons import PROGRAM, Lesson
 
 FOLDER = "lessons"
 
@@ -20,6 +34,7 @@ FOLDER = "lessons"
 @click.command("learn")
 @click.argument("number", type=click.IntRange(min=1), required=False, metavar="[LESSON]")
 @click.option("--check", "checked", is_flag=True, help="Check the prediction and the program.")
+@click.option("--live", is_flag=True, help="Teach on a page: the text beside the PLC, until Ctrl-C.")
 @click.option("--solution", "solved", is_flag=True, help="Show the solution, and why.")
 @click.option("--folder", type=click.Path(file_okay=False, path_type=Path), default=FOLDER, show_default=True,
               help="Where your lessons are.")
@@ -27,20 +42,22 @@ FOLDER = "lessons"
               help="For teachers: check all lessons in all folders of this folder, one a learner.")
 @click.option("--report", "out", type=click.Path(file_okay=False, path_type=Path), metavar="DIR", default="report",
               show_default=True, help="With --class: where report.html, traces and pages go.")
-def command(number: int | None, checked: bool, solved: bool, folder: Path, learners: Path | None, out: Path) -> None:
-    """Thirteen lessons: read, predict, look, change, check.
+def command(number: int | None, checked: bool, live: bool, solved: bool, folder: Path, learners: Path | None, out: Path) -> None:
+    """Sixteen lessons: read, predict, look, change, check.
 
     Without LESSON, lists them.  `fbvm learn 1` shows the first one and makes a folder for it; there, write your prediction into
     answers.toml and change program.st, then `fbvm learn 1 --check`.  Status 1 if something is not right yet."""
     from fbvm.testing.course.lessons import check, lessons, prediction_mistake
 
-    if (checked or learners) and find_spec("pytest") is None:
+    if live:
+        check_installed()
+    if (checked or live or learners) and find_spec("pytest") is None:
         raise click.UsageError("checks need pytest: pip install pytest")
     if learners is not None:
         _class(learners, out)
         return
     if number is None:
-        if checked or solved:
+        if checked or solved or live:
             raise click.UsageError("say which lesson: fbvm learn 1 --check")
         _list(folder)
         return
@@ -52,6 +69,9 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
         return
     with writing(folder):
         target = found.begin(folder)
+    if live:
+        _serve_page(found, folder, target)
+        return
     if not checked:
         say(found.text)
         say(f"Your files are in {named(target)}.  When you are ready: fbvm learn {number} --check")
@@ -64,6 +84,39 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
         sys.exit(status.FAILED)
     following = f"; the next one: fbvm learn {number + 1}" if number < len(lessons()) else "; that was the last one"
     say(f"lesson {number} is done{following}", fg="green")
+
+
+def _serve_page(lesson: Lesson, folder: Path, target: Path) -> None:
+    """Teaches on a page; the learner's program runs beside the text, and is begun again when its file changes."""
+    from fbvm.live.lesson import LiveLesson
+    from fbvm.testing.course.lessons import answer, prediction_mistake, program_mistakes, questions
+
+    def predict(values: Mapping[str, str]) -> str:
+        answer(lesson, folder, values)
+        return prediction_mistake(lesson, folder)
+
+    taught = LiveLesson(lesson.title, lesson.text, lambda: questions(lesson, folder), predict,
+                        lambda: program_mistakes(lesson, folder), lesson.solution)  # fmt: skip
+    say(f"Your files are in {named(target)}; the page follows when you change them.")
+    if (target / "fbvm.toml").is_file():
+        serve_page(project_origin(target / "fbvm.toml", None, _endless), Control(is_paused=True), PageOptions(), lesson=taught)
+        return
+    files = (target / PROGRAM,)
+    image = compile_or_exit(files, None, (), runnable=True)
+    origin = FileOrigin(files, (), image, _wired, lambda plc: Running(plc, scans=ENDLESS))
+    serve_page(origin, Control(is_paused=True), PageOptions(), lesson=taught)
+
+
+def _endless(run: Running) -> Running:
+    return Running(run.plc, scans=ENDLESS, writes=run.writes)
+
+
+def _wired(image: Image) -> tuple[Plc, Callable[[], None]]:
+    """A PLC in memory, with its units."""
+    plc, network = Plc(image, CYCLE_NS), LoopNetwork()
+    for unit in usual_units(mailbox_names(image)):
+        plc.attach(unit, network)
+    return plc, network.close
 
 
 def _list(folder: Path) -> None:

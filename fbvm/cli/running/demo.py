@@ -29,6 +29,9 @@ from fbvm.base.files import write_file
 from fbvm.base.host import can_end_others
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import LISTENING
+from fbvm.cli.shared.live.origins import Built, BuiltOrigin, SeenPlc
+from fbvm.cli.shared.live.page import PageOptions, check_installed, live_option, serve_page
+from fbvm.cli.shared.run_recording import program_text
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.code.compiler import compile_files
 from fbvm.machine.backplane import ETN21_ADDRESS
@@ -36,7 +39,11 @@ from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.draw.chart import draw
 from fbvm.record.trace.recorder import Recorder
+from fbvm.record.trace.source_texts import source_texts
 from fbvm.run import loop
+from fbvm.run.interactive import Control
+from fbvm.run.plant import ENDLESS
+from fbvm.run.running import Running
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
@@ -82,10 +89,13 @@ class Server(Protocol):
 @click.command("demo")
 @click.option("--server", "kind", type=click.Choice(["own", "pymodbus"]), default="own" if can_end_others() else "pymodbus",
               show_default=True, help="own: another PLC, with the server program for an ETN21.  pymodbus: other people's.")
-def command(kind: str) -> None:
+@live_option
+def command(kind: str, live: bool) -> None:
     """Run a client program against a real Modbus TCP server on this computer.
 
     Needs no hardware, no root, no configuration.  Ends with 0 only if the data is equal on both sides."""
+    if live:
+        check_installed()
     if kind == "pymodbus":
         try:
             import pymodbus.client  # noqa: F401
@@ -98,20 +108,41 @@ def command(kind: str) -> None:
         with own_server() if kind == "own" else pymodbus_server() as server:
             console.print(f"A Modbus TCP server {whose} listens on 127.0.0.1:{server.port}; what the program calls\n{SERVER} "
                           "is there.", soft_wrap=True)  # fmt: skip
+            if live:
+                console.print("The PLC waits for you to let it run: r on its page.")
+                _serve_page(program, server)
+                return
             sys.exit(_show(console, program, server))
     except OSError as error:
         console.print(f"The network cannot be used: {error}", style="red")
         sys.exit(status.NETWORK)
 
 
-def _show(console: Console, program: Path, server: Server) -> int:
-    """Runs the program and prints everything; returns the exit status."""
+def _serve_page(program: Path, server: Server) -> None:
+    """Runs the program under a page until Ctrl-C, paused before its first scan."""
+    plc, network = _plc(program, server)
+    try:
+        text = program_text([program], ())
+        seen = SeenPlc(plc, source_texts(plc.image, {str(program): program}), text)
+        origin = BuiltOrigin(Built({"demo": seen}, [Running(plc, scans=ENDLESS)]))
+        serve_page(origin, Control(is_paused=True), PageOptions())
+    finally:
+        network.close()
+
+
+def _plc(program: Path, server: Server) -> tuple[Plc, TcpNetwork]:
     image = compile_files([program], runnable=True, lint=False).image
     assert image is not None, "the demo's own program compiles"
     plc = Plc(image, CYCLE_NS)
     network = TcpNetwork({SERVER: ("127.0.0.1", server.port)})
+    plc.attach(Etn21(0, ETN21_ADDRESS), network)
+    return plc, network
+
+
+def _show(console: Console, program: Path, server: Server) -> int:
+    """Runs the program and prints everything; returns the exit status."""
+    plc, network = _plc(program, server)
     try:
-        plc.attach(Etn21(0, ETN21_ADDRESS), network)
         recorder = Recorder(plc, SIGNALS)
         with StepDisplay(console, plc) as steps:
             plc.watchers.append(steps.watch)

@@ -15,6 +15,8 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.debug.door import DebugPort, run_with_port
 from fbvm.cli.shared.debug.worlds import plant_sources
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
+from fbvm.cli.shared.live.origins import project_origin
+from fbvm.cli.shared.live.page import PageOptions, serve_page
 from fbvm.cli.shared.project_arguments import check_project_options, read_given_project
 from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run
 from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, scans_in, value_text
@@ -23,6 +25,7 @@ from fbvm.cli.shared.terminal import say, say_json
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.net.tcp import TcpNetwork
 from fbvm.run import run_all
+from fbvm.run.interactive import Control
 from fbvm.run.plant import Kind, Plant
 from fbvm.run.project import Project
 from fbvm.run.running import Running
@@ -32,7 +35,7 @@ from fbvm.watch.values import Value
 
 OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json",
            "trace": "--trace", "journal": "--journal", "verify": "--verify", "depth": "--depth",
-           "debug_port": "--debug"}  # fmt: skip
+           "debug_port": "--debug", "live": "--live"}  # fmt: skip
 """The options that may be given with a project; all others are in its file."""
 HOW_TO_MAP = 'write [[door]] with address = "{endpoint}" and bind = "127.0.0.1:{port}"'
 
@@ -44,6 +47,9 @@ def run_project(file: Path, context: click.Context) -> int:
     net = context.params["net"] if "net" in given else None
     for_ns, scans = context.params["for_ns"], context.params["scans"]
     as_json, debug_port = context.params["as_json"], context.params["debug_port"]
+    if context.params["live"]:
+        _run_live(file, net, context.params)
+        return status.GOOD
     project = read_given_project(file)
     if not isinstance(project, Project):
         return _refuse(project, as_json)
@@ -89,6 +95,14 @@ def _execute(plant: Plant, debug_port: int | None, tick: Callable[[], None]) -> 
         run_all(plant.runs, tick)
     else:
         run_with_port(plant.named_runs, DebugPort(debug_port, plant_sources(plant)), tick)
+
+
+def _run_live(file: Path, net: str | None, options: Mapping[str, Any]) -> None:
+    """Runs a project under a page, which stays there until Ctrl-C."""
+    if options["as_json"] or options["scan_time"] or options["debug_port"] is not None:
+        raise click.UsageError("--live shows it on the page: leave out --json, --scan-time and --debug")
+    origin = project_origin(file, net, lambda run: run, options["for_ns"], options["scans"])
+    serve_page(origin, Control(), PageOptions(), {name: options[name] for name in ("journal", "trace", "verify")})
 
 
 def _record(plant: Plant, recorded: RunRecording, options: Mapping[str, Any]) -> None:

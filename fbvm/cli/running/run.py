@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from fbvm.cli.running.project import run_project
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.shared.debug.door import DebugPort, debug_option, run_with_port
 from fbvm.cli.shared.debug.worlds import DebugSources
-from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.files import growing_file, writing
-from fbvm.cli.shared.networks import build_network, mailbox_names
+from fbvm.cli.shared.live.origins import FileOrigin
+from fbvm.cli.shared.live.page import PageOptions, check_installed, live_option, serve_page
+from fbvm.cli.shared.networks import build_network, mailbox_names, net_of, try_doors
 from fbvm.cli.shared.options import (
-    CYCLE_NS,
     Door,
     Mapping,
     Setting,
     address,
     bind_option,
     charted_names,
-    door,
-    mapping,
+    cycle_option,
+    door_option,
+    map_option,
+    net_option,
     setting,
     show_option,
     time_ns,
@@ -52,20 +53,20 @@ from fbvm.record.export.pcapng import Capture
 from fbvm.record.trace.recorder import Recorder
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.run import loop
+from fbvm.run.interactive import Control
+from fbvm.run.plant import ENDLESS
 from fbvm.run.running import EVENT, PACES, Running, TimedWrite
 from fbvm.watch.places import parse_for
 
 NEVER_WITH_DEBUG = {"journal": "--journal", "trace": "--trace", "html": "--html", "rungs": "--ladder", "charts": "--sfc",
                     "charted": "--chart", "lines": "--break", "watched": "--watch", "conditions": "--break-if"}  # fmt: skip
 """Options that look into scans themselves, by the names of their parameters."""
-HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 
 
 @click.command("run")
 @source_options
 @click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
-@click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
-              help="Cycle of programs without a TASK, and how often the PLC scans.")
+@cycle_option
 @click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")
 @click.option("--for", "for_ns", type=time_ns, metavar="TIME", help="End after this time.")
 @click.option("--until", metavar="EXPRESSION", help="End when this holds after a scan: 'Main.done AND D200 > 5'.")
@@ -79,12 +80,9 @@ HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
 @click.option("--ladder", "rungs", metavar="SCANS", help="Draw the rungs with their power in these scans: 3 or 3,5..7.")
 @click.option("--sfc", "charts", metavar="SCANS",
               help="Draw the charts with their active steps and tested transitions in these scans.")
-@click.option("--net", type=click.Choice(["loop", "tcp"]), default="loop", show_default=True,
-              help="loop: in memory, virtual time.  tcp: real connections, real time.")
-@click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
-              help="Where an endpoint that the program names really is.")
-@click.option("--door", "doors", type=door, multiple=True, metavar="[IP:PORT=][HOST:]PORT",
-              help="Where others reach the program: its first port, or the one that is named.  Implies --net tcp.")
+@net_option
+@map_option
+@door_option
 @bind_option
 @allow_outside_option
 @click.option("--pace", type=click.Choice(PACES), default=PACES[0], show_default=True,
@@ -99,6 +97,7 @@ HOW_TO_MAP = "say where by --map {endpoint}=127.0.0.1:{port} or --door {port}"
               help="auto: Python first, machine code when that pays.")
 @click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
 @debug_option
+@live_option
 @click.option("--scan-time", is_flag=True,
               help="Say how long scans took and how late they began; a run over tcp on a terminal does so by itself.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -114,10 +113,11 @@ def command(
     End by one of --scans, --for and --until, or with --door by Ctrl-C; before that, --break, --watch and --break-if end it
     inside a scan.  Status 1 if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could
     not be used."""
+    if options["live"]:
+        check_installed()
     if project := project_argument(files):
         sys.exit(run_project(project, click.get_current_context()))
-    if options["doors"] and click.get_current_context().get_parameter_source("net") is ParameterSource.DEFAULT:
-        options["net"] = "tcp"
+    options["net"] = net_of(options["net"], options["doors"])
     _check_usage(**options)
     _check_endpoints(**options)
     drawn = bool(options["rungs"])
@@ -126,6 +126,9 @@ def command(
     banks = e_banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
                       *options["conditions"], *options["lines"]])
     image = image.with_e_banks(banks)
+    if options["live"]:
+        _run_live(image, cycle_ns, banks, files=files, program=program, libraries=libraries, **options)
+        return
     with ExitStack() as stack:
         network = build_network(options["net"], options["mappings"], options["seed"], options["bind"], options["doors"])
         stack.callback(network.close)
@@ -137,7 +140,7 @@ def command(
             network.tap = capture.tap
         for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
-        _try_doors(plc, network, options["mappings"], options["doors"])
+        try_doors(plc, network, options["mappings"], options["doors"])
         html = options["html"]
         with record_run(options, said, html is not None) as recorded, \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
@@ -155,6 +158,31 @@ def command(
             for line in halt_lines(plc, plc.halted, statement_lines(image, files, libraries)):
                 say(line, fg="yellow", err=True)
     sys.exit(result.status)
+
+
+def _run_live(image: Image, cycle_ns: int, banks: Sequence[str], *, files: tuple[Path, ...], program: str | None,
+              libraries: tuple[Path, ...], **options: Any) -> None:  # fmt: skip
+    """Runs under a page, up to the bounds that are given; the page stays there until Ctrl-C."""
+
+    def wire(image: Image) -> tuple[Plc, Callable[[], None]]:
+        network = build_network(options["net"], options["mappings"], options["seed"], options["bind"], options["doors"])
+        plc = _plc(image.with_e_banks(banks), cycle_ns, options["engine"])
+        plc.watch_cycle.time_ns = options["watch_ns"]
+        for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
+            plc.attach(unit, network)
+        try_doors(plc, network, options["mappings"], options["doors"])
+        return plc, network.close
+
+    def bound(plc: Plc) -> Running:
+        ends = {name: options[name] for name in ("scans", "for_ns", "until", "max_ns") if options[name] is not None}
+        try:
+            set_breakpoints(plc, options["lines"], options["watched"], options["conditions"])
+            return Running(plc, **(ends or {"scans": ENDLESS}), writes=[_write(plc, given) for given in options["settings"]])
+        except (LookupError, TypeError, ValueError) as error:
+            raise click.UsageError(str(error)) from None
+
+    origin = FileOrigin(files, libraries, image, wire, bound, {"program": program, **compile_options(files)})
+    serve_page(origin, Control(), PageOptions(), {name: options[name] for name in ("journal", "trace", "verify")})
 
 
 def _plc(image: Image, cycle_ns: int, engine: str) -> Plc:
@@ -223,21 +251,6 @@ def _write(plc: Plc, given: Setting) -> TimedWrite:
     return TimedWrite(found, parse_for(found, given.value), given.at_ns)
 
 
-def _try_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...], doors: tuple[Door, ...]) -> None:
-    """Tries the endpoints of units that --map and --door name, and says where each is.  Ends with status 5 if one cannot be
-    used."""
-    if isinstance(network, LoopNetwork):
-        return
-    own = {attached.unit.address for attached in plc.units}
-    named = [row.endpoint for row in mappings if row.endpoint.host in own and row.endpoint.port]
-    try:
-        found = network.try_doors([*named, *(door.endpoint for door in doors if door.endpoint)])
-    except OSError as error:
-        unusable(error)
-    say_doors(found)
-    network.notices.tell = notice_teller(HOW_TO_MAP, found)
-
-
 def _warn_unused_mappings(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
     """Warns of rows of --map that the run has not used, which often have a wrong address."""
     if isinstance(network, LoopNetwork):
@@ -253,14 +266,21 @@ def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, pl
     return Capture(file, 0 if network.virtual_time else loop.epoch_ns(), lambda address: f"scan {plc.scans}")
 
 
+NEVER_LIVE = {"html": "--html", "rungs": "--ladder", "charts": "--sfc", "charted": "--chart", "shown": "--show", "pcap": "--pcap",
+              "debug_port": "--debug", "scan_time": "--scan-time"}  # fmt: skip
+"""Options whose results the page shows itself, by the names of their parameters."""
+
+
 def _check_usage(
-    *, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
+    *, live: bool, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
     max_ns: int | None, debug_port: int | None, **others: Any,
 ) -> None:  # fmt: skip
+    if live and (both := [said for name, said in NEVER_LIVE.items() if {"debug_port": debug_port, **others}.get(name)]):
+        raise click.UsageError(f"--live shows it on the page: leave out {', '.join(both)}")
     if debug_port is not None and (both := [said for name, said in NEVER_WITH_DEBUG.items() if others.get(name)]):
         raise click.UsageError(f"--debug looks into scans itself: leave out {', '.join(both)}")
     ends = sum(bound is not None for bound in (scans, for_ns, until))
-    if ends > 1 or not (ends or doors or debug_port is not None):
+    if ends > 1 or not (ends or doors or live or debug_port is not None):
         raise click.UsageError(f"say when to end by one of --scans, --for and --until; {ends or 'none'} given")
     if max_ns is not None and until is None:
         raise click.UsageError("--max bounds --until, which is not given")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from io import TextIOWrapper
 from pathlib import Path
@@ -23,6 +23,8 @@ from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
 from fbvm.cli.shared.files import OutputError, growing_file, writing
 from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, say_fins, try_fins
+from fbvm.cli.shared.live.origins import Built, BuiltOrigin, SeenPlc
+from fbvm.cli.shared.live.page import PageOptions, check_installed, live_option, serve_page
 from fbvm.cli.shared.networks import mailbox_names
 from fbvm.cli.shared.options import address, bind_option, time_ns, watch_cycle_option
 from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, recording_file_options
@@ -38,7 +40,9 @@ from fbvm.record.trace.requests import RequestLog
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
-from fbvm.run.running import EVENT
+from fbvm.run.interactive import Control
+from fbvm.run.plant import ENDLESS
+from fbvm.run.running import EVENT, Running
 from fbvm.step.world import Debugged
 from fbvm.wire.link import Peer
 
@@ -75,12 +79,14 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.  Words that it does not "
                    "have begin with 0; words of units are not set.")
+@live_option
 @click.option("--log", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), metavar="FILE",
               help="Write who asked what, a JSON object a line; - is the terminal.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], bind: str, port: int, image: Path | None,
     log: Path | None, watch_ns: int, backlog: bool, fins: bool, fins_bind: str, fins_port: int, fins_node: int | None,
-    fins_control: bool, debug_port: int | None, trace: Path | None, journal: Path | None, verify: bool, **settings: int | None,
+    fins_control: bool, debug_port: int | None, live: bool, trace: Path | None, journal: Path | None, verify: bool,
+    **settings: int | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
     reach the first port at which it waits.  With --fins, SCADA software and libraries that speak FINS reach it, too.
@@ -88,6 +94,10 @@ def command(
     With --trace all that clients do is recorded; `fbvm chart`, `table`, `why` and `step` look at it, also meanwhile.
 
     Status 5 if the port cannot be used, 4 if a trap stopped the program, 2 if the memory could not be saved, else 0."""
+    if live:
+        check_installed()
+        if debug_port is not None:
+            raise click.UsageError("--live and --debug both look into scans: give one of them")
     signals = Signals()
     read_only = bool(settings["read_only"])
     door = fins_door(fins_bind, fins_port, fins_node, fins_control, read_only) if fins else None
@@ -105,10 +115,18 @@ def command(
             plc.attach(unit, network)
         if door:
             try_fins(network, door)
-        recorded = _recording(stack, plc, files, libraries, program, {"trace": trace, "journal": journal, "verify": verify})
-        reason = _start(plc, network, signals, door)
-        debugging = _debug_port(stack, plc, debug_port, files, libraries) if debug_port is not None else None
-        reason, saved = _serve(plc, reason, signals, debugging, image, recorded.tick)
+        recordings: dict[str, Any] = {"trace": trace, "journal": journal, "verify": verify}
+        if live:
+            reason = _start(plc, network, signals, door)
+            if reason != "trap":
+                _serve_page(plc, files, libraries, signals, image, recordings)
+                reason = "trap" if plc.trap else reason
+            saved = _save(plc, image)
+        else:
+            recorded = _recording(stack, plc, files, libraries, program, recordings)
+            reason = _start(plc, network, signals, door)
+            debugging = _debug_port(stack, plc, debug_port, files, libraries) if debug_port is not None else None
+            reason, saved = _serve(plc, reason, signals, debugging, image, recorded.tick)
     if plc.trap:
         say(str(plc.trap), err=True)
     sys.exit(status.STOPPED if reason == "trap" else status.GOOD if saved else status.USAGE)
@@ -237,6 +255,25 @@ def _start(plc: Plc, network: TcpNetwork, signals: Signals, fins: FinsDoor | Non
         say(f"{LISTENING}{doors[0].real}")
         sys.stdout.flush()
     return reason
+
+
+def _serve_page(plc: Plc, files: Sequence[Path], libraries: Sequence[Path], signals: Signals, image: Path | None,
+                recording: dict[str, Any]) -> None:  # fmt: skip
+    """Runs under a page until Ctrl-C or SIGTERM."""
+    control = Control()
+
+    def tick() -> None:
+        if signals.save:
+            signals.save = False
+            _save(plc, image)
+        if signals.end:
+            control.end()
+
+    sources = files or [SHIPPED]
+    texts = source_texts(plc.image, {str(file): file for file in sources} | {file.name: file for file in sources}, libraries)
+    seen = SeenPlc(plc, texts, program_text(sources, libraries, **compile_options(sources)))
+    built = Built({sources[0].stem: seen}, [Running(plc, scans=ENDLESS)])
+    serve_page(BuiltOrigin(built), control, PageOptions(), recording, tick)
 
 
 # --- signals and images -----------------------------------------------------------------------------------------------

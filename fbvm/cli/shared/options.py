@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from ipaddress import IPv4Address
 
-from click import BadParameter, Context, Parameter, option
+from click import BadParameter, Choice, Context, Parameter, option
 
 from fbvm.base.digits import whole_number
 from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
@@ -124,6 +124,16 @@ def door(value: str) -> Door:
 
 bind_option = option("--bind", default="127.0.0.1", show_default=True, metavar="ADDRESS",
                      help="Address of this computer to listen on; 0.0.0.0 is all.")
+
+
+cycle_option = option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
+                      help="Cycle of programs without a TASK, and how often the PLC scans.")
+net_option = option("--net", type=Choice(["loop", "tcp"]), default="loop", show_default=True,
+                    help="loop: in memory, virtual time.  tcp: real connections, real time.")
+map_option = option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
+                    help="Where an endpoint that the program names really is.")
+door_option = option("--door", "doors", type=door, multiple=True, metavar="[IP:PORT=][HOST:]PORT",
+                     help="Where others reach the program: its first port, or the one that is named.  Implies --net tcp.")
 
 
 def _endpoint(text: str) -> tuple[str, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 from fbvm.base.areas import FLAG_AREAS, SLOTS_OFFSET, Address
 from fbvm.base.memory import WHOLE_BYTES
@@ -223,8 +224,9 @@ def _retained_in(kind: Type, offset: int, path: str, retaining: Containment, who
     if whole and not holds_block(kind):
         yield Retained(path, offset, kind.size)
     elif isinstance(kind, ArrayType) and isinstance(kind.element, StructType | ArrayType):
-        for index in range(kind.count):
-            yield from _retained_in(kind.element, offset + index * kind.element.size, f"{path}[{index}]", retaining, whole)
+        for number, subscripts in enumerate(product(*(range(low, high + 1) for low, high in kind.bounds))):
+            name = f"{path}[{', '.join(map(str, subscripts))}]"
+            yield from _retained_in(kind.element, offset + number * kind.element.size, name, retaining, whole)
     elif isinstance(kind, StructType) and not kind.block:
         for member in kind.fields.values():
             yield from _retained_in(member.type, offset + member.offset, f"{path}.{member.name}", retaining, whole)

@@ -13,12 +13,19 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
+export function inSvg(tag, attributes) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+}
+
 export function options(select, names, chosen) {
   select.replaceChildren(...names.map((name) => make("option", { value: name }, name)));
   if (names.includes(chosen)) select.value = chosen;
 }
 
-const DRAWN = new Set(["svg", "path", "text", "style", "rect", "line", "g"]);
+const DRAWN = new Set(["svg", "path", "text", "style", "rect", "line", "g", "defs", "symbol", "use", "title", "desc", "circle", "ellipse", "polyline",
+  "polygon", "tspan", "linearGradient", "radialGradient", "stop", "clipPath", "marker", "pattern"]);
 
 export function drawing(text, label) {
   const found = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
@@ -52,4 +59,15 @@ export function remembered(key, otherwise) {
   } catch {
     return otherwise;
   }
+}
+
+// The number that a literal means; TRUE is 1, a time is in seconds; null for what is none.
+export function number(text) {
+  if (text === "TRUE" || text === "FALSE") return text === "TRUE" ? 1 : 0;
+  const found = /^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(text ?? "") ? Number(text) : null;
+  if (found !== null) return found;
+  const time = /^T#(-?)(?:(\d+)d)?(?:(\d+)h)?(?:(\d+)m(?!s))?(?:([\d.]+)s)?(?:([\d.]+)ms)?/.exec(text ?? "");
+  if (!time) return null;
+  const [, sign, d = 0, h = 0, m = 0, s = 0, ms = 0] = time;
+  return (sign ? -1 : 1) * (((Number(d) * 24 + Number(h)) * 60 + Number(m)) * 60 + Number(s) + Number(ms) / 1000);
 }

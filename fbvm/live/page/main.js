@@ -1,30 +1,39 @@
 // The page of a running PLC: what it looks at, and what an update brings.
 
+import { ChangeBar } from "/change.js";
 import { at, make, options, remember, remembered } from "/dom.js";
+import { LessonPanel } from "/lesson.js";
 import { MemoryPanel } from "/memory.js";
 import { NetworkPanel } from "/network.js";
+import { PicturePanel } from "/picture.js";
 import { ProgramPanel } from "/program.js";
 import { ScanTools } from "/scan.js";
 import { Connection } from "/socket.js";
+import { TimesPanel } from "/times.js";
 import { TrendPanel } from "/trend.js";
 import { UnitsPanel } from "/units.js";
 import { WatchPanel } from "/watch.js";
 
-const PANELS = { program: "Program", watch: "Watch", trend: "Trend", units: "Units", network: "Network", memory: "Memory",
-  acts: "What was done" };
+const PANELS = { lesson: "Lesson", program: "Program", watch: "Watch", trend: "Trend", units: "Units", network: "Network", memory: "Memory",
+  picture: "Picture",
+  times: "Scan times", acts: "What was done" };
 const isWide = () => matchMedia("(min-width: 70rem)").matches;
 
 class Page {
   constructor() {
-    this.shown = new Set(remembered("shown", isWide() ? ["program", "watch", "trend", "acts"] : ["program"]));
+    const shown = remembered("shown", null);
+    this.shown = new Set(shown ?? (isWide() ? ["program", "watch", "trend", "acts"] : ["program"]));
+    this.isNew = shown === null;
     this.plc = remembered("plc", "");
     this.about = null;
     this.state = {};
     this.panels = { program: new ProgramPanel(this), watch: new WatchPanel(this), trend: new TrendPanel(this),
-      units: new UnitsPanel(this), network: new NetworkPanel(this), memory: new MemoryPanel(this) };
+      units: new UnitsPanel(this), network: new NetworkPanel(this), memory: new MemoryPanel(this), picture: new PicturePanel(this),
+      times: new TimesPanel(), lesson: new LessonPanel(this) };
     this.scan = new ScanTools(this);
-    at("tabs").append(...Object.entries(PANELS).map(([id, name], number) =>
-      make("button", { "data-panel": id, title: `${name} (${number + 1})`, on: { click: () => this.toggle(id) } }, name)));
+    this.change = new ChangeBar(this);
+    at("tabs").append(...Object.entries(PANELS).map(([id, name]) =>
+      make("button", { "data-panel": id, on: { click: () => this.toggle(id) } }, name)));
     at("plc").addEventListener("change", () => this.choose(at("plc").value));
     addEventListener("keydown", (event) => this.key(event));
     this.show();
@@ -44,7 +53,13 @@ class Page {
     options(at("plc"), names, this.plc);
     document.title = `fbvm live: ${names.join(", ")}`;
     at("log").replaceChildren();
+    document.querySelector("[data-panel=picture]").hidden = !this.about.pictures;
+    document.querySelector("[data-panel=lesson]").hidden = !this.about.lesson;
+    if (this.about.lesson && this.isNew) this.open("lesson");
+    if (this.about.pictures && this.isNew) this.open("picture");
+    this.isNew = false;
     this.scan.begin();
+    this.change.begin();
     await this.choose(this.plc);
   }
 
@@ -59,7 +74,8 @@ class Page {
   // Tells fbvm what the page sees: nothing else is sent.
   async look() {
     if (!this.about) return;
-    const seen = { plc: this.plc, names: [...this.names()], units: this.shown.has("units"), network: this.shown.has("network") };
+    const seen = { plc: this.plc, names: [...this.names()], units: this.shown.has("units"), network: this.shown.has("network"),
+      pictures: this.shown.has("picture"), times: this.shown.has("times") };
     if (this.shown.has("program")) Object.assign(seen, { scan: true, instance: this.panels.program.instance });
     if (this.shown.has("memory")) Object.assign(seen, this.panels.memory.seen());
     const found = await this.ask("look", seen);
@@ -98,10 +114,19 @@ class Page {
   }
 
   update(update) {
+    if (update.restarted) {
+      this.begin();
+      return;
+    }
+    this.change.update(update);
     Object.assign(this.state, update);
     this.scan.update(update, this.state);
     for (const panel of Object.values(this.panels)) panel.update(update, this.state);
     for (const [plc, scan, text] of update.acts ?? []) at("log").prepend(make("li", {}, `${plc}, before scan ${scan}: ${text}`));
+  }
+
+  open(id) {
+    if (!this.shown.has(id)) this.toggle(id);
   }
 
   toggle(id) {
@@ -125,7 +150,8 @@ class Page {
       return;
     }
     const number = Number(event.key);
-    if (number >= 1 && number <= 7) this.toggle(Object.keys(PANELS)[number - 1]);
+    const tabs = [...document.querySelectorAll("#tabs button:not([hidden])")];
+    if (number >= 1 && number <= tabs.length) this.toggle(tabs[number - 1].dataset.panel);
     else if (event.key === "/") {
       if (!this.shown.has("watch")) this.toggle("watch");
       at("find").focus();

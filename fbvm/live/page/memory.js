@@ -28,6 +28,12 @@ export class MemoryPanel {
     this.draw();
   }
 
+  // Which statement gave the word its value: the answer stands in Watch.
+  why(word) {
+    this.page.open("watch");
+    this.page.panels.watch.why(`${at("area").value}${word}`);
+  }
+
   draw() {
     const form = at("form").value;
     const shown = (word) => form === "t" ? [word >> 8, word & 255].map((one) => one > 31 && one < 127 ? String.fromCharCode(one) : ".").join("")
@@ -38,7 +44,7 @@ export class MemoryPanel {
       rows.push(make("tr", {}, make("th", { scope: "row" }, `${at("area").value}${this.from + row}`),
         ...this.words.slice(row, row + wide).map((word, number) => make("td", {
           class: [word ? "" : "zero", this.before?.length && this.before[row + number] !== word ? "moved" : ""].join(" ").trim(),
-          title: `${at("area").value}${this.from + row + number}` }, shown(word)))));
+          title: `${at("area").value}${this.from + row + number}: who wrote it?` }, make("button", { on: { click: () => this.why(this.from + row + number) } }, shown(word))))));
     }
     at("words").tBodies[0].replaceChildren(...rows);
   }

@@ -1,6 +1,6 @@
 // The network panel: frames with their scans, and faults that are switched on and off.
 
-import { at, make, options } from "/dom.js";
+import { at, make, options, save } from "/dom.js";
 
 const MOST_FRAMES = 500;
 
@@ -9,6 +9,10 @@ export class NetworkPanel {
     this.page = page;
     this.frames = [];
     at("only").addEventListener("input", () => this.draw());
+    at("pcapng").addEventListener("click", async () => {
+      const made = await page.ask("capture", { plc: page.plc });
+      if (made) save(`${page.plc}.pcapng`, Uint8Array.from(atob(made.pcapng), (one) => one.charCodeAt(0)), "application/octet-stream");
+    });
     at("break").addEventListener("click", () => page.ask("fault", { kind: at("kind").value, ...(at("peer").value.trim() ? { peer: at("peer").value.trim() } : {}) }));
   }
 

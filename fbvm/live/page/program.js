@@ -9,13 +9,50 @@ export class ProgramPanel {
     this.lines = [];
     this.chips = new Map();
     this.rows = new Map();
+    at("breaking").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.stop("");
+    });
     at("instance").addEventListener("change", async () => {
       await this.choose(at("instance").value);
       await page.look();
     });
   }
 
+  stop(where) {
+    const kind = where ? "line" : at("breakKind").value;
+    const when = where ? "" : at("breakWhen").value.trim();
+    return this.page.ask("break", { plc: this.page.plc, kind, where: where || at("breakWhere").value.trim(), ...(when ? { when } : {}) });
+  }
+
+  // Breakpoints as a list and beside the lines, and where the scan stands.
+  breakpoints(state) {
+    const { page } = this;
+    at("breaks").replaceChildren(...(state.breaks ?? []).map((text, number) => make("li", {}, `● ${text} `,
+      make("button", { "aria-label": `Remove the breakpoint ${text}`, on: { click: () => page.ask("unbreak", { plc: page.plc, number }) } }, "remove"))));
+    const { halt } = state;
+    at("halt").hidden = !halt;
+    if (halt) {
+      at("halt").textContent = halt.line ? `Scan ${halt.scan} stands before ${halt.file.split(/[\\/]/).pop()}:${halt.line} in ${halt.instance || halt.pou}${halt.why ? `: ${halt.why}` : ""}`
+        : `Scan ${halt.scan} stands at the end of ${halt.pou}${halt.why ? `: ${halt.why}` : ""}`;
+      const known = [...at("instance").options].find((option) => option.value.toUpperCase() === halt.instance.toUpperCase());
+      if (known && known.value !== this.instance) {
+        at("instance").value = known.value;
+        this.choose(known.value).then(() => { this.breakpoints(state); page.look(); });
+        return;
+      }
+    }
+    for (const [number, row] of this.rows) {
+      const isHere = Boolean(halt) && halt.line === number && halt.file === this.path;
+      if (isHere && !row.classList.contains("halted")) row.scrollIntoView({ block: "nearest" });
+      row.classList.toggle("halted", isHere);
+      row.classList.toggle("breakpoint", (state.breaks ?? []).some((text) => text.startsWith("line ") && text.split(" ")[1].endsWith(`${this.file}:${number}`)));
+    }
+  }
+
   async begin(plc) {
+    const { about } = this.page;
+    at("breaking").hidden = about.read_only || about.writable !== null;
     const paths = plc.instances.map((instance) => instance.path);
     const wanted = remembered(`instance.${plc.name}`, paths[0] ?? "");
     options(at("instance"), paths, wanted);
@@ -28,6 +65,8 @@ export class ProgramPanel {
     at("rungs").replaceChildren();
     const found = instance ? await this.page.ask("source", { plc: this.page.plc, instance }) : null;
     this.lines = found?.lines ?? [];
+    this.path = found?.file ?? "";
+    this.file = (found?.file ?? "").split(/[\\/]/).pop();
     this.chips.clear();
     this.rows.clear();
     const body = at("source").tBodies[0];
@@ -46,9 +85,19 @@ export class ProgramPanel {
       this.chips.set(name, [...known, [chip, value]]);
       return chip;
     });
-    const row = make("tr", {}, make("td", { class: "line" }, String(number)), make("td", {}, line.text), make("td", { class: "values" }, ...chips));
+    const row = make("tr", {}, make("td", { class: "line", title: "A breakpoint", on: { click: () => this.stop(`${this.path}:${number}`) } }, String(number)), make("td", {}, line.text), make("td", { class: "values" }, ...chips));
     this.rows.set(number, row);
     return row;
+  }
+
+  // Marks the lines of the running program that are wrong in the changed one, where they are the same.
+  mark(mistakes) {
+    for (const one of document.querySelectorAll("#source .mistake")) one.remove();
+    for (const one of mistakes) {
+      const same = [...this.rows].filter(([, row]) => row.children[1].textContent.trim() === one.text.trim());
+      const row = (this.rows.get(one.line)?.children[1].textContent.trim() === one.text.trim() ? this.rows.get(one.line) : same[0]?.[1]) ?? this.rows.get(one.line);
+      if (one.file === this.file) row?.children[2].append(make("div", { class: "mistake" }, `✗ ${one.text.trim()}: ${one.message}`));
+    }
   }
 
   names() {
@@ -62,6 +111,7 @@ export class ProgramPanel {
     if (update.forces) {
       for (const [name, pairs] of this.chips) for (const [chip] of pairs) chip.classList.toggle("forced", name in state.forces);
     }
+    if (update.breaks || update.halt !== undefined) this.breakpoints(state);
     if (!update.inside) return;
     const executed = new Set(update.inside.executed);
     for (const [number, row] of this.rows) row.classList.toggle("executed", executed.has(number));

@@ -2,7 +2,7 @@
 
 import { at, options, save } from "/dom.js";
 
-const NAMES = { run: "running", pause: "paused", past: "in the past", trap: "stopped by a trap" };
+const NAMES = { run: "running", pause: "paused", past: "in the past", trap: "stopped by a trap", halt: "inside a scan", ended: "at its end" };
 
 export class ScanTools {
   constructor(page) {
@@ -11,6 +11,7 @@ export class ScanTools {
     on("run", () => page.ask("run"));
     on("pause", () => page.ask("pause"));
     on("step", () => page.ask("step", { scans: 1 }));
+    on("statement", () => page.ask("statement", { plc: page.plc }));
     on("ten", () => page.ask("step", { scans: 10 }));
     on("warm", () => page.ask("start", { plc: page.plc, kind: "warm" }));
     on("cold", () => page.ask("start", { plc: page.plc, kind: "cold" }));
@@ -18,6 +19,12 @@ export class ScanTools {
     on("back", () => this.travel(-1));
     on("forth", () => this.travel(1));
     on("now", () => page.ask("view", { plc: page.plc }));
+    on("branch", () => page.ask("branch", { plc: page.plc }));
+    at("future").addEventListener("change", () => {
+      const future = Number(at("future").value);
+      if (future < 0) page.ask("view", { plc: page.plc });
+      else page.ask("view", { plc: page.plc, scan: 0, future }).then((found) => found ?? at("future").replaceChildren());
+    });
     on("test", () => this.test());
     at("speed").addEventListener("change", () => page.ask("speed", { factor: Number(at("speed").value) }));
     at("mode").addEventListener("change", () => page.ask("mode", { plc: page.plc, mode: at("mode").value }));
@@ -30,7 +37,11 @@ export class ScanTools {
     options(at("mode"), about.modes);
     at("pace").hidden = about.real;
     for (const id of ["run", "pause", "step", "ten", "speed"]) at(id).disabled = about.read_only;
-    for (const id of ["mode", "warm", "cold"]) at(id).disabled = fixed;
+    for (const id of ["mode", "warm", "cold", "statement"]) at(id).disabled = fixed;
+    at("statement").hidden = about.real;
+    at("branch").hidden = !about.branches || fixed;
+    at("others").hidden = !about.futures.length;
+    at("future").replaceChildren(new Option("this one", "-1"), ...about.futures.map((name, number) => new Option(name, String(number))));
     at("test").hidden = !about.tests;
   }
 
@@ -54,11 +65,13 @@ export class ScanTools {
       at("slider").setAttribute("aria-valuetext", `scan ${state.scan} of ${first} to ${last}`);
       at("now").disabled = state.state !== "past";
     }
-    if (update.state) at("now").disabled = update.state !== "past";
+    if (update.state) at("now").disabled = at("branch").disabled = update.state !== "past";
+    if (update.state && update.state !== "past") at("future").value = "-1";
   }
 
   view(scan) {
-    return this.page.ask("view", { plc: this.page.plc, scan });
+    const future = Number(at("future").value);
+    return this.page.ask("view", { plc: this.page.plc, scan, ...(future >= 0 ? { future } : {}) });
   }
 
   async travel(scans) {
@@ -77,7 +90,7 @@ export class ScanTools {
   key(event) {
     const many = event.shiftKey ? 10 : 1;
     const calls = {
-      r: () => at("run").click(), p: () => at("pause").click(), s: () => at("step").click(), S: () => at("ten").click(),
+      r: () => at("run").click(), p: () => at("pause").click(), s: () => at("step").click(), n: () => at("statement").click(), S: () => at("ten").click(),
       ArrowLeft: () => this.travel(-many), ArrowRight: () => this.travel(many), End: () => at("now").click(),
       "?": () => at("keys").showModal(),
     };

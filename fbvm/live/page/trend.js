@@ -1,6 +1,6 @@
 // The trend panel: what is watched over time, sampled as the page sees it, or every one of the last recorded scans.
 
-import { at, make, save } from "/dom.js";
+import { at, make, number, save } from "/dom.js";
 
 const MOST_SAMPLES = 600;
 const WIDTH = 600;
@@ -78,14 +78,4 @@ export class TrendPanel {
     const rows = this.samples.map((sample) => [sample.scan, sample.ns, ...names.map((name) => sample.values.get(name) ?? "")]);
     save("trend.csv", [["scan", "ns", ...names], ...rows].map((row) => row.map(cell).join(",")).join("\r\n"), "text/csv");
   }
-}
-
-function number(text) {
-  if (text === "TRUE" || text === "FALSE") return text === "TRUE" ? 1 : 0;
-  const found = /^-?\d+(\.\d+)?(e[-+]?\d+)?$/i.test(text ?? "") ? Number(text) : null;
-  if (found !== null) return found;
-  const time = /^T#(-?)(?:(\d+)d)?(?:(\d+)h)?(?:(\d+)m(?!s))?(?:([\d.]+)s)?(?:([\d.]+)ms)?/.exec(text ?? "");
-  if (!time) return null;
-  const [, sign, d = 0, h = 0, m = 0, s = 0, ms = 0] = time;
-  return (sign ? -1 : 1) * (((Number(d) * 24 + Number(h)) * 60 + Number(m)) * 60 + Number(s) + Number(ms) / 1000);
 }

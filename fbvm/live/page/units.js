@@ -29,7 +29,11 @@ export class UnitsPanel {
       const cable = make("button", { disabled: Boolean(this.page.about?.read_only || this.page.about?.writable), "aria-pressed": String(!unit.plugged),
         on: { click: () => this.page.ask("cable", { plc: this.page.plc, unit: unit.name, plugged: !unit.plugged }) } },
       unit.plugged ? "pull the cable" : "plug the cable");
+      const bit = unit.words.find(([, said]) => said.endsWith("Restart Bit"));
+      const restart = bit ? [make("button", { disabled: Boolean(this.page.about?.read_only), on: { click: () => this.page.ask("write", { plc: this.page.plc, name: bit[0], value: "TRUE" }) } },
+        `restart the unit (${bit[0]})`)] : [];
       return make("div", {}, make("h3", {}, `${unit.name}, ${unit.address}, ${unit.plugged ? "cable plugged" : "cable pulled"} `, cable),
+        ...restart,
         make("table", { "aria-label": `Words of ${unit.name}` }, make("tbody", {}, ...words.map(([address, said, text, meaning]) =>
           make("tr", { class: this.before.has(address) && this.before.get(address) !== text ? "moved" : "" },
             make("td", { class: "mono" }, address),

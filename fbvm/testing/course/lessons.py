@@ -6,11 +6,14 @@ A lesson is a folder of `examples/lessons/`: `lesson.md` is its text, `given.st`
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import entry_points
@@ -18,6 +21,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from fbvm.base.data import data_folder
+from fbvm.base.files import write_file
 from fbvm.testing.lesson import FILE as ANSWERS
 from fbvm.testing.pages import FOLDER
 
@@ -29,6 +33,7 @@ LARGEST_BYTES = 1 << 20
 """Of a learner's file; a larger one is left out."""
 QUIET = ("-q", "-rN", "--tb=short", "--import-mode=importlib", "-p", "no:cacheprovider", "--fbvm-no-warn", "all")
 PREDICTION = "test_prediction"
+_ANSWER = re.compile(r"\s*(\w+)\s*=\s*(.*)")
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,58 @@ def check(lesson: Lesson, folder: Path) -> int:
     if status == 0:
         (target / DONE).touch()
     return status
+
+
+def program_mistakes(lesson: Lesson, folder: Path) -> list[str]:
+    """What a learner's program does not do yet: the names of the tests that fail, as sentences; marks the lesson as done if none
+    does."""
+    target = folder / lesson.slug
+    with tempfile.TemporaryDirectory() as temporary:
+        listing = Path(temporary) / "results.xml"
+        status = run_pytest([*QUIET, "--rootdir", str(target), "-c", str(_ini(target)), f"--junitxml={listing}",
+                             "--fbvm-pages", "0", str(target)], quiet=True)  # fmt: skip
+        if status == 0:
+            (target / DONE).touch()
+            return []
+        cases = list(ElementTree.parse(listing).iter("testcase")) if listing.is_file() else []
+    wrong = [(case.get("name", ""), found) for case in cases
+             for found in [case.find("failure") if case.find("failure") is not None else case.find("error")] if found is not None]
+    return [_mistake(name, found.get("message") or "") for name, found in wrong] or [f"{PROGRAM} could not be checked"]
+
+
+def _mistake(name: str, said: str) -> str:
+    """A failed test in a sentence, with what it said if that is one."""
+    sentence = name.partition("[")[0].removeprefix("test_").replace("_", " ")
+    first = said.split("\n", 1)[0].removeprefix("AssertionError: ")
+    return sentence if not first or first.startswith("assert ") else f"{sentence}: {first}"
+
+
+def questions(lesson: Lesson, folder: Path) -> list[tuple[str, str, str]]:
+    """What a learner is asked to predict: name, question, and the answer so far."""
+    found, asked = [], list[str]()
+    text = (folder / lesson.slug / ANSWERS).read_text(encoding="utf-8")
+    try:
+        given = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        given = {}
+    for line in text.splitlines():
+        if line.startswith("#"):
+            asked.append(line.lstrip("# ").strip())
+        elif match := _ANSWER.fullmatch(line):
+            found.append((match[1], " ".join(asked), str(given.get(match[1], ""))))
+            asked = []
+    return found
+
+
+def answer(lesson: Lesson, folder: Path, values: Mapping[str, str]) -> None:
+    """Writes predictions into a learner's file, each as the text that it is given as."""
+    path = folder / lesson.slug / ANSWERS
+    lines = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        match = _ANSWER.fullmatch(line)
+        known = match is not None and match[1] in values
+        lines.append(f"{match[1]} = {json.dumps(values[match[1]], ensure_ascii=False)}" if match and known else line)
+    write_file(path, "\n".join(lines) + "\n")
 
 
 def is_done(lesson: Lesson, folder: Path) -> bool:

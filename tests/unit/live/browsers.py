@@ -10,6 +10,7 @@ from fbvm.live.connection import Connection
 from fbvm.live.guard import Guard
 from fbvm.live.plcs import LivePlc
 from fbvm.live.session import UPDATE_NS, Session
+from fbvm.live.stops import forget_statement
 from fbvm.live.workbench import Workbench
 from fbvm.machine.backplane import usual_units
 from fbvm.run.interactive import Control
@@ -112,6 +113,16 @@ class Page:
             self.live.before_scan()
             self.plc.scan()
             self.live.after_scan()
+
+    def run(self, turns: int) -> None:
+        """As many scans as the loop of a run would do, up to a breakpoint, at which it pauses."""
+        for _ in range(turns):
+            if self.control.is_paused:
+                return
+            self.scan()
+            if self.plc.halted:
+                forget_statement(self.live)
+                self.control.pause()
 
     def update(self) -> dict[str, Any]:
         """The next update, 100 ms later; {} if there is none."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import pytest
 from browsers import Page
 
+from fbvm.live.futures import Future, run_again
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
 from fbvm.live.session import UPDATE_NS
+from fbvm.run.running import Running
 
 
 @pytest.fixture
@@ -216,3 +219,104 @@ def test_every_act_is_in_the_recording_and_is_done_again_to_the_same_memory() ->
     assert [recorded.at(scan).read("Main.Level") for scan in (5, 6, 8, 9, 11)] == [25, 71, 73, 71, 67]
     again = recorded.at(page.plc.scans)
     assert bytes(again.memory.map[:]) == bytes(page.plc.memory.map[:])
+
+
+def test_a_restart_is_refused_while_nothing_has_changed(page: Page) -> None:
+    assert page.ask("restart")["error"] == "the program has not changed"
+
+
+def test_a_scan_stands_at_a_breakpoint_and_goes_on_by_statements(page: Page) -> None:
+    page.done("break", plc="pump", kind="condition", where="Main.Level > 22")
+    page.run(10)
+    update = page.update()
+    assert update["state"] == "halt" and update["halt"]["why"] == "Main.Level > 22 holds" and page.control.is_paused
+    assert page.plc.read("Main.Level") == 23 and page.plc.scans == 2
+    line = update["halt"]["line"]
+    page.done("statement", plc="pump")
+    page.run(1)
+    update = page.update()
+    assert update["halt"]["line"] > line or update["halt"]["line"] == 0
+    assert update["halt"]["why"] == ""
+    assert [row.kind for row in page.plc.breakpoints] == ["condition"]
+    page.done("unbreak", plc="pump", number=0)
+    page.done("run")
+    page.run(3)
+    assert page.update()["state"] == "run" and page.update().get("breaks", []) == []
+
+
+def test_a_breakpoint_at_a_line_has_a_condition_and_is_listed(page: Page) -> None:
+    page.done("break", plc="pump", kind="line", where="Main", when="Level = 25")
+    assert page.update()["breaks"] == [f"line {next(iter(page.plc.breakpoints))}"]
+    page.run(20)
+    assert page.plc.read("Main.Level") == 25 and page.update()["halt"]["instance"] == "Main"
+
+
+def test_a_breakpoint_that_cannot_be_set_is_refused_in_words(page: Page) -> None:
+    assert "no" in page.ask("break", plc="pump", kind="line", where="nowhere.st:3")["error"]
+    assert page.ask("break", plc="pump", kind="moon", where="x")["error"].startswith("a breakpoint is a line")
+    assert page.ask("unbreak", plc="pump", number=4)["error"] == "there is no breakpoint 4"
+    assert "only look" in Page(read_only=True).ask("break", plc="pump", kind="line", where="Main")["error"]
+
+
+def test_lines_and_pictures_are_seen_while_a_breakpoint_is_armed(page: Page) -> None:
+    page.done("look", plc="pump", instance="Main", scan=True)
+    page.done("break", plc="pump", kind="condition", where="Main.Level > 1000")
+    page.update()
+    page.run(3)
+    assert page.update()["inside"]["executed"]
+
+
+def test_a_write_at_a_breakpoint_is_recorded(page: Page) -> None:
+    page.done("break", plc="pump", kind="line", where="Main", when="Level = 22")
+    page.run(20)
+    page.done("write", plc="pump", name="Main.Level", value="60")
+    page.done("unbreak", plc="pump")
+    page.done("run")
+    page.run(4)
+    scans = page.live.recorded.scans
+    assert page.live.recorded.at(scans.stop).read("Main.Level") == page.plc.read("Main.Level") == 64
+
+
+def test_what_has_passed_is_saved_for_wireshark(page: Page) -> None:
+    data = base64.b64decode(page.done("capture", plc="pump")["pcapng"])
+    assert data[:4] == bytes.fromhex("0a0d0d0a") and b"fbvm" in data
+
+
+def test_scan_times_are_told_as_a_histogram_where_they_are_looked_at(page: Page) -> None:
+    page.plc.scan_times.note(0, 1000)
+    page.plc.scan_times.note(1, 1000)
+    page.plc.scan_times.note(2, 70_000)
+    assert "times" not in page.update()
+    page.done("look", plc="pump", times=True)
+    bins = page.update()["times"]
+    assert [count for _, count in bins] == [2, 1]
+    assert 960 <= bins[0][0] <= 1000 and 67_000 <= bins[1][0] <= 70_000
+
+
+def test_another_future_begins_behind_a_past_scan_and_has_done_the_same_before() -> None:
+    old, new = Page(), Page()
+    new.done("hello", version=1)
+    old.bench.can_branch = True
+    old.scan(5)
+    old.done("write", plc="pump", name="Main.Level", value="60")
+    old.scan(5)
+    old.done("write", plc="pump", name="Main.Level", value="70")
+    old.scan(5)
+    old.done("view", plc="pump", scan=7)
+    assert "past" in old.ask("write", plc="pump", name="Main.Level", value="1")["error"]
+    old.done("branch", plc="pump")
+    assert old.bench.branch_at == ("pump", 8) and old.control.has_ended
+    run_again(new.bench, [Running(new.plc, scans=1000)], old.bench.orders, "pump", 8)
+    assert new.plc.scans == 8 and new.plc.memory.map[:] == old.live.recorded.at(8).memory.map[:]
+    new.bench.futures = [Future("future 1", {"pump": old.live})]
+    new.done("view", plc="pump", scan=14, future=0)
+    new.done("look", plc="pump", names=["Main.Level"])
+    update = new.update()
+    assert (update["state"], update["scan"], update["values"]["Main.Level"]) == ("past", 14, "75")
+    assert "there is no future" in new.ask("view", plc="pump", scan=1, future=3)["error"]
+
+
+def test_a_past_that_cannot_be_done_again_has_one_future(page: Page) -> None:
+    page.scan(3)
+    page.done("view", plc="pump", scan=1)
+    assert "cannot be done again" in page.ask("branch", plc="pump")["error"]

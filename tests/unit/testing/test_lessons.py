@@ -16,7 +16,19 @@ from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
 from fbvm.record.trace.reader import Trace
 from fbvm.testing.course.class_report import report, summary
-from fbvm.testing.course.lessons import ANSWERS, GIVEN, PROGRAM, Lesson, check_class, lessons, run_pytest
+from fbvm.testing.course.lessons import (
+    ANSWERS,
+    GIVEN,
+    PROGRAM,
+    Lesson,
+    answer,
+    check_class,
+    is_done,
+    lessons,
+    program_mistakes,
+    questions,
+    run_pytest,
+)
 from fbvm.testing.lesson import predicted
 
 HOUSE = Path(__file__).resolve().parents[3]
@@ -30,8 +42,8 @@ def found_by_children(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HOUSE), os.environ.get("PYTHONPATH", "")]))
 
 
-def test_there_are_thirteen() -> None:
-    assert [lesson.number for lesson in lessons()] == list(range(1, 14))
+def test_there_are_sixteen() -> None:
+    assert [lesson.number for lesson in lessons()] == list(range(1, 17))
 
 
 @every_lesson
@@ -134,7 +146,7 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not (own.parent / "solution").exists() and not (own.parent / "lesson.md").exists()
     assert re.search(r"Level against edge +begun\n", called()[1])
     assert "Press(CLK := Button);" in called("3", "--solution")[1]
-    assert called("14")[0] == called("--check")[0] == called("--class", "nobody")[0] == 2
+    assert called("17")[0] == called("--check")[0] == called("--class", "nobody")[0] == 2
     (tmp_path / "class").mkdir()
     assert called("--class", "class", "--report", "class/out")[0] == called("--class", "class")[0] == 2
 
@@ -161,3 +173,28 @@ def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_number_in_quotes_is_a_number(written: str, value: object, tmp_path: Path) -> None:
     (tmp_path / "answers.toml").write_text(f"x = {written}\n", encoding="utf-8")
     assert predicted(str(tmp_path / "test_lesson.py"), "x") == value
+
+
+def test_predictions_are_asked_for_and_written_without_what_stands_around_them(tmp_path: Path) -> None:
+    lesson = lessons()[1]
+    lesson.begin(tmp_path)
+    assert [(name, said) for name, said, _ in questions(lesson, tmp_path)] == [
+        ("between", "true or false: Lamp between the two statements"),
+        ("at_the_end", "true or false: Lamp at the end of the scan"),
+    ]
+    answer(lesson, tmp_path, {"between": 'a "b"'})
+    assert [given for _, _, given in questions(lesson, tmp_path)] == ['a "b"', ""]
+    assert predicted(str(tmp_path / lesson.slug / "test_lesson.py"), "between") == 'a "b"'
+    assert "# true or false: Lamp at the end of the scan" in (tmp_path / lesson.slug / ANSWERS).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_wrong_program_is_told_in_sentences_and_a_right_one_ends_the_lesson(tmp_path: Path) -> None:
+    lesson = next(one for one in lessons() if one.number == 14)
+    target = lesson.begin(tmp_path)
+    for path in (lesson.folder / "solution").iterdir():
+        if path.name != PROGRAM:
+            (target / path.name).write_bytes(path.read_bytes())
+    assert program_mistakes(lesson, tmp_path) == ["stop stops the motor", "stop wins while start is pressed"]
+    (target / PROGRAM).write_bytes((lesson.folder / "solution" / PROGRAM).read_bytes())
+    assert program_mistakes(lesson, tmp_path) == [] and is_done(lesson, tmp_path)

@@ -1,0 +1,126 @@
+// The picture panel: a drawing of the user's machine, whose elements show values and write them.  fbvm has made the drawing safe.
+
+import { at, drawing, inSvg, make, number, options, remember, remembered } from "/dom.js";
+
+export class PicturePanel {
+  constructor(page) {
+    this.page = page;
+    this.pictures = [];
+    this.values = {};
+    this.changes = [];
+    at("drawing").addEventListener("change", () => {
+      remember("picture", at("drawing").value);
+      this.build();
+    });
+  }
+
+  begin() {}
+
+  update(update) {
+    if (update.pictures) {
+      this.pictures = update.pictures;
+      options(at("drawing"), this.pictures.map((one) => one.title), remembered("picture", ""));
+      at("chooser").hidden = this.pictures.length < 2;
+      this.values = update.picture ?? this.values;
+      this.build();
+    } else if (update.picture) {
+      this.values = update.picture;
+      this.show();
+    }
+  }
+
+  build() {
+    const picture = this.pictures[Math.max(0, at("drawing").selectedIndex)];
+    if (!picture) return;
+    at("wrong").textContent = picture.problems.join("\n");
+    const svg = picture.svg ? drawing(picture.svg, picture.title) : "";
+    if (svg) svg.setAttribute("role", "group");
+    at("machine").replaceChildren(svg);
+    this.changes = [];
+    at("bound").tBodies[0].replaceChildren(...(svg ? picture.bindings.map((binding) => this.bind(svg, binding)) : []));
+    this.show();
+  }
+
+  // Prepares an element for what it shows; returns the row of the table in which it is read.
+  bind(svg, binding) {
+    const element = svg.querySelector(`#m-${CSS.escape(binding.element)}`);
+    const cell = make("td", { class: "value" });
+    const what = [(text) => { cell.textContent = text; }];
+    if (binding.text !== undefined) what.push((text) => { (element.querySelector("tspan") ?? element).textContent = binding.text.replace("{}", text.replace(/^'(.*)'$/, "$1")); });
+    if (binding.color) what.push((text) => { element.style.fill = binding.color[text] ?? binding.color.else ?? ""; });
+    if (binding.visible !== undefined) what.push((text) => { element.style.visibility = text === binding.visible ? "visible" : "hidden"; });
+    if (binding.fill) what.push(filled(svg, element, binding.fill));
+    if (binding.rotate) what.push(turned(element, binding.rotate));
+    if (binding.move) what.push(moved(element, binding.move));
+    this.changes.push([binding.key, what]);
+    const wanted = binding.click;
+    if (wanted !== undefined && !this.page.about?.read_only) this.clicked(element, binding);
+    return make("tr", {}, make("th", { scope: "row" }, binding.element), make("td", { class: "mono" }, `${binding.plc}: ${binding.name}`), cell,
+      make("td", { class: "dim" }, wanted === undefined ? "" : wanted === "toggle" ? "click: the other value" : wanted === "press" ? "TRUE while held" : `click: ${wanted}`));
+  }
+
+  clicked(element, { plc, name, key, click, element: id }) {
+    const write = (value) => this.page.ask("write", { plc, name, value });
+    element.setAttribute("role", "button");
+    element.setAttribute("tabindex", "0");
+    element.setAttribute("aria-label", `${id}: writes ${name}`);
+    const down = click === "press" ? () => write("TRUE") : () => write(click === "toggle" ? (this.values[key] === "TRUE" ? "FALSE" : "TRUE") : click);
+    const up = click === "press" ? () => write("FALSE") : () => {};
+    let isHeld = false;
+    const begin = (event) => {
+      event.preventDefault();
+      if (!isHeld) down();
+      isHeld = true;
+    };
+    const end = () => {
+      if (isHeld) up();
+      isHeld = false;
+    };
+    element.addEventListener("pointerdown", (event) => {
+      if (event.isTrusted) element.setPointerCapture(event.pointerId);
+      begin(event);
+    });
+    for (const kind of ["pointerup", "pointercancel", "blur"]) element.addEventListener(kind, end);
+    element.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") begin(event); });
+    element.addEventListener("keyup", (event) => { if (event.key === "Enter" || event.key === " ") end(); });
+  }
+
+  show() {
+    for (const [key, what] of this.changes) for (const change of what) if (this.values[key] !== undefined) change(this.values[key]);
+  }
+}
+
+// How far a value is between two others, 0 to 1.
+function part(text, [low, high]) {
+  return ((number(text) ?? low) - low) / (high - low);
+}
+
+// Cuts an element from above, so that it is seen as far as it is filled.
+function filled(svg, element, range) {
+  const box = element.getBBox();
+  const clip = inSvg("clipPath", { id: `fill-of-${element.id}` });
+  const rect = inSvg("rect", { x: box.x, width: box.width });
+  clip.append(rect);
+  svg.append(clip);
+  element.setAttribute("clip-path", `url(#${clip.id})`);
+  return (text) => {
+    const height = Math.min(1, Math.max(0, part(text, range))) * box.height;
+    rect.setAttribute("y", box.y + box.height - height);
+    rect.setAttribute("height", height);
+  };
+}
+
+function turned(element, range) {
+  const box = element.getBBox();
+  const before = element.getAttribute("transform") ?? "";
+  return (text) => {
+    element.setAttribute("transform", `${before} rotate(${(part(text, range) % 1) * 360} ${box.x + box.width / 2} ${box.y + box.height / 2})`);
+  };
+}
+
+function moved(element, { from, by: [right, down] }) {
+  const before = element.getAttribute("transform") ?? "";
+  return (text) => {
+    element.setAttribute("transform", `translate(${part(text, from) * right} ${part(text, from) * down}) ${before}`);
+  };
+}

@@ -1,0 +1,45 @@
+"""A lesson beside its PLC: the prediction before the check, tries, and the solution."""
+
+from __future__ import annotations
+
+import pytest
+from browsers import Page
+
+from fbvm.live.lesson import TRIES, LiveLesson
+
+
+@pytest.fixture
+def taught() -> Page:
+    page, answers = Page(), {"lamp": ""}
+
+    def predict(values: dict[str, str]) -> str:
+        answers.update(values)
+        return "" if answers["lamp"] == "4" else "this is not what the program does"
+
+    page.bench.lesson = LiveLesson("Lamp", "# Lamp", lambda: [("lamp", "Which scan?", answers["lamp"])], predict,
+                                   lambda: ["stop stops the motor"], lambda: "lamp = 4")  # fmt: skip
+    return page
+
+
+def test_a_page_is_told_its_lesson(taught: Page) -> None:
+    assert taught.done("hello", version=1)["lesson"] == {
+        "title": "Lamp", "text": "# Lamp", "questions": [["lamp", "Which scan?", ""]], "predicted": False, "tries_left": TRIES}
+
+
+def test_the_program_is_checked_when_the_prediction_is_right(taught: Page) -> None:
+    assert "predict first" in taught.ask("check")["error"]
+    assert taught.done("predict", names=["lamp"], values=["3"]) == {
+        "mistake": "this is not what the program does", "tries_left": TRIES - 1}
+    assert taught.done("predict", names=["lamp"], values=["4"])["mistake"] == ""
+    assert taught.done("check") == {"mistakes": ["stop stops the motor"], "tries_left": TRIES - 2}
+
+
+def test_answers_to_what_was_not_asked_are_refused(taught: Page) -> None:
+    assert taught.ask("predict", names=["moon"], values=["3"])["error"] == "a prediction has one value for each of lamp"
+    assert "error" in taught.ask("predict", names=["lamp"], values=[])
+
+
+def test_a_page_without_a_lesson_says_so() -> None:
+    page = Page()
+    assert page.done("hello", version=1)["lesson"] is None
+    assert "fbvm learn --live" in page.ask("solution")["error"]

@@ -1,0 +1,55 @@
+"""What a changed program keeps of the one before it."""
+
+from __future__ import annotations
+
+from fbvm import Plc, compile_text
+from fbvm.machine.retention import start_with_retained
+
+
+def plc(text: str) -> Plc:
+    image = compile_text(text).image
+    assert image is not None
+    return Plc(image)
+
+
+OLD = """TYPE Point : STRUCT x, y : INT; END_STRUCT END_TYPE
+FUNCTION_BLOCK Counter VAR RETAIN n : INT; END_VAR VAR passing : INT; END_VAR
+n := n + 1; passing := passing + 1; END_FUNCTION_BLOCK
+PROGRAM Main VAR RETAIN total : INT; name : STRING[10]; p : Point; a : ARRAY[3..5] OF INT; gone : INT; kind : INT; END_VAR
+VAR lost : INT; counters : ARRAY[1..2] OF Counter; END_VAR
+total := total + 1; lost := lost + 1; name := 'pump 1'; p.x := 7; p.y := 8; a[3] := 3; a[5] := 5; kind := 4;
+counters[2](); END_PROGRAM"""
+NEW = """TYPE Point : STRUCT new : LINT; y, x : INT; END_STRUCT END_TYPE
+FUNCTION_BLOCK Counter VAR RETAIN before : LINT; n : INT; END_VAR VAR passing : INT; END_VAR n := n + 1; END_FUNCTION_BLOCK
+PROGRAM Main VAR lost : INT := 70; END_VAR VAR more : LINT; counters : ARRAY[2..3] OF Counter; END_VAR
+VAR RETAIN kind : REAL := 1.5; a : ARRAY[4..9] OF INT := [6(1)]; p : Point; name : STRING[4] := 'new'; total : INT; END_VAR
+more := more + 1; END_PROGRAM"""
+
+
+def test_retained_variables_are_found_by_name_wherever_they_lie_now() -> None:
+    old, new = plc(OLD), plc(NEW)
+    old.run(scans=3)
+    kept = {place.name for place in start_with_retained(new, old)}
+    assert new.read("Main.total") == 3
+    assert (new.read("Main.p.x"), new.read("Main.p.y"), new.read("Main.p.new")) == (7, 8, 0)
+    assert [new.read(f"Main.a[{number}]") for number in (4, 5, 6)] == [0, 5, 1]
+    assert new.read("Main.counters[2].n") == 3 and new.read("Main.counters[2].passing") == 0
+    assert kept == {"Main.total", "Main.p.x", "Main.p.y", "Main.a[4]", "Main.a[5]", "Main.counters[2].n"}
+
+
+def test_what_is_not_retained_or_does_not_fit_begins_anew() -> None:
+    old, new = plc(OLD), plc(NEW)
+    old.run(scans=3)
+    start_with_retained(new, old)
+    assert new.read("Main.lost") == 70
+    assert new.read("Main.kind") == 1.5 and new.read("Main.name") == "new"
+
+
+def test_retained_areas_are_kept_and_others_are_not() -> None:
+    old, new = plc(OLD), plc(NEW)
+    old.write("D100", 7)
+    old.write("H5", 8)
+    old.write("W5", 9)
+    start_with_retained(new, old)
+    assert (new.read("D100"), new.read("H5"), new.read("W5")) == (7, 8, 0)
+    assert new.scans == 0
