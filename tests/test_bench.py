@@ -225,6 +225,13 @@ def test_the_script_reconnecting_clients(load: Load, monkeypatch: pytest.MonkeyP
     assert counts["right"] > 8
 
 
+def test_the_script_bare_loop(load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    script, turns = load("bare_loop"), iter([0] * 5 + [1])
+    monkeypatch.setattr(script, "select", SimpleNamespace(select=lambda *_: (next(turns) and [sys.stdin], [], [])))
+    script.main(1 << 60)
+    assert json.loads(capsys.readouterr().out) == {"periods": 1, "missed": 0}
+
+
 def test_the_script_llvmlite_range(load: Load) -> None:
     script = load("llvmlite_range")
     assert all(end.startswith("llvmlite==") for end in script.ends())
