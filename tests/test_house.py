@@ -377,3 +377,9 @@ def test_every_code_is_used() -> None:
 def test_every_operation_is_exercised() -> None:
     named = set(re.findall(r"""["'](\w+)["']""", all_tests()))
     assert [name for name in [*EXPRESSIONS, *STATEMENTS] if name not in named] == []
+
+
+def test_no_two_test_files_have_the_same_name() -> None:
+    """pytest imports each under the name of its file alone."""
+    names = Counter(path.name for path in (PACKAGE.parent / "tests").rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
