@@ -232,6 +232,14 @@ def test_the_script_bare_loop(load: Load, monkeypatch: pytest.MonkeyPatch, capsy
     assert json.loads(capsys.readouterr().out) == {"periods": 1, "missed": 0}
 
 
+@needs_machine_code
+def test_the_script_objects(load: Load, capsys: pytest.CaptureFixture[str]) -> None:
+    script = load("objects")
+    assert list(script.CALLED) == ["function", "method", "pointer", "interface"]
+    assert all(script.nanoseconds(call, 200) > 0 for call in script.CALLED.values())
+    assert len(script.in_cpp(200)) in (0, 2)
+
+
 def test_the_script_llvmlite_range(load: Load) -> None:
     script = load("llvmlite_range")
     assert all(end.startswith("llvmlite==") for end in script.ends())

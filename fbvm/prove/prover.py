@@ -202,7 +202,7 @@ class Prover:
         for found in simulated(self.image, self.limits.cycle_ns, self.judge, self.inputs, self.limits.simulated_scans,
                                self.limits.seed, budget=STEP_BUDGET):  # fmt: skip
             if found is not None:
-                self.tell(f"a random run gets there in scan {len(found.inputs)}: looking for the shortest")
+                self.tell(f"a random run gets there after {_scans(len(found.inputs))}: looking for the shortest")
                 shorter = self._searched(min(len(found.inputs), self.limits.scans))
                 return shorter or self._met(found.inputs, False)
             if self.limits.expired():
@@ -224,7 +224,8 @@ class Prover:
         run = replayed(self.image, self.limits.cycle_ns, self.judge, inputs, is_shortest, budget=STEP_BUDGET)
         if run is not None:
             word = REACHED if self.question.is_reach else BROKEN
-            return self._verdict(word, f"in scan {run.scans}, by {'the shortest run' if is_shortest else 'a random run'}", run)
+            how = "the shortest run" if is_shortest else "a random run"
+            return self._verdict(word, f"after {_scans(run.scans)}, by {how}", run)
         if self.unwound:
             site = self.image.sites[self.unwound[0].site]
             return self._verdict(UNDECIDED, f"a loop goes on for longer than it can be followed ({site})")
@@ -279,3 +280,7 @@ class Prover:
 
 class SpuriousRun(Exception):
     """A run of the solver that the engine does not do: a defect of fbvm."""
+
+
+def _scans(count: int) -> str:
+    return f"{count} scan{'s' if count > 1 else ''}"

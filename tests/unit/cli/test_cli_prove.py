@@ -31,7 +31,7 @@ def test_a_broken_property_has_status_1_and_a_chart() -> None:
     result = proved(INTERLOCK, "--never", "Main.Left")
     assert result.exit_code == 1
     assert result.stdout.splitlines() == [
-        "never Main.Left: BROKEN in scan 1, by the shortest run", "               0", "Main.Backward  #", "Main.Left      #"]
+        "never Main.Left: BROKEN after 1 scan, by the shortest run", "               0", "Main.Backward  #", "Main.Left      #"]
 
 
 def test_json_has_the_inputs_scan_by_scan() -> None:
@@ -59,7 +59,7 @@ def test_an_answer_that_comes_too_late_is_written_as_a_test(tmp_path: Path) -> N
     program.write_text(text, encoding="utf-8")
     result = proved(str(program), "--within", "Main.In", "Main.t.Q", "30ms", "--test", str(test))
     assert (result.exit_code, result.stdout.splitlines()[0]) == (
-        1, "Main.t.Q within 30ms of Main.In: BROKEN in scan 4, by the shortest run")
+        1, "Main.t.Q within 30ms of Main.In: BROKEN after 4 scans, by the shortest run")
     late = runpy.run_path(str(test))["test_main_t_q_within_30ms_of_main_in"]
     with pytest.raises(AssertionError):
         late()
@@ -75,7 +75,7 @@ def test_two_blocks_are_compared(tmp_path: Path) -> None:
     good, wrong = (proved(str(program), "--equal", "Twice", other) for other in ("Shifted", "Thrice"))
     assert (good.exit_code, good.stdout) == (0, "Twice and Shifted are equal: PROVED by induction over 1 scan\n")
     assert (wrong.exit_code, wrong.stdout.splitlines()[0]) == (
-        1, "Twice and Thrice are equal: BROKEN in scan 1, by the shortest run")
+        1, "Twice and Thrice are equal: BROKEN after 1 scan, by the shortest run")
     assert proved(str(program), "--equal", "Twice", "Nobody").exit_code == 2
 
 

@@ -30,7 +30,7 @@ def test_what_is_broken_fails_with_the_shortest_run(fb: Any) -> None:
     with pytest.raises(NotProved) as failed:
         proved(fb("Gate", text=GATE), never="Down AND NOT Close")
     assert str(failed.value).splitlines() == [
-        "never Down AND NOT Close: BROKEN in scan 2, by the shortest run", "       0", "Close  #.", "Down   ##"]
+        "never Down AND NOT Close: BROKEN after 2 scans, by the shortest run", "       0", "Close  #.", "Down   ##"]
 
 
 def test_an_assumption_is_kept_by_all_runs(fb: Any) -> None:
