@@ -17,6 +17,7 @@ from fbvm.syntax.il.operators import OPERATORS, Operator
 from fbvm.syntax.ladder.instructions.pasted import ladder_lines
 from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.builder import TooDeep
+from fbvm.syntax.st.declarations import SET_BY
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.statements import Statements
 from fbvm.syntax.tree import Argument, Expr, Name, NameRef
@@ -28,9 +29,6 @@ _OPERANDS = (tree.NameRef | tree.Literal | tree.Member | tree.Index | tree.Part 
              | tree.NullLiteral)  # fmt: skip
 RUNGS_STAND = "rungs stand between LADDER and END_LADDER"
 _RUNG_WORDS = {"OUT", "OUTNOT", "LDNOT", "ANDNOT", "ORNOT", "TIM", "CNT", "ANDLD", "ORLD", "KEEP", "DIFU", "DIFD"}
-_SET_BY = {"S": {"RS"}, "R": {"SR", "CTU", "CTUD"}}
-"""Operator -> standard blocks that have an input of that name (a counter may have its type in the name): in front of an
-instance of these the operator gives the input, table 70."""
 
 
 class InstructionError(Exception):
@@ -172,7 +170,7 @@ class ListLowering:
     def _set(self, each: Instruction, operator: Operator, needed: bool) -> None:
         target = self._operand(each)
         kind = self.builder.blocks.get(target.text.upper(), "") if isinstance(target, NameRef) else ""
-        if kind.partition("_")[0] in _SET_BY[each.name]:
+        if kind.partition("_")[0] in SET_BY[each.name]:
             self._give(each, target, needed)
         else:
             self._assign(each, target, operator.sign, self._kept(each, needed))

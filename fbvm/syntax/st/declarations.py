@@ -34,8 +34,10 @@ from fbvm.syntax.tree import (
 )
 
 Settings = AccessVars | ConfigVars
-LATCHING = ("RS", "SR", "CT")
-"""With what the names of the standard blocks begin that have inputs S or R."""
+SET_BY = {"S": {"RS"}, "R": {"SR", "CTU", "CTUD"}}
+"""Operator of instruction lists -> standard blocks that have an input of that name (a counter may have its type in the name): in
+front of an instance of these the operator gives the input, table 70."""
+_LATCHING = frozenset().union(*SET_BY.values())
 ConfigItem = VarSection | Task | ProgramInstance | Refused | Settings
 
 
@@ -46,7 +48,7 @@ class Declarations(Types):
 
     def var_section(self, word: Token, qualifiers: list[Name], variables: list[VarDecl], end: Token) -> VarSection:
         for declared in variables:
-            if isinstance(declared.spec, NamedType) and declared.spec.text[:2].upper() in LATCHING:
+            if isinstance(declared.spec, NamedType) and declared.spec.text.upper().partition("_")[0] in _LATCHING:
                 self.blocks.update((name.text.upper(), declared.spec.text.upper()) for name in declared.names)
         return VarSection(word.start, end.end, word.text.upper(), tuple(qualifiers), tuple(variables))
 
