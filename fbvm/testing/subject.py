@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.dialects import dialect as named_dialect
 from fbvm.base.files import reason
 from fbvm.base.types import fold
 from fbvm.check.lint.suppression import ANY, Wanted
@@ -116,10 +117,10 @@ def _build(sources: list[Source], name: str | None, libraries: Sequence[Path], s
     if name == "":
         name = _only(sources)
     for stubbed, stub in stubs.items():
-        sources = _stubbed(sources, stubbed, stub, libraries)
+        sources = _stubbed(sources, stubbed, stub, libraries, dialect)
     if name is None:
         return compiled(sources, None, "")
-    node, source = _declared(sources, name, libraries)
+    node, source = _declared(sources, name, libraries, dialect)
     if node.kind == "PROGRAM":
         return compiled(sources, node.name.text, f"{node.name.text}.")
     wrapper = Source(f"<test of {node.name.text}>", _wrapper(node, source))
@@ -223,12 +224,12 @@ def pous(source: Source) -> list[tree.Pou]:
     return [node for node in text.declarations if isinstance(node, tree.Pou)]
 
 
-def _declared(sources: Sequence[Source], name: str, libraries: Sequence[Path]) -> tuple[tree.Pou, Source]:
+def _declared(sources: Sequence[Source], name: str, libraries: Sequence[Path], dialect: str) -> tuple[tree.Pou, Source]:
     known = [(node, source) for source in sources for node in pous(source)]
     for node, source in known:
         if fold(node.name.text) == fold(name):
             return node, source
-    found = _in_libraries(name, libraries)
+    found = _in_libraries(name, libraries, dialect)
     if found is None:
         there = ", ".join(node.name.text for node, _ in known)
         said = f"there is no {name}" + (f"; there is {there}" if there else " in any library")
@@ -236,8 +237,8 @@ def _declared(sources: Sequence[Source], name: str, libraries: Sequence[Path]) -
     return found
 
 
-def _in_libraries(name: str, libraries: Sequence[Path]) -> tuple[tree.Pou, Source] | None:
-    shelves, report = Libraries(libraries), Report()
+def _in_libraries(name: str, libraries: Sequence[Path], dialect: str) -> tuple[tree.Pou, Source] | None:
+    shelves, report = Libraries(libraries, preferred=named_dialect(dialect).libraries), Report()
     for owner in shelves.names:
         for source, text in shelves.load(name, owner, report):
             for node in text.declarations:
@@ -282,9 +283,9 @@ def _wrapper(pou: tree.Pou, source: Source) -> str:
 # --- stubs ------------------------------------------------------------------------------------------------------------
 
 
-def _stubbed(sources: list[Source], name: str, stub: str, libraries: Sequence[Path]) -> list[Source]:
+def _stubbed(sources: list[Source], name: str, stub: str, libraries: Sequence[Path], dialect: str) -> list[Source]:
     """The sources with a stub in place of the POU, or of its body, of a name.  All other lines keep their numbers."""
-    node, source = _declared(sources, name, libraries)
+    node, source = _declared(sources, name, libraries, dialect)
     text = stub
     if not _DECLARES.match(stub):
         start, end = _body(node, source)

@@ -85,7 +85,7 @@ class Rig:
         """All words that belong neither to the sheet's program nor to the unit nor to the clock."""
         found = {area: self.words(area).tolist() for area in AREAS}
         for area, own in (("CIO", OWN_CIO), ("CIO", range(5801, 6144)), ("W", range(480, 512)), ("D", OWN_DM),
-                          ("A", range(2)), ("A", range(200, 201)), ("A", range(262, 266))):  # fmt: skip
+                          ("A", range(2)), ("A", range(200, 201)), ("A", range(262, 266)), ("A", range(351, 355))):  # fmt: skip
             for word in own:
                 found[area][word] = 0
         return found

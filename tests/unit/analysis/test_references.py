@@ -133,10 +133,14 @@ def test_who_calls_whom() -> None:
 
 
 @pytest.mark.slow
-def test_every_name_of_the_corpus_has_a_declaration() -> None:
+@pytest.mark.parametrize("objects", [
+    False,
+    pytest.param(True, marks=pytest.mark.xfail(strict=True, reason="names of methods and properties are not followed yet")),
+])
+def test_every_name_of_the_corpus_has_a_declaration(objects: bool) -> None:
     lost = []
     for each in programs():
-        if each.runs:
+        if each.runs and each.name.startswith("objects/") is objects:
             program = Program(dialect=each.dialect)
             program.replace(each.path.name, each.text)
             program.check_all()
