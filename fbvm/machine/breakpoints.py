@@ -110,6 +110,8 @@ class BreakpointRows:
     def __init__(self, plc: Inspected, image: Image) -> None:
         self._inspected, self._image = plc, image
         self._rows: dict[Breakpoint, LineStop | Watchpoint] = {}
+        self._watched: dict[Breakpoint, Place | Span] = {}
+        """What breakpoints of kind "change" watch."""
         self._stops = StopTable(plc.memory, len(image.sites))
 
     @cached_property
@@ -138,17 +140,19 @@ class BreakpointRows:
         row = LineStop(lines.sites, test, parse_passes(hits), self._message(lines, message))
         return self._put(Breakpoint("line", lines.where, when, hits, message), row)
 
-    def change(self, where: str, when: str = "", hits: str = "") -> Breakpoint:
+    def change(self, where: str | Place, when: str = "", hits: str = "") -> Breakpoint:
         """Stops behind the statement that changed a variable, an address or a range of addresses (as `Plc.find` takes them).
 
         A change between two scans is found at the first statement of the second.  Raises UnknownPlace, ValueError for what
         lies behind a reference or if the PLC is observed."""
-        found = self._inspected.find(where)
+        found = self._inspected.find(where) if isinstance(where, str) else where
         condition = self._condition(when)
         extents, mask = _extents(found)
         row = Watchpoint(extents, mask, test=self._test(condition), read=lambda: self._inspected.read(found),
                          wanted=parse_passes(hits))  # fmt: skip
-        return self._put(Breakpoint("change", where, when, hits), row)
+        said = Breakpoint("change", where if isinstance(where, str) else where.name, when, hits)
+        self._watched[said] = found
+        return self._put(said, row)
 
     def condition(self, when: str, hits: str = "") -> Breakpoint:
         """Stops behind the statement that makes a condition TRUE: `n > 5 AND D100 = 0`.  Raises ValueError as `change` does."""
@@ -176,11 +180,13 @@ class BreakpointRows:
     def remove(self, breakpoint: Breakpoint) -> None:
         """Removes a breakpoint.  Raises KeyError if it is not set."""
         del self._rows[breakpoint]
+        self._watched.pop(breakpoint, None)
         self._stops.put(self._rows.values())
 
     def clear(self) -> None:
         """Removes all breakpoints; a scan that stands goes on all the same with the next `Plc.scan`."""
         self._rows.clear()
+        self._watched.clear()
         self._stops.put(())
 
     def _put(self, breakpoint: Breakpoint, row: LineStop | Watchpoint) -> Breakpoint:
@@ -293,7 +299,7 @@ class BreakpointRows:
 
     def _reason(self, said: Breakpoint, row: LineStop | Watchpoint) -> str:
         if isinstance(row, Watchpoint) and said.kind == "change":
-            whole = self._inspected.find(said.where)
+            whole = self._watched[said]
             found, before, after = changed(whole, cast(Value, row.before), cast(Value, row.value))
             name = said.where if found is whole else found.name
             return f"{name} was {self._shown(found, before)}, is {self._shown(found, after)}"

@@ -12,13 +12,14 @@ from typing import TypeAlias
 from fbvm.engine.observation import NO_SITE
 from fbvm.engine.stops import State
 from fbvm.machine.breakpoints import Breakpoint
+from fbvm.record.recording.last_change import stretches
 from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.trace.events import Statement
 from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position, Reached, Said
 from fbvm.step.scan_replay import END, depth
 from fbvm.step.scan_stops import Ends, Looked, ScanStops
-from fbvm.step.search import LiveRunner, PastRunner, Runner, ScanCheck, last_in, stretches
+from fbvm.step.search import LiveRunner, PastRunner, Runner, ScanCheck, last_in
 from fbvm.step.session import Session
 from fbvm.step.world import World
 
@@ -42,8 +43,7 @@ class Debugged:
     @property
     def recorded(self) -> RecordedPlc:
         """The recording of its scans."""
-        session = self.session
-        return session.source.recorded if isinstance(session, PastSession) else session.world.recorded(self.name)
+        return self.session.recorded
 
     @property
     def world(self) -> World | None:

@@ -8,6 +8,7 @@ from functools import partial
 from fbvm.base.memory import Memory
 from fbvm.engine.trap import Trap
 from fbvm.machine.plc import Phase, Plc
+from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.events import Event
 from fbvm.record.trace.scan_source import Moment
@@ -85,7 +86,11 @@ class PastSession(Stepping):
     @property
     def source_plc(self) -> Plc:
         """The PLC that was recorded."""
-        return self.source.recorded.plc
+        return self.recorded.plc
+
+    @property
+    def recorded(self) -> RecordedPlc:
+        return self.source.recorded
 
     def first(self) -> int:
         return self.source.scans.start

@@ -5,7 +5,7 @@ it is played (`ScanStops`).  So a stop at full speed and a step back stand at th
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from typing import Protocol
 
 from fbvm.engine.stops import State
@@ -15,8 +15,6 @@ from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.recording.replay import Replay
 from fbvm.step.world import World
 
-FIRST_STRETCH = 32
-"""Scans that a search backwards looks at first; then at twice as many, and so on."""
 MOST_AT_ONCE = 4096
 """Scans of one slice."""
 
@@ -164,12 +162,3 @@ def last_in(runner: Runner, end: int) -> Generator[None, None, tuple[int, State,
         runner.rows.take_told()
         yield None
     return found
-
-
-def stretches(first: int, end: int) -> Iterator[range]:
-    """The scans from `first` to before `end` in stretches that grow, the latest first."""
-    size = FIRST_STRETCH
-    while end > first:
-        start = max(first, end - size)
-        yield range(start, end)
-        end, size = start, size * 2

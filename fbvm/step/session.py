@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 
 from fbvm.machine.plc import Phase, Plc
+from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.step.position import Position as Position
 from fbvm.step.scan_replay import END, Action, MomentListener, PastMoment, ScanReplay, Stop
 from fbvm.step.stepping import Stepping, reached_step
@@ -66,6 +67,10 @@ class Session(Stepping):
             self.world.act(self.name, here, action)
         finally:
             self.go_to(here)
+
+    @property
+    def recorded(self) -> RecordedPlc:
+        return self.world.recorded(self.name)
 
     def follow(self, listener: MomentListener, scans: range) -> None:
         here = self.here

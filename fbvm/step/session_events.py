@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fbvm.code.image import Site
 from fbvm.record.draw.why import Follower
+from fbvm.record.recording.last_change import may_change
 from fbvm.record.trace.outline import outer_statements
 from fbvm.step.scan_replay import Moment
 from fbvm.step.stepping import Stepping
 from fbvm.step.stop_report import StopReport
 from fbvm.watch.names import Names
+from fbvm.watch.paths import Place
 
 
 class SessionEvents:
@@ -31,6 +35,10 @@ class SessionEvents:
     def follow(self, follower: Follower, scans: range | None = None) -> None:
         """Reports the phases and events of some scans, or of all, to `follower`."""
         self._session.follow(follower, scans or self.scans)
+
+    def may_change(self, places: Sequence[Place], scans: range) -> range:
+        """The scans up to the last change of one of the places, or up to some scans behind it."""
+        return may_change(self._session.recorded, places, scans)
 
     def line(self, site: Site) -> str:
         """The text of the line on which a statement stands."""

@@ -14,6 +14,7 @@ from fbvm.engine.trap import Trap
 from fbvm.record.draw.power import RungExecution
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartCall
+from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.trace.events import Statement
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.facts import ProgramFacts
@@ -64,6 +65,11 @@ class Stepping(ABC):
     @abstractmethod
     def follow(self, listener: MomentListener, scans: range) -> None:
         """Reports the phases and events of some scans, up to the current position, to `listener`."""
+
+    @property
+    @abstractmethod
+    def recorded(self) -> RecordedPlc:
+        """The recording of the PLC."""
 
     @abstractmethod
     def first(self) -> int:

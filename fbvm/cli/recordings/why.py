@@ -24,7 +24,7 @@ from fbvm.watch.paths import Place
 def command(name: str, path: Path | None, scan: int | None, deep: int, plc: str | None, libraries: tuple[Path, ...]) -> None:
     """Say why a variable has its value: the statement that gave it, what it had read, and so on back through scans.
 
-    Up to 10,000 scans are searched.  The TRACE may be left out where the folder has only one."""
+    The search goes back to the first scan that was recorded.  The TRACE may be left out where the folder has only one."""
     with open_trace(path or _only_trace(), plc, libraries, Depth.STATEMENTS) as trace:
         if trace.depth is not Depth.STATEMENTS:
             raise click.UsageError("the trace does not hold what statements read; it was made of a table, or without --depth")

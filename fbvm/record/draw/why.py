@@ -25,9 +25,7 @@ from fbvm.watch.values import Value, show_time
 DEEPEST = 6
 """The default depth of causes of causes."""
 WINDOWS = (100, 1000)
-"""Scans that are searched at once, backwards: first, and then."""
-MOST_SCANS = 10_000
-"""Scans that are searched: some seconds."""
+"""Scans that are searched at once, backwards: where a change is known to be, or is likely, and where it may be anywhere."""
 ORDER_BITS = 32
 """The number of an event is that of its window's first scan, shifted by so many bits, and its number in the window."""
 MOST_FACTS = 32
@@ -76,6 +74,7 @@ class EventSource(Protocol):
     def scans(self) -> range: ...
     def at(self, scan: int) -> Readable: ...
     def follow(self, follower: Follower, scans: range | None = None) -> None: ...
+    def may_change(self, places: Sequence[Place], scans: range) -> range: ...
     def line(self, site: Site) -> str: ...
 
 
@@ -106,7 +105,7 @@ class Change:
 class Cause:
     """A value, the change that led to it and its causes.
 
-    `change` is None if the scans that were searched, from number `first` on, have none."""
+    `change` is None if there is none since the first scan that there is."""
 
     place: Place
     value: str
@@ -115,7 +114,6 @@ class Cause:
     repeated: bool = False
     """True if its causes are listed at another place of the tree."""
     causes: list[Cause] = field(default_factory=list)
-    first: int = 0
 
 
 class _Changes:
@@ -235,15 +233,17 @@ def why(trace: EventSource, place: Place, scan: int, deepest: int = DEEPEST) -> 
     then = trace.at(scan)
     value = Signal(place, place.name).text(trace.names.read(then.read, place))
     place = _dereferenced(trace.names, then.memory, place)
-    start = max(trace.scans.start, scan - MOST_SCANS + 1)
-    search = _Search(trace, start)
-    end, window = scan + 1, WINDOWS[0]
+    search, left, window = _Search(trace), range(trace.scans.start, scan + 1), WINDOWS[0]
     while True:
-        search.begin(range(max(start, end - window), end))
+        search.begin(left[-window:])
         cause = search.explain(place, value, (scan + 1) << ORDER_BITS, deepest, set())
-        end, window = max(start, end - window), WINDOWS[1]
-        if end == start or not _open(cause):
+        before = left[:-window]
+        if not before or not (wanted := list(dict.fromkeys(_open(cause)))):
             return cause
+        left = trace.may_change(wanted, before)
+        if not left:
+            return cause
+        window = WINDOWS[left == before]
 
 
 def _dereferenced(names: Names, memory: Memory, place: Place) -> Place:
@@ -258,8 +258,8 @@ def _dereferenced(names: Names, memory: Memory, place: Place) -> Place:
 class _Search:
     """Searches causes in windows, one before the other: what one has not, the one before may have."""
 
-    def __init__(self, trace: EventSource, first: int) -> None:
-        self._trace, self._first = trace, first
+    def __init__(self, trace: EventSource) -> None:
+        self._trace = trace
         self._past: _Changes | None = None
         self._found: dict[tuple[Place, int], Change] = {}
         """The changes that led to values of places at events, as far as they are known."""
@@ -278,7 +278,7 @@ class _Search:
     def explain(self, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:
         """The causes of a value at event `before`, as far as they are known."""
         change = self._last(place, before)
-        cause = Cause(place, value, change, first=self._first)
+        cause = Cause(place, value, change)
         key = place, change.order if change else -1
         if key in known:
             cause.repeated = bool(change and change.facts)
@@ -299,9 +299,12 @@ def _once(facts: Iterable[Fact]) -> Iterator[Fact]:
             yield fact
 
 
-def _open(cause: Cause) -> bool:
-    """True if a cause has no change, which an earlier scan may have."""
-    return cause.change is None or any(_open(inner) for inner in cause.causes)
+def _open(cause: Cause) -> Iterator[Place]:
+    """The places without a change, which an earlier scan may have; of one behind a reference the reference."""
+    if cause.change is None:
+        yield replace(cause.place, hops=())
+    for inner in cause.causes:
+        yield from _open(inner)
 
 
 # --- as text ----------------------------------------------------------------------------------------------------------
@@ -323,8 +326,6 @@ def _since(trace: EventSource, cause: Cause) -> str:
     change = cause.change
     if change is None:
         start = trace.scans.start
-        if cause.first > start:
-            return f" since before scan {cause.first}, the first that was looked at"
         return f" since before scan {start}, the first of the trace" if start else " since power-on"
     when = f" since scan {change.scan} ({show_time(change.now_ns).removeprefix('T#')})"
     if change.phase is Phase.REFRESH:

@@ -11,7 +11,6 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import pairwise
 from math import isfinite
 from mmap import mmap
 
@@ -282,9 +281,9 @@ class _Lines:
         for line, start, end in zip(lines, places, [*places[1:], count], strict=True):
             whole += [line] * (end - start)
         self._before, self._count, self._whole = before, count, b"".join(whole)
-        moved = 0
-        for one, other in pairwise(int.from_bytes(line, "little") for line in (before, *lines)):
-            moved |= one ^ other
+        moved, number = 0, int.from_bytes(before, "little")
+        for line in lines:
+            moved |= number ^ int.from_bytes(line, "little")  # a byte that was never another than at first is 0 here
         self.changed = [at for at, byte in enumerate(moved.to_bytes(LINE, "little")) if byte]
         """The bytes of the line that are not the same all the time."""
         self._moved = frozenset(self.changed)

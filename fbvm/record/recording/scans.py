@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from fbvm.machine.plc import Phase, Plc
+from fbvm.record.recording.last_change import may_change
 from fbvm.record.recording.recorded import RecordedPlc
 from fbvm.record.trace.events import Event, NetworkEvent
 from fbvm.record.trace.observing import observing
@@ -14,6 +15,7 @@ from fbvm.record.trace.packets import add_tap
 from fbvm.record.trace.scan_source import Follower, Moment, ScanSource
 from fbvm.record.trace.writer import Depth, descriptions, meanings
 from fbvm.watch.names import Names
+from fbvm.watch.paths import Place
 from fbvm.wire.tap import TapEvent
 
 
@@ -80,6 +82,10 @@ class RecordedScans(ScanSource):
 
         if scans := self._wanted(scans):
             self._recorded.follow_with(scans, attached)
+
+    def may_change(self, places: Sequence[Place], scans: range) -> range:
+        """The scans up to the last change of one of the places, or up to some scans behind it."""
+        return may_change(self._recorded, places, scans)
 
     def _listen(self, plc: Plc, follower: Follower) -> ScanListener:
         """Has a PLC report to `follower` the ends of its scans and what passes the network."""

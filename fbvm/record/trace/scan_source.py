@@ -92,6 +92,12 @@ class ScanSource(ABC):
         """Reports to `follower` the end of some scans, or of all, and what passed the network; nothing that happened inside."""
         self.follow(_Ends(follower), scans)
 
+    def may_change(self, places: Sequence[Place], scans: range) -> range:
+        """Some scans without those at their end in which none of the places was changed, as far as that is known quickly.
+
+        They are empty if none was changed in any of them.  The places are not behind references."""
+        return scans
+
     def find(self, text: str) -> Place | Span:
         """The place or span of places that `text` names.  Raises UnknownPlace."""
         return find(self.symbols, self.areas, text)

@@ -264,17 +264,6 @@ def test_a_cause_before_all_windows_is_found(monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.slow
-def test_a_long_trace_is_searched_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fbvm.record.draw.why.WINDOWS", (2, 4))
-    monkeypatch.setattr("fbvm.record.draw.why.MOST_SCANS", 9)
-    trace = recorded_from(0, 12)
-    late = cause_text(trace, ask(trace, "Main.Seen", 11))
-    assert late == "Main.Seen = 5 since before scan 3, the first that was looked at"
-    earlier = cause_text(trace, ask(trace, "Main.Seen", 8)).splitlines()
-    assert earlier[0] == "Main.Seen = 5 since scan 0 (0s), by pump.st:4 in Main"
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("first", [0, 20])
 def test_a_cause_from_outside_in_the_third_scan_and_none_before_the_first(first: int) -> None:
     """What was written before the first recorded scan is there when the trace begins."""

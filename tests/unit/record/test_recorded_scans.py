@@ -21,6 +21,7 @@ from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.signals import network_events, waveforms
 from fbvm.record.trace.writer import Depth, TraceWriter
 from fbvm.units.port.noc import Noc
+from fbvm.watch.paths import Place
 from fbvm.wire.link import Peer
 from fbvm.wire.registers import server
 
@@ -91,3 +92,46 @@ def test_the_network_is_part_of_it(path: str, unit: Etn21 | Noc) -> None:
     assert passed == network_events(trace)
     assert len(passed) > 5
     assert page_data(recorded) == page_data(trace)
+
+
+LONG_AGO = """PROGRAM Main
+VAR
+    n, kept, seen : DINT; early, late : BOOL; Given : INT; store : ARRAY[0..3] OF INT; t : TON; p : REF_TO INT;
+    lamp AT CIO 100.03 : BOOL; other AT CIO 100.04 : BOOL;
+END_VAR
+    n := n + 1;
+    p := REF(store[2]);
+    IF n = 5 THEN early := TRUE; p^ := 7; END_IF;
+    IF early AND n = 300 THEN late := TRUE; END_IF;
+    IF n < 170 THEN kept := kept + 1; END_IF;
+    IF n MOD 2 = 0 AND n < 370 THEN seen := n; seen := seen * 2; END_IF;
+    lamp := late;
+    other := n MOD 3 = 0;
+    t(IN := late, PT := T#3s);
+END_PROGRAM
+"""
+
+
+@pytest.mark.slow
+def test_causes_of_long_ago_are_those_that_a_search_of_each_scan_finds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A recording is searched by breakpoints from the latest scan backwards, a trace scan by scan."""
+    monkeypatch.setattr("fbvm.record.recording.last_change.WINDOW", 20)
+    monkeypatch.setattr("fbvm.record.draw.why.WINDOWS", (20, 100))
+    made = compile_text(LONG_AGO).image
+    assert made is not None
+    plc, file = Plc(made), io.BytesIO()
+    recorded, writer = Recording().add("plc", plc), TraceWriter(plc, file, Depth.STATEMENTS)
+    for scan in range(400):
+        if scan in (100, 220):
+            plc.write("Main.Given", scan)
+        plc.scan()
+    writer.close()
+    source, trace = RecordedScans(recorded, {}), Trace(io.BytesIO(file.getvalue()))
+    for name, scan in [("seen", 399), ("Given", 399), ("p^", 210), ("lamp", 399), ("t.ET", 399)]:
+        place = source.find(f"Main.{name}")
+        assert isinstance(place, Place)
+        assert cause_text(source, why(source, place, scan)) == cause_text(trace, why(trace, place, scan)), name
+    assert "since scan 220" in cause_text(source, why(source, source.find("Main.Given"), 399))  # type: ignore[arg-type]
+    store = source.find("Main.store")
+    assert isinstance(store, Place)
+    assert (source.may_change([store], range(400)).stop - 1) - 4 in range(20)
