@@ -5,14 +5,15 @@ program."""
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 from weakref import finalize
 
-from fbvm.code.image import Image
+from fbvm.code.image import Body, Image
 from fbvm.code.operations import Block, Node
-from fbvm.code.shapes import blocks
+from fbvm.code.shapes import blocks, statements
 from fbvm.engine.depths import with_recursion_room
 
 STATEMENTS = ("statement", "rung")
@@ -37,25 +38,35 @@ class Counted:
 
 FRAMES_A_LEVEL = 4
 """Python frames that counting takes at most for each level of nested code."""
-_counted: dict[int, Counted] = {}
-"""Those of images that are still in use."""
+_counted: dict[int, dict[frozenset[str] | None, Counted]] = {}
+"""Those of images that are still in use, by what is counted."""
 
 
-def counted(image: Image) -> Counted:
+def counted(image: Image, files: Set[str] | None = None) -> Counted:
     """The same program, in which all statements, rungs, and ways past the statements of an IF or CASE are counted.
 
-    The same object as long as the image is in use."""
-    known = _counted.get(id(image))
-    if known is None:
-        known = _counted[id(image)] = with_recursion_room(image, FRAMES_A_LEVEL, partial(_made, image))
+    With `files` only those of bodies that these files have, by their names in sites.  The same object as long as the image is in
+    use."""
+    wanted = None if files is None else frozenset(files)
+    if id(image) not in _counted:
+        _counted[id(image)] = {}
         finalize(image, _counted.pop, id(image))
+    known = _counted[id(image)].get(wanted)
+    if known is None:
+        known = _counted[id(image)][wanted] = with_recursion_room(image, FRAMES_A_LEVEL, partial(_made, image, wanted))
     return known
 
 
-def _made(image: Image) -> Counted:
+def _made(image: Image, files: frozenset[str] | None) -> Counted:
     counters: list[Counter] = []
-    bodies = tuple(replace(body, code=_block(body.code, None, counters)) for body in image.bodies)
+    bodies = tuple(replace(body, code=_block(body.code, None, counters)) if files is None or _is_of(body, image, files) else body
+                   for body in image.bodies)  # fmt: skip
     return Counted(replace(image, bodies=bodies, counters=len(counters)), tuple(counters))
+
+
+def _is_of(body: Body, image: Image, files: frozenset[str]) -> bool:
+    """True if some statement of a body stands in one of some files."""
+    return any(image.sites[node[2]].file in files for node in statements(body.code) if _is_statement(node))
 
 
 def _block(block: Block, site: int | None, counters: list[Counter]) -> Block:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from operator import sub
 
@@ -47,8 +47,10 @@ class Counting:
 
 
 @contextmanager
-def counting(plc: Plc) -> Iterator[Counting]:
-    """Counts what `plc` executes inside the `with` block.  Raises ValueError if somebody looks into every scan of `plc`."""
-    made = counted(plc.image)
+def counting(plc: Plc, files: Set[str] | None = None) -> Iterator[Counting]:
+    """Counts what `plc` executes inside the `with` block, all or what stands in some files, by their names in sites.
+
+    Raises ValueError if somebody looks into every scan of `plc`."""
+    made = counted(plc.image, files)
     with instrumented(plc, made.image) as engine:
         yield Counting(made, engine)

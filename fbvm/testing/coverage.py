@@ -139,6 +139,11 @@ def _spot(site: Site) -> Position:
     return site.line, site.column
 
 
+def covered_files(subject: Subject) -> set[str]:
+    """The files whose statements are part of coverage, by their names in sites."""
+    return {name for name in {site.file for site in subject.image.sites} if _path(name, subject)}
+
+
 def _path(name: str, subject: Subject) -> str:
     """The file of a source, "" for one that is no file or came with fbvm."""
     if name in subject.sources:

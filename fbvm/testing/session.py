@@ -43,11 +43,20 @@ def count_coverage(config: pytest.Config, plc: Plc, subject: Subject) -> Iterato
         return
     from fbvm.machine.counting import counting
 
-    with counting(plc) as counts:
+    with counting(plc, covered(config, subject)) as counts:
         try:
             yield
         finally:
             add_coverage(config, subject, counts)
+
+
+def covered(config: pytest.Config, subject: Subject) -> set[str]:
+    """The files whose statements are counted, by their names in sites; none if the session measures no coverage."""
+    if not config.pluginmanager.has_plugin("fbvm_coverage"):
+        return set()
+    from fbvm.testing.coverage import covered_files
+
+    return covered_files(subject)
 
 
 def add_coverage(config: pytest.Config, subject: Subject, counts: Counting) -> None:

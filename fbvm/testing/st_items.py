@@ -30,7 +30,7 @@ from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
 from fbvm.testing.rig import Trapped
-from fbvm.testing.session import add_coverage, failure_page, library_folders
+from fbvm.testing.session import add_coverage, covered, failure_page, library_folders
 from fbvm.testing.subject import LIBRARY, Subject, SubjectError, subject
 from fbvm.testing.warning_plugin import warning_plugin
 from fbvm.watch.names import Names, is_single
@@ -93,7 +93,7 @@ class StItem(pytest.Item):
         watch = Assertions(plc, made.prefix)
         recorded = Recording().add(self.name, plc)
         try:
-            with counting(plc) as counts:
+            with counting(plc, watch.files | covered(self.config, made)) as counts:
                 try:
                     _run(plc, watch, counts, f"{made.prefix}Done")
                 finally:
@@ -162,6 +162,8 @@ class Assertions:
         inside = [number for number in statements(plc.image) if fold(plc.image.sites[number].pou) == ASSERT]
         self.called, self.failing = inside or (NO_SITE, NO_SITE)
         """The sites of its IF, and of its RETURN, which is executed if the condition is FALSE."""
+        self.files = {plc.image.sites[number].file for number in inside}
+        """The file that it stands in."""
         self.names = Names.of(plc.image, plc.memory.areas)
         self._bodies = {number for number, body in enumerate(plc.image.bodies) if fold(body.name) == ASSERT}
         self._reads: dict[Frame, list[Place]] = {}

@@ -34,7 +34,7 @@ from fbvm.record.recording.recording import Recording  # noqa: E402
 from fbvm.record.recording.scans import RecordedScans  # noqa: E402
 from fbvm.record.trace.events import Event  # noqa: E402
 from fbvm.record.trace.observing import observing  # noqa: E402
-from fbvm.record.trace.writer import Depth, TraceWriter, source_lines  # noqa: E402
+from fbvm.record.trace.writer import source_lines  # noqa: E402
 
 PROGRAM = Path(__file__).parent / "programs" / "lines100.st"
 SCANS = 10_000
@@ -108,7 +108,7 @@ def power_us() -> None:
 
 def scan_counted_us(image: Image, engine: str) -> float:
     plc = Plc(image, engine=engine)
-    with counting(plc):
+    with counting(plc, {site.file for site in image.sites if site.pou == "Main"}):  # as coverage does: no libraries
         return scan_us(plc, NATIVE_SCANS if engine == "native" else PYTHON_SCANS)
 
 
@@ -133,17 +133,6 @@ def scans_of_each_build(image: Image) -> None:
         listened = scan_us(plc, OBSERVED_SCANS)
     row("a scan with a listener that is told every event", f"{listened:.1f} us")
     row("  events a scan; listener / python", f"{told.events / plc.scans:.0f}; {listened / python:.1f}")
-
-
-def recorded(image: Image, scans: int) -> None:
-    plain = seconds(lambda: Plc(image).run(scans=scans))
-    share = scans / SCANS
-    for depth in Depth:
-        plc, file = Plc(image), io.BytesIO()
-        writer = TraceWriter(plc, file, depth)
-        taken = seconds(lambda plc=plc: plc.run(scans=scans)) + seconds(writer.close)
-        row(f"added by recording {scans} scans, depth {depth.value}", f"{taken - plain:.2f} s", f"<= {0.3 * share:.2g} s")
-        row("  size", f"{writer.size_bytes / 1e6:.2f} MB", f"<= {1 + 20e-6 * scans:.2f} MB")
 
 
 def paged(image: Image, scans: int) -> None:
@@ -176,7 +165,7 @@ def shown(image: Image, scans: int) -> None:
 
 
 def in_a_file(image: Image, scans: int) -> None:
-    """A run that is recorded into a file: its price, its size, and scans of it that are shown from there."""
+    """A run that is recorded into a file, the same at any depth: its price, its size, and scans that are shown from there."""
     text = ProgramText(((str(PROGRAM), PROGRAM.read_text(encoding="utf-8")),))
     for engine in ("native", "python"):
         count = scans if engine == "native" else max(LEAST_SCANS, scans // 10)
@@ -237,7 +226,6 @@ def main() -> None:
     power_us()
     shown(image, LEAST_SCANS)
     in_a_file(image, scans)
-    recorded(image, scans)
     paged(image, scans)
 
 

@@ -51,6 +51,17 @@ def test_the_memory_is_that_of_a_run_that_nobody_counts(image: Image) -> None:
     assert lines(image, counts.skipped()) == {10: 6}
 
 
+@pytest.mark.parametrize("engine", ["python", *["native"] * native.available()])
+def test_files_that_nobody_asks_for_are_not_counted(engine: str) -> None:
+    made = compile_text("PROGRAM Main VAR t : TON; n : INT; END_VAR t(IN := TRUE, PT := T#25ms); n := n + 1; END_PROGRAM").image
+    assert made is not None
+    plc, plain = Plc(made, engine=engine), Plc(made, engine=engine)
+    with counting(plc, {"text.st"}) as counts:
+        assert plc.run(scans=5) == plain.run(scans=5)
+    assert bytes(plc.memory.u8) == bytes(plain.memory.u8)
+    assert [(made.sites[site].file, count) for site, count in counts.executed().items()] == [("text.st", 5)] * 2
+
+
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
 def test_tiers_count_together(image: Image, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tiers, "STATEMENTS_TO_PAY", 20)
