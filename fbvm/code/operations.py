@@ -154,7 +154,7 @@ due        | a                      |        |             | notes time a (ns) i
 stop       | code site              |        | code        | traps
 observe    | kind site detail       |        |             | statement, rung, contact, read or write; a plain build drops it
 count      | number                 |        |             | adds 1 to a counter beside the memory; the compiler makes none
-mark       | number rows a          |        |             | stores a in a byte beside the memory, by rows of instances; likewise
+mark       | number rows a          |        |             | a (b or u8) into a byte beside the memory, by rows of instances
 """
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 from fbvm.base.types import StructType, base, fold
 from fbvm.engine.choice.tiers import forget_marks, marks_of
-from fbvm.engine.powered import UNMARKED, Element, Powered, powered
+from fbvm.engine.powered import Element, Powered, powered, state
 from fbvm.machine.instrumented import instrumented
 from fbvm.machine.plc import Plc
 from fbvm.watch.paths import Place, UnknownPlace
@@ -40,8 +40,9 @@ class Power:
         if marks is None:
             return {}
         row = marks.row(start)
-        found = marks_of(self._engine)[row:row + len(marks.elements)]
-        return {element: mark == 1 for element, mark in zip(marks.elements, found, strict=True) if mark != UNMARKED[0]}
+        found = marks_of(self._engine)[row:row + marks.marks]
+        states = {element: state(reading, found) for element, reading in marks.elements.items()}
+        return {element: known for element, known in states.items() if known is not None}
 
     def body(self, instance: str | Place) -> tuple[int, int]:
         """The body that an instance executes, and the byte at which that begins.  Raises UnknownPlace."""

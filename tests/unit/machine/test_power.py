@@ -51,6 +51,35 @@ LADDER
     OUT 100.01
 END_LADDER
 END_PROGRAM"""
+MANY = """PROGRAM Main
+VAR a, b : BOOL; END_VAR
+LADDER
+    LD W0.00
+    AND W0.01
+    AND W0.02
+    AND W0.03
+    ANDNOT W0.04
+    AND W0.05
+    OR W0.06
+    OR W0.07
+    OR W0.00
+    OUT a
+    LDNOT W0.07
+    OUT W0.06
+    LD a
+    OR b
+    LD W0.03
+    AND W0.06
+    ORLD
+    AND=(300) W1 #3
+    OUT b
+    OUTNOT W2.00
+    LD b
+    AND W2.00
+    SET W0.03
+END_LADDER
+END_PROGRAM"""
+"""All bits of a byte, one of them twice, one that a rung writes between two that read it, and a comparison."""
 ENGINES = ["python", pytest.param("native", marks=pytest.mark.skipif(not native.available(), reason="llvmlite is not installed"))]
 INSTANCES = ["Main", "Main.pumps[0]", "Main.pumps[1]", "Main.pumps[2]", "Main.single"]
 
@@ -103,6 +132,21 @@ def test_it_is_what_the_recorder_sees(engine: str) -> None:
             assert known(power, INSTANCES) == seen.states
             assert bool(power.elements("Main.single")) == (scan in (1, 2, 3))
     assert bytes(plc.memory.u8) == bytes(observed.memory.u8)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_contacts_that_share_a_byte_are_told_apart(engine: str) -> None:
+    made = image(MANY)
+    plc, observed, seen = Plc(made, engine=engine), Plc(made, engine="python"), Seen()
+    with powering(plc) as power, observing(observed, seen):
+        for scan, word in enumerate([0, 0xFF, 0x2F, 0x3F, 0x40, 0x80, 0xC9, 0x10, 0x08]):
+            for one in (plc, observed):
+                one.write("W0", word)
+                one.write("W1", scan % 4)
+                one.scan()
+            assert known(power, ["Main"]) == seen.states
+    marks = powered(made).bodies[power.body("Main")[0]]
+    assert (marks.marks, len(marks.elements)) == (11, 22)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -236,7 +236,7 @@ def _mark(w: Writer, number: int, rows: tuple[int, ...], a: Node) -> None:
         row = w.new(f"udiv i64 {away}, {size}")
         known = w.new(f"select i1 {w.new(f'icmp ult i64 {row}, {count}')}, i64 {row}, i64 0")
         index = w.new(f"add i64 {w.new(f'mul i64 {known}, {marks}')}, {index}")
-    value = w.new(f"zext i1 {w.value(a)} to i8")
+    value = w.value(a) if a[1] == "u8" else w.new(f"zext i1 {w.value(a)} to i8")
     w.emit(f"store i8 {value}, ptr {w.new(f'getelementptr inbounds i8, ptr %c, i64 {index}')}, align 1")
 
 
