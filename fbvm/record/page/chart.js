@@ -19,7 +19,7 @@ class Chart {
     this.shown = [];
     this.old = new Set();
     this.scroll.addEventListener("scroll", () => this.move({}));
-    new ResizeObserver(() => this.draw()).observe(this.scroll);
+    new ResizeObserver(() => { if (this.drawn !== this.size) this.draw(); }).observe(this.scroll);  // it calls once at the beginning
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     this.fingers = new Map();
     this.canvas.addEventListener("pointerdown", event => this.down(event));
@@ -28,6 +28,7 @@ class Chart {
     this.canvas.addEventListener("wheel", event => this.wheel(event), {passive: false});
   }
 
+  get size() { return `${this.scroll.clientWidth} x ${this.scroll.clientHeight}`; }
   get left() { return this.labels.offsetWidth; }
   get width() { return Math.max(50, this.scroll.clientWidth - this.left); }
   get scale() { return this.width / this.state.span; }
@@ -103,6 +104,7 @@ class Chart {
   draw() {
     const wide = this.scroll.clientWidth, high = this.scroll.clientHeight, dots = devicePixelRatio || 1;
     if (!wide || !high) return false;
+    this.drawn = this.size;
     this.canvas.style.height = `${high}px`;
     this.canvas.style.marginBottom = `${-high}px`;
     if (this.canvas.width !== Math.round(wide * dots) || this.canvas.height !== Math.round(high * dots)) {

@@ -17,7 +17,7 @@ function start(data, bytes) {
   const panels = {scan: new ScanPanel(run, state, move), memory: new MemoryPanel(run, state, move),
                   frames: new FramesPanel(run, state, move)};
   const where = document.getElementById("where");
-  let waiting = false, choose = true, shown = null, naming = 0, took = 0;
+  let waiting = 0, choose = true, shown = null, naming = 0, took = 0;
 
   /** Changes the state and has everything drawn anew with the next picture. */
   function move(change) {
@@ -32,13 +32,13 @@ function start(data, bytes) {
     state.start = Math.min(Math.max(state.start, run.first), Math.max(run.first, run.last + 1 - state.span));
     choose ||= state.filter !== before.filter || state.moving !== before.moving
       || state.moving && (state.start !== before.start || state.span !== before.span);
-    if (!waiting) requestAnimationFrame(draw);
-    waiting = true;
+    waiting ||= requestAnimationFrame(draw);
   }
 
   function draw() {
     const begun = performance.now();
-    waiting = false;
+    cancelAnimationFrame(waiting);
+    waiting = 0;
     if (choose) chart.choose();
     const moved = choose || shown !== `${state.scan} ${state.row} ${state.chosen}`, later = chart.values(moved), isRough = chart.draw();
     choose = false;
