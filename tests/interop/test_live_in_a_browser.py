@@ -202,6 +202,18 @@ def test_read_only_pages_only_look(live: Any) -> None:
     assert level.get_by_role("button", name="Write once").is_disabled() and page.locator("#pause").is_disabled()
 
 
+def test_what_is_typed_before_there_is_a_connection_is_searched_when_there_is_one(live: Any) -> None:
+    run = live("--paused")
+    page = run.window("about:blank")
+    page.add_init_script("""addEventListener("DOMContentLoaded", () => {
+        document.getElementById("find").value = "Main.Level";
+        document.getElementById("find").dispatchEvent(new Event("input"));
+    })""")
+    page.goto(run.url)
+    page.locator("#found button", has_text="Main.Level").wait_for(timeout=10_000)
+    assert run.complaints == []
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1400, "dark"), (2560, "light")])
 def test_no_panel_is_wider_than_the_window(live: Any, width: int, scheme: str) -> None:
     page = live().window(viewport={"width": width, "height": 900}, color_scheme=scheme)

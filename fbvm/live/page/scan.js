@@ -43,6 +43,7 @@ export class ScanTools {
     at("others").hidden = !about.futures.length;
     at("future").replaceChildren(new Option("this one", "-1"), ...about.futures.map((name, number) => new Option(name, String(number))));
     at("test").hidden = !about.tests;
+    at("test").disabled = false;
   }
 
   update(update, state) {

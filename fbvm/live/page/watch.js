@@ -30,6 +30,7 @@ export class WatchPanel {
   begin(plc) {
     this.list = remembered(`watch.${plc.name}`, []).map(String);
     this.build();
+    if (at("find").value.trim()) this.search(); // typed before there was a connection, or for another PLC
   }
 
   names() {
