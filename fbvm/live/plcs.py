@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
@@ -22,6 +23,17 @@ from fbvm.wire.tap import TapEvent
 MOST_PACKETS = 2000
 """Frames that are kept of a PLC, the latest ones."""
 MOST_CAPTURE_BYTES = 2 << 20
+
+
+@dataclass
+class Traffic:
+    """What has passed between two addresses: how many frames, and the last of them with its scan."""
+
+    one: str
+    other: str
+    frames: int = 0
+    scan: int = 0
+    info: str = ""
 
 
 class LivePlc:
@@ -46,6 +58,8 @@ class LivePlc:
         """Number, scan and content of frames; numbers count on."""
         self.frames = 0
         self._events: deque[tuple[int, int, str, TapEvent]] = deque(maxlen=MOST_PACKETS)
+        self.traffic: dict[str, Traffic] = {}
+        """What has passed between the units of this PLC and others, by the two addresses."""
         self._addresses = {attached.unit.address for attached in plc.units}
         self._dissector = Dissector()
         for network in {id(attached.network): attached.network for attached in plc.units}.values():
@@ -60,6 +74,11 @@ class LivePlc:
     def is_real(self) -> bool:
         """True if the PLC has real connections, and so real time."""
         return not all(attached.network.virtual_time for attached in self.plc.units)
+
+    def state(self, is_paused: bool) -> str:
+        """How the PLC goes on, as pages name it."""
+        plc = self.plc
+        return "trap" if plc.trap else "halt" if plc.halted else "ended" if self.ended() else "pause" if is_paused else "run"
 
     def before_scan(self) -> None:
         """Observes the next scan if somebody wants to see inside."""
@@ -111,5 +130,8 @@ class LivePlc:
         if unit in self._addresses:
             self._events.append((self.plc.scans, now_ns, unit, event))
             for packet in self._dissector.dissect(now_ns, event):
+                one, other = sorted((packet.source.host, packet.destination.host))
+                known = self.traffic.setdefault(f"{one} {other}", Traffic(one, other))
+                known.frames, known.scan, known.info = known.frames + 1, self.plc.scans, packet.info
                 self.packets.append((self.frames, self.plc.scans, packet))
                 self.frames += 1

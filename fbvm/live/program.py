@@ -4,7 +4,7 @@ executed in one scan."""
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -131,8 +131,8 @@ class ScanView:
         if isinstance(event, Statement):
             self._executed.setdefault(event.frame.base, set()).add(event.site)
 
-    def of(self, instance: str) -> dict[str, Any]:
-        """What an instance did: numbers of the executed lines, and pictures with their headlines."""
+    def steps_of(self, instance: str) -> Generator[None, None, dict[str, Any]]:
+        """What an instance did: numbers of the executed lines, and pictures with their headlines.  Drawn in short steps."""
         bases = {base for base in self._executed if self._names.instance(base).upper() == instance.upper()}
         lines = {self._image.sites[site].line for base in bases for site in self._executed[base]}
         pictures: dict[int, tuple[str, str]] = {}
@@ -141,10 +141,12 @@ class ScanView:
                 key = (made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items()),
                        *sorted(made.values.items(), key=repr))  # fmt: skip
                 pictures[made.picture.site] = self._picture(key, partial(self._rung, made))
+                yield
         for called in self._charts.calls:
             if self._names.instance(called.base).upper() == instance.upper() and len(pictures) < MOST_PICTURES:
                 key = called.picture.site, tuple(sorted(called.tested.items())), called.active
                 pictures[called.picture.site] = self._picture(key, partial(_chart, called))
+                yield
         return {"scan": self.scan, "executed": sorted(lines), "pictures": [list(pictures[site]) for site in sorted(pictures)]}
 
     def _picture(self, key: tuple[object, ...], draw: Callable[[], tuple[str, str]]) -> tuple[str, str]:

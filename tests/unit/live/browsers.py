@@ -9,8 +9,9 @@ from fbvm import LoopNetwork, ModbusPeer, Peer, Plc, Recording, compile_text
 from fbvm.live.connection import Connection
 from fbvm.live.guard import Guard
 from fbvm.live.plcs import LivePlc
-from fbvm.live.session import UPDATE_NS, Session
+from fbvm.live.session import Session
 from fbvm.live.stops import forget_statement
+from fbvm.live.updates import UPDATE_NS
 from fbvm.live.workbench import Workbench
 from fbvm.machine.backplane import usual_units
 from fbvm.run.interactive import Control
@@ -97,7 +98,9 @@ class Page:
 
     def ask(self, do: str, **fields: Any) -> dict[str, Any]:
         """The whole reply."""
-        reply: dict[str, Any] = json.loads(self.session.answer(json.dumps({"id": 1, "do": do, **fields})))
+        text = self.session.answer(json.dumps({"id": 1, "do": do, **fields})) or self.session.update(self.now_ns)
+        assert text is not None
+        reply: dict[str, Any] = json.loads(text)
         return reply
 
     def done(self, do: str, **fields: Any) -> dict[str, Any]:

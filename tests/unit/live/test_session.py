@@ -11,7 +11,7 @@ from browsers import Page
 from fbvm.live.futures import Future, run_again
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
-from fbvm.live.session import UPDATE_NS
+from fbvm.live.updates import UPDATE_NS
 from fbvm.run.running import Running
 
 
