@@ -53,11 +53,19 @@ class LiveHost:
         if now_ns - self._ticked_ns >= UPDATE_NS:
             self._ticked_ns = now_ns
             self._tick()
+            self._end_unseen_power()
             self._ticks += 1
             if self._ticks % LOOK_TICKS == 0:
                 for looked_at in (self.workbench.changes, self.workbench.pictures, self.workbench.groups):
                     if looked_at:
                         looked_at.look()
+
+    def _end_unseen_power(self) -> None:
+        """Lets machine code note power only where a page shows rungs, and nobody else has the PLCs."""
+        seen = {session.live for session in self.server.sessions if session.shows_inside and not self.workbench.held_by}
+        for live in self._plcs:
+            if live not in seen:
+                live.end_power()
 
     def close(self) -> None:
         """Ends all connections."""

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
-from fbvm.live.program import Drawn, ScanView, instances
+from fbvm.live.program import Drawn, PowerView, ScanView, instances
 from fbvm.machine.plc import Plc
+from fbvm.machine.power import Power, powering
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.recording.recording import PlcRecording
 from fbvm.record.recording.scans import RecordedScans
@@ -18,6 +19,7 @@ from fbvm.record.trace.observing import observing
 from fbvm.record.trace.packets import Dissector, Packet, add_tap
 from fbvm.record.trace.writer import descriptions, meanings, source_lines
 from fbvm.watch.names import Names
+from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.tap import TapEvent
 
 MOST_PACKETS = 2000
@@ -54,6 +56,9 @@ class LivePlc:
         self.wants_view = False
         """True if the next scan is to be observed."""
         self._observing = ExitStack()
+        self._powering = ExitStack()
+        self.power: Power | None = None
+        """The power in rungs and charts as machine code notes it; None while it does not."""
         self.packets: deque[tuple[int, int, Packet]] = deque(maxlen=MOST_PACKETS)
         """Number, scan and content of frames; numbers count on."""
         self.frames = 0
@@ -67,8 +72,24 @@ class LivePlc:
 
     def wish_view(self, is_paused: bool) -> None:
         """Has the next scan observed.  With real connections only while the run is paused and goes scan by scan: Python alone
-        observes, which would take time from the peers."""
+        observes, which would take time from the peers; else machine code notes the power in rungs."""
         self.wants_view = is_paused or not self.is_real
+        has_power = bool(self.plc.image.rungs or self.plc.image.charts)
+        if not self.wants_view and has_power and self.power is None and not self.plc.breakpoints.armed:
+            self.power = self._powering.enter_context(powering(self.plc))
+
+    def end_power(self) -> None:
+        """Machine code notes power no longer: nobody looks, or somebody else looks into scans."""
+        if self.power is not None:
+            self.power = None
+            self._powering.close()
+
+    def view_of(self, instance: str) -> ScanView | PowerView | None:
+        """What is known of the inside of the last scans of an instance; None for nothing yet."""
+        try:
+            return PowerView(self.plc, self.power, instance, self._drawn) if self.power else self.view
+        except UnknownPlace:  # the page of another program
+            return None
 
     @property
     def is_real(self) -> bool:
@@ -82,6 +103,8 @@ class LivePlc:
 
     def before_scan(self) -> None:
         """Observes the next scan if somebody wants to see inside."""
+        if self.wants_view or self.plc.breakpoints.armed:
+            self.end_power()
         if self.wants_view and not self.plc.trap and not self.plc.breakpoints.armed:
             self.wants_view = False
             view = ScanView(self.plc.image, self.plc.memory.areas, self.names, self._drawn)

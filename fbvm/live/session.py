@@ -106,6 +106,16 @@ class Session:
                 return None
         return self._updates.next(now_ns, is_late)
 
+    @property
+    def live(self) -> LivePlc:
+        """The PLC that the page looks at."""
+        return self._seen.live
+
+    @property
+    def shows_inside(self) -> bool:
+        """True if the page shows rungs and charts of the present."""
+        return bool(self._seen.instance) and not self._seen.past
+
     def begin_again(self) -> None:
         """Tells the page, which was in the session before this one, that other PLCs run now: it says hello once more."""
         self._updates.begins_again = self._updates.is_ready = True

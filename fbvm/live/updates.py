@@ -13,6 +13,7 @@ from fbvm.base.memory import Memory
 from fbvm.live.look import Look
 from fbvm.live.messages import dump
 from fbvm.live.plcs import LivePlc
+from fbvm.live.program import PowerView, ScanView
 from fbvm.live.stops import halt_row, shown_breakpoints
 from fbvm.live.workbench import Workbench, fault_rows
 from fbvm.watch import places
@@ -27,8 +28,8 @@ MOST_SHOWN = 300
 """Characters of a value; what is longer is cut."""
 MEMORY_WORDS = 200
 """Words that the memory panel shows at once."""
-STEP = 16
-"""Values that are read and written out in one step: about a tenth of a millisecond."""
+STEP = 8
+"""Values that are read and written out in one step: less than a tenth of a millisecond."""
 ACTS = 100
 MOST_LINKS = 200
 """Pairs of addresses between which the plant shows what has passed."""
@@ -103,9 +104,10 @@ class Updates:
             for live, _ in self._bench.pictures.places.values():
                 if live.name not in seen:
                     self._copy(live)
+        view = look.past_view if look.past else look.live.view_of(look.instance) if look.instance else None
         made = {**self._state(), **self._small_panels(now_ns)}
         yield
-        yield from self._panels(made)
+        yield from self._panels(made, view)
         changed = {name: value for name, value in made.items() if self._is_new(name, value)}
         yield
         values: dict[str, str] = {}
@@ -166,7 +168,7 @@ class Updates:
         """What is worked out in no time."""
         look, bench, made = self._look, self._bench, dict[str, Any]()
         live = look.live
-        if look.instance and not look.past and now_ns - self._viewed_ns >= VIEW_NS:
+        if look.instance and not look.past and not bench.held_by and now_ns - self._viewed_ns >= VIEW_NS:
             self._viewed_ns = now_ns
             live.wish_view(bench.control.is_paused)
         if look.memory:
@@ -192,13 +194,11 @@ class Updates:
             self.acts = len(bench.acts)
         return made
 
-    def _panels(self, made: dict[str, Any]) -> Steps:
+    def _panels(self, made: dict[str, Any], view: ScanView | PowerView | None) -> Steps:
         """What takes longer."""
         look = self._look
-        if look.instance:
-            view = look.past_view if look.past else look.live.view
-            if view is not None:
-                made["inside"] = yield from view.steps_of(look.instance)
+        if look.instance and view:
+            made["inside"] = yield from view.steps_of(look.instance)
         if look.units:
             made["units"] = []
             for attached in list(look.live.plc.units):

@@ -29,6 +29,9 @@ from fbvm.run.plant import Plant
 from fbvm.run.project import PlcRow, Project
 from fbvm.run.running import Running
 
+GROUPS_FILE = "watch.toml"
+"""Beside the file of a project; beside a program with its name in front: pump.watch.toml."""
+
 
 @dataclass
 class SeenPlc:
@@ -57,6 +60,10 @@ class Origin(Protocol):
     def files(self) -> Sequence[Path]:
         """The files whose change makes another program; none for a program that is not begun again."""
 
+    @property
+    def groups_file(self) -> Path | None:
+        """Where groups of watched names are kept; None if nowhere."""
+
     def matters(self, changed: Sequence[Path]) -> bool:
         """True if these changed files make another program."""
 
@@ -76,6 +83,7 @@ class BuiltOrigin:
 
     built: Built
     files: Sequence[Path] = ()
+    groups_file: Path | None = None
 
     def matters(self, changed: Sequence[Path]) -> bool:
         return False
@@ -108,6 +116,10 @@ class FileOrigin:
     @property
     def files(self) -> Sequence[Path]:
         return self.given
+
+    @property
+    def groups_file(self) -> Path:
+        return self.given[0].with_name(f"{self.given[0].stem}.{GROUPS_FILE}")
 
     def matters(self, changed: Sequence[Path]) -> bool:
         return bool(changed)
@@ -152,6 +164,10 @@ class ProjectOrigin:
     def files(self) -> Sequence[Path]:
         rows = self.project.plcs if self.project else ()
         return [self.file, *(source for row in rows for source in row.sources)]
+
+    @property
+    def groups_file(self) -> Path:
+        return self.file.with_name(GROUPS_FILE)
 
     def matters(self, changed: Sequence[Path]) -> bool:
         if any(file != self.file for file in changed) or self.project is None:
