@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from io import BytesIO
@@ -42,7 +42,9 @@ class LivePlc:
     """A PLC under the name that pages know, with `texts`, its sources by name, and its recording."""
 
     def __init__(self, name: str, plc: Plc, recorded: PlcRecording, texts: Mapping[str, str],
-                 ended: Callable[[], bool] = lambda: False) -> None:  # fmt: skip
+                 ended: Callable[[], bool] = lambda: False, watch: Sequence[str] = ()) -> None:  # fmt: skip
+        self.watch = watch
+        """Names that a page watches at first."""
         self.ended = ended
         """True when the run has come to the end that was said for it."""
         self.name, self.plc, self.recorded, self.texts = name, plc, recorded, texts

@@ -139,7 +139,7 @@ class Session:
             "lesson": bench.lesson.about() if bench.lesson else None,
             "pictures": bench.pictures is not None and bool(bench.pictures.shown), "groups": bench.groups is not None,
             "modes": [mode.value for mode in Mode], "faults": {name: kind.meaning for name, kind in NAMED.items()},
-            "plcs": [{"name": live.name, "cycle": live.plc.cycle_ns, "instances": live.instances,
+            "plcs": [{"name": live.name, "cycle": live.plc.cycle_ns, "watch": list(live.watch), "instances": live.instances,
                       "areas": {name: area.size_bytes // 2 for name, area in live.plc.memory.areas.items()
                                 if area.unit_bits == 16 and name not in FLAG_AREAS},
                       "units": [attached.unit.name for attached in live.plc.units]} for live in bench.plcs.values()],

@@ -2,7 +2,7 @@
 
 import { at, options, save } from "/dom.js";
 
-const NAMES = { run: "running", pause: "paused", past: "in the past", trap: "stopped by a trap", halt: "inside a scan", ended: "at its end" };
+export const NAMES = { run: "running", pause: "paused", past: "in the past", trap: "stopped by a trap", halt: "inside a scan", ended: "at its end" };
 
 export class ScanTools {
   constructor(page) {

@@ -40,6 +40,8 @@ class SeenPlc:
     plc: Plc
     texts: dict[str, str]
     text: ProgramText
+    watch: tuple[str, ...] = ()
+    """What a page watches at first."""
 
 
 @dataclass
@@ -218,7 +220,7 @@ class ProjectOrigin:
             texts = source_texts(kind.runs[0].plc.image, own, row.libraries)
             text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect)
             for name, run in zip(kind.names, kind.runs, strict=True):
-                plcs[name] = SeenPlc(run.plc, texts, text)
+                plcs[name] = SeenPlc(run.plc, texts, text, tuple(row.watch))
         return Built(plcs, [self.bound(run) for run in plant.runs], plant.close)
 
 

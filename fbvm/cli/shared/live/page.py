@@ -208,7 +208,7 @@ class _Page:
         for (name, seen), run in zip(self.built.plcs.items(), self.built.runs, strict=True):
             told = Described(seen.text, source_lines(seen.plc.image, seen.texts))
             recorded = self._recording.add(self._segment(name), seen.plc, told)
-            lives.append(LivePlc(name, seen.plc, recorded, seen.texts, partial(_has_ended, run)))
+            lives.append(LivePlc(name, seen.plc, recorded, seen.texts, partial(_has_ended, run), seen.watch))
         test = None
         if self.built.repeated:
             files, program = self.built.repeated
