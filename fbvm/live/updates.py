@@ -51,7 +51,7 @@ class Updates:
         self.frames = self.acts = 0
         """Frames and acts that the page has been told."""
         self._work: Generator[None, None, str | None] | None = None
-        self._copies: dict[str, Memory] = {}
+        self._copies: dict[LivePlc, Memory] = {}
 
     @property
     def is_under_way(self) -> bool:
@@ -97,13 +97,9 @@ class Updates:
 
     def _steps(self, now_ns: int) -> Generator[None, None, str | None]:
         look = self._look
-        seen = {live.name: live for live, _ in look.names.values()} | {look.live.name: look.live}
-        for live in seen.values():
+        pictures = self._bench.pictures.places if look.pictures and self._bench.pictures else {}
+        for live in {look.live, *(live for live, _ in (*look.names.values(), *pictures.values()))}:
             self._copy(live)
-        if look.pictures and self._bench.pictures:
-            for live, _ in self._bench.pictures.places.values():
-                if live.name not in seen:
-                    self._copy(live)
         view = look.past_view if look.past else look.live.view_of(look.instance) if look.instance else None
         made = {**self._state(), **self._small_panels(now_ns)}
         yield
@@ -127,14 +123,14 @@ class Updates:
     def _copy(self, live: LivePlc) -> None:
         """Keeps the memory of a PLC as it is now."""
         memory = live.plc.memory
-        copy = self._copies.get(live.name)
+        copy = self._copies.get(live)
         if copy is None or copy.size != memory.size:
-            copy = self._copies[live.name] = Memory(memory.size, memory.areas)
+            copy = self._copies[live] = Memory(memory.size, memory.areas)
         copy.u8[:] = memory.u8
 
     def _memory(self, live: LivePlc) -> Memory:
         """The memory of a PLC at the moment of the update, or as it was."""
-        return self._look.seen.memory if self._look.past and live is self._look.live else self._copies[live.name]
+        return self._look.seen.memory if self._look.past and live is self._look.live else self._copies[live]
 
     def _read(self, live: LivePlc, place: Place | Span) -> Value:
         return places.read_found(self._memory(live), place)
@@ -207,7 +203,7 @@ class Updates:
         if look.pictures and pictures:
             made["pictures"], made["picture"] = pictures.shown, {}
             for number, (key, (live, place)) in enumerate(list(pictures.places.items())):
-                if live.name in self._copies:
+                if live in self._copies:
                     made["picture"][key] = show(place.type, self._value(live, place), place.hexadecimal)
                 if number % STEP == STEP - 1:
                     yield
