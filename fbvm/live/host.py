@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fbvm.live.session import UPDATE_NS, Session
+from fbvm.live.session import Session
 from fbvm.live.sockets import LiveServer
 from fbvm.live.stops import forget_statement
+from fbvm.live.updates import UPDATE_NS
 from fbvm.live.workbench import Workbench
 
 LOOK_TICKS = 3
@@ -36,7 +37,7 @@ class LiveHost:
     def serve(self, wait_ns: int) -> bool:
         if self.workbench.changes:
             self.workbench.changes.step()
-        return self.server.serve(wait_ns)
+        return self.server.serve(0 if self.server.is_behind else wait_ns)
 
     def before_scan(self, number: int, now_ns: int) -> None:
         self._plcs[number].before_scan()
@@ -47,16 +48,24 @@ class LiveHost:
         if live.plc.halted:
             forget_statement(live)
 
-    def update(self, now_ns: int) -> None:
-        self.server.update(now_ns)
+    def update(self, now_ns: int, is_late: Callable[[], bool]) -> None:
+        self.server.update(now_ns, is_late)
         if now_ns - self._ticked_ns >= UPDATE_NS:
             self._ticked_ns = now_ns
             self._tick()
+            self._end_unseen_power()
             self._ticks += 1
             if self._ticks % LOOK_TICKS == 0:
-                for looked_at in (self.workbench.changes, self.workbench.pictures):
+                for looked_at in (self.workbench.changes, self.workbench.pictures, self.workbench.groups):
                     if looked_at:
                         looked_at.look()
+
+    def _end_unseen_power(self) -> None:
+        """Lets machine code note power only where a page shows rungs, and nobody else has the PLCs."""
+        seen = {session.live for session in self.server.sessions if session.shows_inside and not self.workbench.held_by}
+        for live in self._plcs:
+            if live not in seen:
+                live.end_power()
 
     def close(self) -> None:
         """Ends all connections."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from fbvm.live.plcs import LivePlc
 from fbvm.run.picture_rows import Binding, Picture
 from fbvm.watch.names import is_single
 from fbvm.watch.paths import Place, UnknownPlace
-from fbvm.watch.values import show
 
 Places = dict[str, tuple[LivePlc, Place]]
 """What is shown, by `key`."""
@@ -85,11 +84,6 @@ class Pictures:
             return f"{binding.element}: {binding.name} is {place.type.name}; only a BOOL is clicked by {binding.click}"
         self.places[key(binding)] = live, place
         return ""
-
-    def values(self, past: LivePlc | None, read: Callable[[Place], Any]) -> Iterator[tuple[str, str]]:
-        """The values as literals, by `key`; those of the PLC `past`, at which the page looks back, come from `read`."""
-        for name, (live, place) in self.places.items():
-            yield name, show(place.type, live.names.read(live.plc.read if live is not past else read, place), place.hexadecimal)
 
 
 def key(binding: Binding) -> str:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
-from fbvm.live.program import Drawn, ScanView, instances
+from fbvm.live.program import Drawn, PowerView, ScanView, instances
 from fbvm.machine.plc import Plc
+from fbvm.machine.power import Power, powering
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.recording.recording import PlcRecording
 from fbvm.record.recording.scans import RecordedScans
@@ -17,6 +19,7 @@ from fbvm.record.trace.observing import observing
 from fbvm.record.trace.packets import Dissector, Packet, add_tap
 from fbvm.record.trace.writer import descriptions, meanings, source_lines
 from fbvm.watch.names import Names
+from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.tap import TapEvent
 
 MOST_PACKETS = 2000
@@ -24,11 +27,24 @@ MOST_PACKETS = 2000
 MOST_CAPTURE_BYTES = 2 << 20
 
 
+@dataclass
+class Traffic:
+    """What has passed between two addresses: how many frames, and the last of them with its scan."""
+
+    one: str
+    other: str
+    frames: int = 0
+    scan: int = 0
+    info: str = ""
+
+
 class LivePlc:
     """A PLC under the name that pages know, with `texts`, its sources by name, and its recording."""
 
     def __init__(self, name: str, plc: Plc, recorded: PlcRecording, texts: Mapping[str, str],
-                 ended: Callable[[], bool] = lambda: False) -> None:  # fmt: skip
+                 ended: Callable[[], bool] = lambda: False, watch: Sequence[str] = ()) -> None:  # fmt: skip
+        self.watch = watch
+        """Names that a page watches at first."""
         self.ended = ended
         """True when the run has come to the end that was said for it."""
         self.name, self.plc, self.recorded, self.texts = name, plc, recorded, texts
@@ -42,10 +58,15 @@ class LivePlc:
         self.wants_view = False
         """True if the next scan is to be observed."""
         self._observing = ExitStack()
+        self._powering = ExitStack()
+        self.power: Power | None = None
+        """The power in rungs and charts as machine code notes it; None while it does not."""
         self.packets: deque[tuple[int, int, Packet]] = deque(maxlen=MOST_PACKETS)
         """Number, scan and content of frames; numbers count on."""
         self.frames = 0
         self._events: deque[tuple[int, int, str, TapEvent]] = deque(maxlen=MOST_PACKETS)
+        self.traffic: dict[str, Traffic] = {}
+        """What has passed between the units of this PLC and others, by the two addresses."""
         self._addresses = {attached.unit.address for attached in plc.units}
         self._dissector = Dissector()
         for network in {id(attached.network): attached.network for attached in plc.units}.values():
@@ -53,16 +74,39 @@ class LivePlc:
 
     def wish_view(self, is_paused: bool) -> None:
         """Has the next scan observed.  With real connections only while the run is paused and goes scan by scan: Python alone
-        observes, which would take time from the peers."""
+        observes, which would take time from the peers; else machine code notes the power in rungs."""
         self.wants_view = is_paused or not self.is_real
+        has_power = bool(self.plc.image.rungs or self.plc.image.charts)
+        if not self.wants_view and has_power and self.power is None and not self.plc.breakpoints.armed:
+            self.power = self._powering.enter_context(powering(self.plc))
+
+    def end_power(self) -> None:
+        """Machine code notes power no longer: nobody looks, or somebody else looks into scans."""
+        if self.power is not None:
+            self.power = None
+            self._powering.close()
+
+    def view_of(self, instance: str) -> ScanView | PowerView | None:
+        """What is known of the inside of the last scans of an instance; None for nothing yet."""
+        try:
+            return PowerView(self.plc, self.power, instance, self._drawn) if self.power else self.view
+        except UnknownPlace:  # the page of another program
+            return None
 
     @property
     def is_real(self) -> bool:
         """True if the PLC has real connections, and so real time."""
         return not all(attached.network.virtual_time for attached in self.plc.units)
 
+    def state(self, is_paused: bool) -> str:
+        """How the PLC goes on, as pages name it."""
+        plc = self.plc
+        return "trap" if plc.trap else "halt" if plc.halted else "ended" if self.ended() else "pause" if is_paused else "run"
+
     def before_scan(self) -> None:
         """Observes the next scan if somebody wants to see inside."""
+        if self.wants_view or self.plc.breakpoints.armed:
+            self.end_power()
         if self.wants_view and not self.plc.trap and not self.plc.breakpoints.armed:
             self.wants_view = False
             view = ScanView(self.plc.image, self.plc.memory.areas, self.names, self._drawn)
@@ -111,5 +155,8 @@ class LivePlc:
         if unit in self._addresses:
             self._events.append((self.plc.scans, now_ns, unit, event))
             for packet in self._dissector.dissect(now_ns, event):
+                one, other = sorted((packet.source.host, packet.destination.host))
+                known = self.traffic.setdefault(f"{one} {other}", Traffic(one, other))
+                known.frames, known.scan, known.info = known.frames + 1, self.plc.scans, packet.info
                 self.packets.append((self.frames, self.plc.scans, packet))
                 self.frames += 1

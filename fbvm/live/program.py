@@ -4,21 +4,23 @@ executed in one scan."""
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from fbvm.base.types import ArrayType, Field, StructType
+from fbvm.base.types import BOOL, ArrayType, Field, StructType, base
 from fbvm.code.image import Image
-from fbvm.machine.plc import Phase
+from fbvm.machine.plc import Phase, Plc
+from fbvm.machine.power import Power
 from fbvm.record.draw.ladder_svg import rung_svg
 from fbvm.record.draw.ladder_text import ladder_surface
-from fbvm.record.draw.power import PowerFlow, RungExecution
+from fbvm.record.draw.power import PowerFlow, RungExecution, latest_execution
 from fbvm.record.draw.rung_values import RungValues
-from fbvm.record.draw.sfc_recorder import ChartCall, ChartRecorder
+from fbvm.record.draw.sfc_recorder import ChartCall, ChartRecorder, active_steps
 from fbvm.record.draw.sfc_text import sfc_surface
 from fbvm.record.draw.table import ScanState
 from fbvm.record.trace.events import Event, Statement
+from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place, UnknownPlace, find
@@ -110,7 +112,7 @@ class ScanView:
     """A listener for one scan: which lines each instance executed, and its rungs and charts with power, as SVG."""
 
     def __init__(self, image: Image, areas: Any, names: Names, drawn: Drawn) -> None:
-        self._image, self._names, self._drawn = image, names, drawn
+        self._image, self._names, self._drawn = image, names, Drawings(drawn)
         self._values = RungValues(image, areas)
         self._power = PowerFlow(image.rungs, lambda scan: True, self._values.keep)
         self._charts = ChartRecorder(image.charts, lambda scan: True)
@@ -131,8 +133,8 @@ class ScanView:
         if isinstance(event, Statement):
             self._executed.setdefault(event.frame.base, set()).add(event.site)
 
-    def of(self, instance: str) -> dict[str, Any]:
-        """What an instance did: numbers of the executed lines, and pictures with their headlines."""
+    def steps_of(self, instance: str) -> Generator[None, None, dict[str, Any]]:
+        """What an instance did: numbers of the executed lines, and pictures with their headlines.  Drawn in short steps."""
         bases = {base for base in self._executed if self._names.instance(base).upper() == instance.upper()}
         lines = {self._image.sites[site].line for base in bases for site in self._executed[base]}
         pictures: dict[int, tuple[str, str]] = {}
@@ -140,24 +142,82 @@ class ScanView:
             if self._names.instance(made.base).upper() == instance.upper() and len(pictures) < MOST_PICTURES:
                 key = (made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items()),
                        *sorted(made.values.items(), key=repr))  # fmt: skip
-                pictures[made.picture.site] = self._picture(key, partial(self._rung, made))
+                pictures[made.picture.site] = self._drawn.picture(key, partial(_rung, made, self._values.of(made)))
+                yield
         for called in self._charts.calls:
             if self._names.instance(called.base).upper() == instance.upper() and len(pictures) < MOST_PICTURES:
                 key = called.picture.site, tuple(sorted(called.tested.items())), called.active
-                pictures[called.picture.site] = self._picture(key, partial(_chart, called))
+                pictures[called.picture.site] = self._drawn.picture(key, partial(_chart, called))
+                yield
         return {"scan": self.scan, "executed": sorted(lines), "pictures": [list(pictures[site]) for site in sorted(pictures)]}
 
-    def _picture(self, key: tuple[object, ...], draw: Callable[[], tuple[str, str]]) -> tuple[str, str]:
-        """A drawing, made once for the same states and values."""
+
+class PowerView:
+    """The rungs and charts of one instance as machine code has noted them at their latest evaluation, with the values at the end
+    of the last scan; which lines were executed is not known."""
+
+    def __init__(self, plc: Plc, power: Power, instance: str, drawn: Drawn) -> None:
+        self._drawn, self.scan = Drawings(drawn), plc.scans - 1
+        body, start = power.body(instance)
+        elements = power.elements(instance)
+        rungs = [latest_execution(rung, start, self.scan, elements) for rung in plc.image.rungs if rung.body == body]
+        self._rungs = [(made, _values_now(plc, made, instance)) for made in rungs[:MOST_PICTURES] if made]
+        by_site = {site: value for (site, _), value in elements.items()}
+        self._charts = [
+            ChartCall(self.scan, start, chart, {number: by_site[row[0]] for number, row in enumerate(chart.transitions)
+                                               if row[0] in by_site}, active_steps(chart, start, plc))
+            for chart in plc.image.charts if chart.body == body
+        ]  # fmt: skip
+
+    def steps_of(self, instance: str) -> Generator[None, None, dict[str, Any]]:
+        """As `ScanView.steps_of`, of the instance of this view."""
+        pictures: list[list[str]] = []
+        for made, values in self._rungs:
+            key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items()), *values.items()
+            draw = partial(_rung, made, lambda step, operand, found=values: found.get((step, operand), ""))  # type: ignore[misc]
+            pictures.append([*self._drawn.picture(key, draw)])
+            yield
+        for called in self._charts:
+            key = called.picture.site, tuple(sorted(called.tested.items())), called.active
+            pictures.append([*self._drawn.picture(key, partial(_chart, called))])
+            yield
+        return {"scan": self.scan, "executed": [], "pictures": pictures}
+
+
+def _values_now(plc: Plc, made: RungExecution, instance: str) -> dict[tuple[int, str], str]:
+    """The values of the operands of a rung that are no bits, by step and operand."""
+    found = {}
+    for step, (_, _, _, operands) in enumerate(made.picture.steps):
+        for operand in operands:
+            for path in (f"{instance}.{operand}", operand.lstrip("%")):
+                try:
+                    place = plc.find(path)
+                except (UnknownPlace, TypeError, ValueError):
+                    continue
+                if isinstance(place, Place) and is_single(place) and base(place.type) is not BOOL:
+                    found[step, operand] = Signal(place, place.name).text(plc.read(place)).replace(" ", "")
+                break
+    return found
+
+
+class Drawings:
+    """Pictures of rungs and charts, each made once for the same states and values."""
+
+    def __init__(self, drawn: Drawn) -> None:
+        self._drawn = drawn
+
+    def picture(self, key: tuple[object, ...], draw: Callable[[], tuple[str, str]]) -> tuple[str, str]:
+        """The headline and the SVG of a key, made by `draw` if it is new."""
         if key not in self._drawn:
             if len(self._drawn) >= MOST_DRAWN:
                 self._drawn.clear()
             self._drawn[key] = draw()
         return self._drawn[key]
 
-    def _rung(self, made: RungExecution) -> tuple[str, str]:
-        head, surface = ladder_surface(made.picture, RUNG_WIDTH, Annotations(made.states, values=self._values.of(made)))
-        return head, rung_svg(surface) if made.picture.steps else ""
+
+def _rung(made: RungExecution, values: Callable[[int, str], str]) -> tuple[str, str]:
+    head, surface = ladder_surface(made.picture, RUNG_WIDTH, Annotations(made.states, values=values))
+    return head, rung_svg(surface) if made.picture.steps else ""
 
 
 def _chart(called: ChartCall) -> tuple[str, str]:

@@ -3,38 +3,31 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Generator
 from typing import Any
 
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.live.futures import REPEATED, order_of
 from fbvm.live.lesson import LiveLesson
-from fbvm.live.messages import ACTIONS, MOST_NAMES, VERSION, MessageError, dump, message_id, parse
+from fbvm.live.look import Look, find_names
+from fbvm.live.messages import ACTIONS, VERSION, MessageError, dump, message_id, parse
 from fbvm.live.plcs import LivePlc
-from fbvm.live.program import ScanView, source_of
-from fbvm.live.stops import halt_row, shown_breakpoints
+from fbvm.live.program import source_of
 from fbvm.live.symbols import parts, row, search
-from fbvm.live.workbench import REFUSED, Workbench, fault_rows
-from fbvm.machine.plc import Plc
+from fbvm.live.updates import Updates, shown
+from fbvm.live.workbench import REFUSED, Workbench
 from fbvm.machine.state import Mode
 from fbvm.net.faults import NAMED
 from fbvm.record.draw.why import cause_text, why
 from fbvm.record.recording.scans import RecordedScans
 from fbvm.watch.names import is_single
-from fbvm.watch.paths import Place, Span
-from fbvm.watch.values import Value, show
+from fbvm.watch.paths import Place
 
-UPDATE_NS = 100_000_000
-"""The shortest time between two updates of a page."""
-VIEW_NS = 250_000_000
-"""The shortest time between two scans that are observed for a page: where Python alone observes, it is much slower."""
-MOST_SHOWN = 300
-"""Characters of a value; what is longer is cut."""
-MEMORY_WORDS = 200
-"""Words that the memory panel shows at once."""
+MOST_WAITING = 50
+"""Questions of a page whose replies are under way."""
 MOST_HISTORY, WHY_SCANS = 500, 300
 """Scans that are executed again for a trend, and for the cause of a value."""
-ACTS = 100
 
 
 class Session:
@@ -42,26 +35,14 @@ class Session:
 
     def __init__(self, workbench: Workbench) -> None:
         self._bench = workbench
-        self._live: LivePlc = next(iter(workbench.plcs.values()))
-        self._names: dict[str, Place | Span] = {}
-        self._instance = ""
-        self._memory: tuple[str, int] | None = None
-        self._units = self._network = self._pictures = self._times = False
-        self._past: tuple[int, Plc] | None = None
-        self._past_view: ScanView | None = None
-        self._other: LivePlc | None = None
-        """The PLC in another future, if that is looked at."""
-        self._ready = False
-        self._told_ns = self._viewed_ns = -VIEW_NS
-        self._begins = False
-        """True if the next update says that the page has to begin again."""
-        self._known: dict[str, Any] = {}
-        """What the page knows: values by name, other parts by theirs."""
-        self._frames = self._acts = 0
+        self._seen = Look(next(iter(workbench.plcs.values())))
+        self._updates = Updates(workbench, self._seen)
+        self._replies: deque[tuple[int | None, Generator[None, None, Any]]] = deque()
+        """Replies that take longer, with the numbers of their questions."""
         self._actions: dict[str, Callable[..., Any]] = {
             "hello": self._hello, "ready": self._take, "look": self._look, "program": self._program, "source": self._source,
             "search": self._search, "parts": self._parts, "history": self._history, "why": self._why, "test": self._test,
-            "capture": self._capture, "view": self._view, "branch": self._branch, "write": self._write,
+            "capture": self._capture, "group": self._keep_group, "view": self._view, "branch": self._branch, "write": self._write,
             "force": workbench.force, "release": workbench.release, "run": self._run, "pause": workbench.pause,
             "step": self._step, "statement": self._statement, "break": workbench.set_breakpoint,
             "unbreak": workbench.remove_breakpoint, "speed": workbench.speed, "mode": workbench.set_mode,
@@ -71,8 +52,10 @@ class Session:
 
     # --- messages -----------------------------------------------------------------------------------------------------
 
-    def answer(self, text: str) -> str:
-        """The reply to a message; a message that cannot be understood or done gets an error, and raises nothing."""
+    def answer(self, text: str) -> str | None:
+        """The reply to a message; None if it takes longer: then it is among the next texts of `update`.
+
+        A message that cannot be understood or done gets an error, and raises nothing."""
         number: Any = None
         try:
             message = parse(text)
@@ -85,41 +68,78 @@ class Session:
                 raise MessageError("this page may only look: fbvm runs with --read-only")
             if ACTIONS[action].changes and self._bench.held_by:
                 raise MessageError(f"{self._bench.held_by} has the PLC: this page looks on meanwhile")
-            if self._past and action in ("write", "force", "release"):
-                raise MessageError(f"this is scan {self._past[0]}, which is past: go back to now, or on from here, first")
+            if self._seen.past and action in ("write", "force", "release"):
+                raise MessageError(f"this is scan {self._seen.past[0]}, which is past: go back to now, or on from here, first")
             fields = {name: value for name, value in message.items() if value is not None}
             order = order_of(self._bench, action, fields)
             done = self._actions[action](**fields)
             if action in REPEATED:
                 self._bench.orders.append(order)
-        except MessageError as error:
+            if isinstance(done, Generator):
+                if len(self._replies) >= MOST_WAITING:
+                    raise MessageError("too many questions wait for their replies")
+                self._replies.append((number, done))
+                return None
+        except (MessageError, *REFUSED) as error:
             return dump({"re": number if number is not None else message_id(text), "error": str(error)})
-        except REFUSED as error:
-            return dump({"re": number, "error": str(error)})
         return dump({"re": number, "ok": done if done is not None else {}})
+
+    @property
+    def is_behind(self) -> bool:
+        """True if a reply or an update has been begun and is not whole yet."""
+        return bool(self._replies) or self._updates.is_under_way
+
+    def update(self, now_ns: int, is_late: Callable[[], bool] = lambda: False) -> str | None:
+        """The next text for the page: a reply that took longer, or what has changed.  None if there is none, or if `is_late` says
+        that time is up; then it is gone on with at the next call.  `now_ns` is the host's time."""
+        while self._replies:
+            number, reply = self._replies[0]
+            try:
+                next(reply)
+            except StopIteration as ended:
+                self._replies.popleft()
+                return dump({"re": number, "ok": ended.value})
+            except REFUSED as error:
+                self._replies.popleft()
+                return dump({"re": number, "error": str(error)})
+            if is_late():
+                return None
+        return self._updates.next(now_ns, is_late)
+
+    @property
+    def live(self) -> LivePlc:
+        """The PLC that the page looks at."""
+        return self._seen.live
+
+    @property
+    def shows_inside(self) -> bool:
+        """True if the page shows rungs and charts of the present."""
+        return bool(self._seen.instance) and not self._seen.past
 
     def begin_again(self) -> None:
         """Tells the page, which was in the session before this one, that other PLCs run now: it says hello once more."""
-        self._begins = self._ready = True
+        self._updates.begins_again = self._updates.is_ready = True
 
     def end(self) -> None:
         """The page has gone."""
-        self._ready, self._past, self._other = False, None, None
+        self._updates.is_ready = False
+        self._seen.leave_past()
 
     def _hello(self, version: int = VERSION) -> dict[str, Any]:
         if version != VERSION:
             raise MessageError(f"this fbvm speaks version {VERSION} of its messages, not {version}")
-        self._known, self._frames, self._acts = {}, 0, 0
-        self._ready = True
+        self._updates.forget()
+        self._updates.frames = self._updates.acts = 0
+        self._updates.is_ready = True
         bench = self._bench
         return {
             "version": VERSION, "read_only": bench.read_only, "writable": bench.writable,
             "real": any(live.is_real for live in bench.plcs.values()), "tests": bench.make_test is not None,
             "branches": bench.can_branch, "futures": [future.name for future in bench.futures],
             "lesson": bench.lesson.about() if bench.lesson else None,
-            "pictures": bench.pictures is not None and bool(bench.pictures.shown),
+            "pictures": bench.pictures is not None and bool(bench.pictures.shown), "groups": bench.groups is not None,
             "modes": [mode.value for mode in Mode], "faults": {name: kind.meaning for name, kind in NAMED.items()},
-            "plcs": [{"name": live.name, "cycle": live.plc.cycle_ns, "instances": live.instances,
+            "plcs": [{"name": live.name, "cycle": live.plc.cycle_ns, "watch": list(live.watch), "instances": live.instances,
                       "areas": {name: area.size_bytes // 2 for name, area in live.plc.memory.areas.items()
                                 if area.unit_bits == 16 and name not in FLAG_AREAS},
                       "units": [attached.unit.name for attached in live.plc.units]} for live in bench.plcs.values()],
@@ -127,34 +147,36 @@ class Session:
 
     def _take(self) -> None:
         """The page has shown the last update."""
-        self._ready = True
+        self._updates.is_ready = True
 
     def _look(self, plc: str, names: list[str] | None = None, instance: str | None = None, memory: str | None = None,
               first: int = 0, units: bool = False, network: bool = False, scan: bool = False,
-              pictures: bool = False, times: bool = False) -> dict[str, Any]:  # fmt: skip
+              pictures: bool = False, times: bool = False, plant: bool = False) -> dict[str, Any]:  # fmt: skip
         """From now on the page sees these names and panels, and nothing else; `scan` wants to see inside scans."""
-        live = self._bench.plc(plc)
-        found: dict[str, Place | Span] = {}
-        unknown: dict[str, str] = {}
-        for name in (names or [])[:MOST_NAMES]:
-            try:
-                found[name] = live.plc.find(name)
-            except REFUSED as error:
-                unknown[name] = str(error)
+        live, look = self._bench.plc(plc), self._seen
+        found, unknown = find_names(self._bench, live, names or [])
         if memory is not None and memory not in live.plc.memory.areas:
             raise MessageError(f"this PLC has no area {memory[:10]!r}")
-        if live is not self._live:
-            self._past = self._past_view = self._other = None
-            self._frames = 0
-        self._live, self._names, self._instance = live, found, (instance or "") if scan else ""
-        self._memory = (memory, max(0, first)) if memory else None
-        self._units, self._network, self._pictures, self._times = units, network, pictures, times
-        self._known, self._viewed_ns = {}, -VIEW_NS
-        if not network:
-            self._frames = 0
-        if self._instance and live.view is None:
+        if live is not look.live:
+            look.leave_past()
+        if live is not look.live or not network:
+            self._updates.frames = 0
+        look.live, look.names, look.instance = live, found, (instance or "") if scan else ""
+        look.memory = (memory, max(0, first)) if memory else None
+        look.units, look.network, look.pictures, look.times, look.plant = units, network, pictures, times, plant
+        self._look_anew()
+        if look.instance and live.view is None:
             live.wish_view(self._bench.control.is_paused)
-        return {"unknown": unknown, "rows": {name: row(place, live.described) for name, place in found.items()}}
+        return {"unknown": unknown, "rows": {name: row(place, owner.described) for name, (owner, place) in found.items()}}
+
+    def _look_anew(self) -> None:
+        self._updates.forget()
+        self._updates.look_at_once()
+
+    def _leave_past(self) -> None:
+        if self._seen.past:
+            self._seen.leave_past()
+            self._look_anew()
 
     # --- questions ----------------------------------------------------------------------------------------------------
 
@@ -165,9 +187,9 @@ class Session:
         live = self._bench.plc(plc)
         return source_of(live.plc.image, live.plc.memory.areas, live.texts, instance)
 
-    def _search(self, plc: str, text: str) -> dict[str, Any]:
+    def _search(self, plc: str, text: str) -> Generator[None, None, dict[str, Any]]:
         live = self._bench.plc(plc)
-        return {"found": search(live.plc, live.described, text)}
+        return search(live.plc, live.described, text)
 
     def _parts(self, plc: str, name: str) -> dict[str, Any]:
         live = self._bench.plc(plc)
@@ -177,7 +199,7 @@ class Session:
         """The values of some names in the last recorded scans, or the last before the one that is looked at."""
         live = self._quiet(plc)
         held = live.recorded.scans
-        stop = self._past[0] + 1 if self._past else held.stop
+        stop = self._seen.past[0] + 1 if self._seen.past else held.stop
         wanted = range(max(held.start, stop - min(max(1, scans), MOST_HISTORY)), stop)
         places = [place for name in names[:50] if isinstance(place := live.plc.find(name), Place) and is_single(place)]
         rows: list[list[str]] = [[] for _ in places]
@@ -185,7 +207,7 @@ class Session:
         for moment in live.past.moments(wanted):
             times.append(moment.now_ns)
             for made, place in zip(rows, places, strict=True):
-                made.append(_shown(place, live.names.read(moment.read, place)))
+                made.append(shown(place, live.names.read(moment.read, place)))
         values = {place.name: made for place, made in zip(places, rows, strict=True)}
         return {"first": wanted.start, "times": times, "values": values}
 
@@ -198,7 +220,7 @@ class Session:
         held = live.recorded.scans
         if not held:
             raise MessageError("no scan has been recorded yet")
-        scan = self._past[0] if self._past else held.stop - 1
+        scan = self._seen.past[0] if self._seen.past else held.stop - 1
         trace = RecordedScans(live.recorded, live.past.lines, first=max(held.start, scan - WHY_SCANS))
         return {"text": cause_text(trace, why(trace, place, scan))}
 
@@ -207,7 +229,8 @@ class Session:
         live = self._bench.plc(plc)
         if self._bench.make_test is None:
             raise MessageError("a test repeats runs of files in virtual time; others are repeated by `fbvm replay`: --trace FILE")
-        seen = [name for name, place in self._names.items() if isinstance(place, Place) and is_single(place)]
+        seen = [place.name for owner, place in self._seen.names.values()
+                if owner is live and isinstance(place, Place) and is_single(place)]  # fmt: skip
         return {"text": self._bench.make_test([act for act in self._bench.acts if act.plc == plc], live, seen)}
 
     def _quiet(self, plc: str) -> LivePlc:
@@ -238,9 +261,9 @@ class Session:
 
     def _branch(self, plc: str) -> None:
         """Goes on from the scan that is looked at, as if nothing had come behind it."""
-        if self._past is None or self._other is not None:
+        if self._seen.past is None or self._seen.other is not None:
             raise MessageError("look at a scan of the present run first: another future begins behind it")
-        self._bench.branch(plc, self._past[0] + 1)
+        self._bench.branch(plc, self._seen.past[0] + 1)
 
     def _capture(self, plc: str) -> dict[str, Any]:
         """What has passed the network last, as a file for Wireshark."""
@@ -249,8 +272,8 @@ class Session:
     def _view(self, plc: str, scan: int | None = None, future: int | None = None) -> dict[str, Any]:
         """Looks at the end of a recorded scan, also of another future, or, without one, at the present again."""
         if scan is None:
-            self._past = self._past_view = self._other = None
-            self._known = {}
+            self._seen.leave_past()
+            self._look_anew()
             return {}
         live = self._quiet(plc)
         other = None
@@ -263,134 +286,28 @@ class Session:
         if scan not in held:
             raise MessageError(f"scan {scan} is not recorded; recorded are {held.start} to {held.stop - 1}" if held
                                else "no scan has been recorded yet")  # fmt: skip
-        self._live, self._known, self._other = live, {}, other
-        self._past = scan, seen.recorded.at(scan + 1)
-        self._past_view = seen.past_view(scan) if self._instance else None
+        look = self._seen
+        look.live, look.other, look.past = live, other, (scan, seen.recorded.at(scan + 1))
+        look.past_view = seen.past_view(scan) if look.instance else None
+        self._look_anew()
         return {"scan": scan}
 
     def _write(self, plc: str, name: str, value: str) -> dict[str, Any]:
         return {"value": self._bench.write(plc, name, value)}
 
+    def _keep_group(self, name: str, names: list[str]) -> None:
+        self._bench.keep_group(name, names)
+
     def _run(self) -> None:
-        self._past = self._past_view = self._other = None
+        self._leave_past()
         self._bench.go_on()
 
     def _statement(self, plc: str) -> None:
-        self._past = self._past_view = self._other = None
+        self._leave_past()
         self._bench.step_statement(plc)
 
     def _step(self, scans: int) -> None:
-        self._past = self._past_view = self._other = None
+        self._leave_past()
         self._bench.step(scans)
-        if self._instance:
-            self._live.wish_view(True)
-
-    # --- updates ------------------------------------------------------------------------------------------------------
-
-    def update(self, now_ns: int) -> str | None:
-        """What has changed for the page since the last update; None if nothing has, if the page has not taken the last one, or
-        if that is less than 100 ms ago.  `now_ns` is the host's time."""
-        if not self._ready or now_ns - self._told_ns < UPDATE_NS:
-            return None
-        if self._begins:
-            self._begins = False
-            return dump({"update": {"restarted": True}})
-        changed = {**self._state(), **self._panels(now_ns)}
-        changed = {name: value for name, value in changed.items() if self._is_new(name, value)}
-        values = {name: text for name, place in self._names.items()
-                  if self._is_new(f"={name}", text := self._text(place))}  # fmt: skip
-        if values:
-            changed["values"] = values
-        if not changed:
-            return None
-        self._told_ns, self._ready = now_ns, False
-        return dump({"update": changed})
-
-    def _is_new(self, name: str, value: Any) -> bool:
-        if name in self._known and self._known[name] == value:
-            return False
-        self._known[name] = value
-        return True
-
-    def _text(self, place: Place | Span) -> str:
-        plc, names = self._seen, self._live.names
-        if isinstance(place, Span):
-            return f"[{', '.join(_shown(one, plc.read(one)) for one in place.places[:64])}]"[:MOST_SHOWN]
-        return _shown(place, names.read(plc.read, place))
-
-    @property
-    def _seen(self) -> Plc:
-        """The PLC that the page sees: as it is, or as it was."""
-        return self._past[1] if self._past else self._live.plc
-
-    def _state(self) -> dict[str, Any]:
-        live, control = self._live, self._bench.control
-        plc, held = live.plc, (self._other or live).recorded.scans
-        state = "past" if self._past else "trap" if plc.trap else "halt" if plc.halted else "ended" if live.ended() else \
-            "pause" if control.is_paused and not control.steps else "run"
-        trap = plc.trap.told(live.names.instance) if plc.trap else ""
-        return {
-            "plc": live.name, "state": state, "mode": plc.mode.value, "speed": control.speed, "trap": trap,
-            "scan": self._past[0] if self._past else plc.scans - 1, "ns": self._past[1].now_ns if self._past else plc.now_ns,
-            "halt": halt_row(live, plc.halted) if plc.halted and not self._past else None,
-            "breaks": [f"{row.kind} {row}" + (f" at passes {row.hits}" if row.hits else "") for row in shown_breakpoints(live)],
-            "held": [held.start, held.stop - 1], "taken": str(plc.scan_times),
-            "forces": {name: _plain(live, name, value) for name, value in self._seen.forces.items()},
-        }  # fmt: skip
-
-    def _panels(self, now_ns: int) -> dict[str, Any]:
-        """What the open panels show."""
-        live, bench, made = self._live, self._bench, dict[str, Any]()
-        if self._instance:
-            view = self._past_view if self._past else live.view
-            if view is not None:
-                made["inside"] = view.of(self._instance)
-            if not self._past and now_ns - self._viewed_ns >= VIEW_NS:
-                self._viewed_ns = now_ns
-                live.wish_view(bench.control.is_paused)
-        if self._memory:
-            area, first = self._memory
-            words = self._seen.memory.words(area)
-            made["memory"] = {"area": area, "first": first, "words": list(words[first : first + MEMORY_WORDS])}
-        if self._units:
-            made["units"] = [self._unit(attached) for attached in live.plc.units]
-        if self._network:
-            rows = live.frame_rows(self._frames, None)
-            if rows:
-                made["frames"], self._frames = rows, rows[-1]["number"] + 1
-            made["faults"] = fault_rows(bench.faults)
-        if self._pictures and bench.pictures:
-            made["pictures"] = bench.pictures.shown
-            made["picture"] = dict(bench.pictures.values(live if self._past else None, lambda place: self._seen.read(place)))
-        if self._times:
-            made["times"] = live.plc.scan_times.bins
-        if bench.changes:
-            made["change"] = bench.changes.state
-        acts = bench.acts[self._acts :][-ACTS:]
-        if acts:
-            made["acts"] = [[act.plc, act.scan, act.text] for act in acts if act.what != "keep"]
-            self._acts = len(bench.acts)
-        return made
-
-    def _unit(self, attached: Any) -> dict[str, Any]:
-        """A unit as the panel shows it: its words and bits that are not 0, with what they are called and what they mean."""
-        unit, live, plc = attached.unit, self._live, self._seen
-        rows = []
-        for address, said in getattr(unit, "descriptions", {}).items():
-            place = plc.find(address)
-            value = plc.read(place)
-            if isinstance(place, Place):
-                meaning = live.meanings.get(address, {}).get(value, "") if isinstance(value, int) else ""
-                rows.append([address, said, _shown(place, value), meaning])
-        return {"name": unit.name, "address": unit.address, "plugged": self._bench.is_plugged(attached), "words": rows}
-
-
-def _shown(place: Place, value: Value) -> str:
-    text = show(place.type, value, place.hexadecimal)
-    return text if len(text) <= MOST_SHOWN else f"{text[: MOST_SHOWN - 1]}…"
-
-
-def _plain(live: LivePlc, name: str, value: Value) -> str:
-    place = live.plc.find(name)
-    assert isinstance(place, Place)
-    return _shown(place, value)
+        if self._seen.instance:
+            self._seen.live.wish_view(True)

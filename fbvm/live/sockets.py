@@ -68,16 +68,25 @@ class LiveServer:
                 self._drop(browser)
         return bool(ready)
 
-    def update(self, now_ns: int) -> None:
-        """Sends one page what has changed, if it has taken the update before; the others have their turn at further calls."""
+    @property
+    def is_behind(self) -> bool:
+        """True if an update or a reply has been begun and waits for time to go on."""
+        return any(session.is_behind for session in self.sessions)
+
+    def update(self, now_ns: int, is_late: Callable[[], bool]) -> None:
+        """Sends pages what has changed, if they have taken the update before, until `is_late` says that time is up; who had no
+        turn then is the first at the next call."""
         for browser in list(self._browsers):
-            ready = browser.session if not browser.connection.has_output else None
-            if ready and (text := ready.update(now_ns)) is not None:
+            session = browser.session if not browser.connection.has_output else None
+            if session is None:
+                continue
+            if (text := session.update(now_ns, is_late)) is not None:
                 browser.connection.send(text)
                 self._write(browser)
                 if browser in self._browsers:  # behind all others
                     self._browsers.remove(browser)
                     self._browsers.append(browser)
+            if is_late():
                 return
 
     def renew_sessions(self) -> None:
@@ -129,7 +138,8 @@ class LiveServer:
             browser.session = self._new_session()
         if browser.session:
             for text in texts:
-                connection.send(browser.session.answer(text))
+                if (reply := browser.session.answer(text)) is not None:
+                    connection.send(reply)
         if not data and not connection.has_output:
             self._drop(browser)
 

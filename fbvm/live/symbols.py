@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from typing import Any
 
 from fbvm.base.types import ArrayType, EnumType, Field, StructType, base
@@ -14,10 +14,13 @@ MOST_FOUND = 200
 MOST_PARTS = 500
 """Elements or members that are listed of one array or structure."""
 MOST_SEARCHED = 200_000
+STEP = 50
+"""Places that are searched in one step."""
 
 
-def search(plc: Plc, described: Mapping[str, str], text: str) -> list[dict[str, Any]]:
-    """The variables and addresses whose names, types or descriptions have all words of `text`; programs' own variables first.
+def search(plc: Plc, described: Mapping[str, str], text: str) -> Generator[None, None, dict[str, Any]]:
+    """The variables and addresses whose names, types or descriptions have all words of `text`, as `found`; programs' own
+    variables first.  Searches in short steps.
 
     What is an address or a range as it stands comes before all."""
     found: dict[str, dict[str, Any]] = {}
@@ -28,17 +31,21 @@ def search(plc: Plc, described: Mapping[str, str], text: str) -> list[dict[str, 
         except (UnknownPlace, ValueError):
             pass
     words = text.upper().split()
-    for place in _places(plc.image.symbols):
+    for number, place in enumerate(_places(plc.image.symbols)):
         if len(found) >= MOST_FOUND:
             break
         if all(word in f"{place.name} {place.type.name}".upper() for word in words):
             found.setdefault(place.name, row(place, described))
-    for address, said in described.items():
+        if number % STEP == STEP - 1:
+            yield
+    for number, (address, said) in enumerate(described.items()):
         if len(found) >= MOST_FOUND:
             break
         if all(word in f"{address} {said}".upper() for word in words):
             found.setdefault(address, row(plc.find(address), described))
-    return list(found.values())
+        if number % STEP == STEP - 1:
+            yield
+    return {"found": list(found.values())}
 
 
 def row(place: Place | Span, described: Mapping[str, str]) -> dict[str, Any]:

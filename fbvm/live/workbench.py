@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fbvm.live.changes import SourceChanges
+from fbvm.live.groups import WatchGroups
 from fbvm.live.lesson import LiveLesson
 from fbvm.live.messages import MessageError
 from fbvm.live.pictures import Pictures
@@ -77,6 +78,8 @@ class Workbench:
         """True if the run is to end, and the changed program to begin."""
         self.branch_at: tuple[str, int] | None = None
         """The PLC and the number of scans from which another future is to begin."""
+        self.groups: WatchGroups | None = None
+        """Groups of names that are kept beside the sources; None where there is no place for them."""
         self.can_branch = False
         """True if new PLCs can do the past again: in virtual time, from power-on."""
         self.futures: Sequence[Any] = ()
@@ -236,6 +239,14 @@ class Workbench:
             raise MessageError("the past of these PLCs cannot be done again: connections are real, or the program has changed")
         self.branch_at = plc, scans
         self.control.end()
+
+    def keep_group(self, name: str, names: Sequence[str]) -> None:
+        """Keeps names to be watched under the name of a group; without names the group is removed."""
+        if self.writable is not None:
+            raise MessageError("with --allow-write only values can be changed")
+        if self.groups is None:
+            raise MessageError("this run has no file beside which groups can be kept")
+        self.groups.keep(name, names)
 
     def do(self, action: str, fields: Mapping[str, Any]) -> None:
         """Does again what an order says."""

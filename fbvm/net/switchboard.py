@@ -84,6 +84,8 @@ class Switchboard(ABC):
         self.tap: Tap | None = None
         self.map = address_map
         self.links: dict[str, HostLink] = {}
+        self.doors: dict[Peer, Peer] = {}
+        """What `try_doors` has found: endpoints of units with those of the host."""
         self.relays = Relays(self.links, self.link_behind, self.tell, seed, faults)
         """The connections that are under faults."""
         self.notices = Notices()
@@ -129,6 +131,7 @@ class Switchboard(ABC):
                 if its.port == real.port and ("0.0.0.0" in (its.host, real.host) or its.host == real.host):
                     raise OSError(f"{real} cannot be used for {endpoint}: it is the door of {other}")
             found[endpoint] = real
+        self.doors |= found
         return found
 
     @abstractmethod

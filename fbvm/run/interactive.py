@@ -19,6 +19,8 @@ MOST_WAIT_NS = 20_000_000
 """After this time at most the loop looks at who looks on, also while nothing is to be scanned."""
 SLICE_NS = 20_000_000
 """So long scans may follow one another in virtual time before the loop looks at who looks on."""
+AUDIENCE_NS = 500_000
+"""So long at most who looks on is told between two scans, and no longer than until the next one is due."""
 AS_FAST_AS_POSSIBLE = 0.0
 """The speed of virtual time that never waits."""
 TRAP, STOPPED = "trap", "stopped"
@@ -37,8 +39,9 @@ class Audience(Protocol):
     def after_scan(self, number: int, now_ns: int) -> None:
         """Called after each scan, or after many in one go."""
 
-    def update(self, now_ns: int) -> None:
-        """Called between scans, at least every 20 ms: the time to tell what has changed."""
+    def update(self, now_ns: int, is_late: Callable[[], bool]) -> None:
+        """Called between scans, at least every 20 ms: the time to tell what has changed.  What is left when `is_late` returns
+        True is for the next call; `serve` then does not wait."""
 
 
 @dataclass
@@ -51,6 +54,11 @@ class Control:
     speed: float = 1.0
     """How fast virtual time passes: 1 as the host's, 0.1 ten times slower, 0 as fast as it goes."""
     has_ended: bool = False
+
+    @property
+    def stands(self) -> bool:
+        """True if no scan is to be executed now."""
+        return self.is_paused and not self.steps
 
     def pause(self) -> None:
         self.is_paused, self.steps = True, 0
@@ -96,7 +104,8 @@ def run_interactive(runs: Sequence[Running], control: Control, audience: Audienc
 def let_look_on(audience: Audience) -> None:
     """Lets an audience look on for a moment while somebody else executes scans."""
     audience.serve(0)
-    audience.update(time.monotonic_ns())
+    end_ns = time.monotonic_ns() + AUDIENCE_NS
+    audience.update(time.monotonic_ns(), lambda: time.monotonic_ns() >= end_ns)
 
 
 class _Loop:
@@ -124,19 +133,20 @@ class _Loop:
             if run.reason == TRAP and run.plc.trap is None:  # somebody has switched it off and on
                 run.reason, run.due_ns = "", max(run.due_ns, self._now_ns)
         due_ns = min((run.due_ns for run in self._runs if not run.reason), default=None)
-        stands = due_ns is None or control.is_paused and not control.steps
+        stands = due_ns is None or control.stands
         self._advance(stands, due_ns)
         wait_ns = MOST_WAIT_NS if stands or due_ns is None else min(MOST_WAIT_NS, self._until_ns(due_ns))
         interrupts.begin_wait()
         self._audience.serve(wait_ns)
         interrupts.waits = False
-        control_stands = control.is_paused and not control.steps
-        self._advance(stands or control_stands, due_ns)
+        self._advance(stands or control.stands, due_ns)
         for network in self._networks:
             network.serve(self._now_ns)
-        if due_ns is not None and not control_stands and not control.has_ended:
+        if due_ns is not None and not control.stands and not control.has_ended:
             self._scan_due()
-        self._audience.update(self._monotonic_ns())  # behind the scans, so that the next ones begin in time
+        began_ns = self._monotonic_ns()  # behind the scans, so that the next ones begin in time
+        end_ns = began_ns + min(AUDIENCE_NS, self._left_ns())
+        self._audience.update(began_ns, lambda: self._monotonic_ns() >= end_ns)
 
     def _advance(self, stands: bool, due_ns: int | None) -> None:
         """Lets the PLCs' time pass as far as the host's time says; it stands during a pause."""
@@ -153,6 +163,14 @@ class _Loop:
             self._now_ns += round(passed_ns * control.speed)
             if due_ns is not None:  # a host that was busy does not make up for a second of virtual time
                 self._now_ns = min(self._now_ns, due_ns + 10 * SLICE_NS)
+
+    def _left_ns(self) -> int:
+        """How long the host has time until the next scan is due."""
+        due_ns = min((run.due_ns for run in self._runs if not run.reason), default=None)
+        if due_ns is None or self._control.stands:
+            return AUDIENCE_NS
+        self._advance(False, due_ns)
+        return self._until_ns(due_ns)
 
     def _until_ns(self, due_ns: int) -> int:
         """How long the host has to wait until the PLCs' time is `due_ns`."""

@@ -3,23 +3,37 @@
 Prints the processor time of the slices between scans in which pages are told, and of scans with and without pages.  A scan that
 is due during a slice begins later by what is left of it: with real connections that is the most that pages cost.
 
-    python tests/bench/live.py [--updates 300]
+    python tests/bench/live.py [--updates 300] [--seconds 10]
+
+In real time: a PLC with real connections whose period is 10 ms, its page served to three programs that take every update; how
+late scans begin by the clock, and the processor time that they take.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import subprocess
+import sys
 import time
+from itertools import pairwise
+from typing import Any
 
-from fbvm import Plc, Recording, compile_text
+from fbvm import Plc, Recording, TcpNetwork, compile_text
+from fbvm.live.host import LiveHost
 from fbvm.live.plcs import LivePlc
-from fbvm.live.session import UPDATE_NS, Session
+from fbvm.live.session import Session
+from fbvm.live.updates import UPDATE_NS
 from fbvm.live.workbench import Workbench
-from fbvm.run.interactive import Control
+from fbvm.machine.backplane import usual_units
+from fbvm.run.interactive import AUDIENCE_NS, Control, run_interactive
+from fbvm.run.running import Running
 
 PAGES, NAMES, RUNGS, SCANS = 3, 200, 10, 10
 """Pages, names of each, rungs of the program, and scans between two updates: 100 ms of 10 ms."""
+
+WARM_S = 3
+"""Seconds in which pages come and machine code is made, which are not counted."""
 
 
 def program() -> str:
@@ -61,21 +75,105 @@ def measured(pages: int, updates: int, is_observed: bool) -> tuple[list[int], li
             live.after_scan()
         for session in sessions:
             began_ns = time.thread_time_ns()
-            session.update(update * UPDATE_NS)
+            while session.update(update * UPDATE_NS, lambda: time.thread_time_ns() - began_ns >= AUDIENCE_NS) is None:  # noqa: B023
+                if not session.is_behind:
+                    break
+                slices.append(time.thread_time_ns() - began_ns)
+                began_ns = time.thread_time_ns()
             slices.append(time.thread_time_ns() - began_ns)
             session.answer('{"do": "ready"}')
     return slices, scans
 
 
+PAGE = """
+import json, sys
+from websockets.sync.client import connect
+with connect(sys.argv[1]) as page:
+    page.send(json.dumps({"id": 1, "do": "hello"}))
+    page.send(json.dumps({"id": 2, "do": "look", "plc": "pump", "names": json.loads(sys.argv[2]), "instance": "Main",
+                          "scan": True}))
+    for text in page:
+        if "update" in json.loads(text):
+            page.send('{"do": "ready"}')
+"""
+"""A page that shows nothing but takes every update."""
+
+
+def in_real_time(pages: int, seconds: float) -> tuple[list[int], list[int], int]:
+    """How late each scan began by the clock, the processor time that it took, in nanoseconds, and how many updates were sent."""
+    text = program()
+    image = compile_text(text).image
+    assert image is not None
+    plc, network = Plc(image), TcpNetwork()
+    for unit in usual_units([]):
+        plc.attach(unit, network)
+    bench = Workbench([live := LivePlc("pump", plc, Recording().add("pump", plc), {image.sites[0].file: text})], Control())
+    host = LiveHost(bench)
+    begun: list[int] = []
+    taken: list[int] = []
+    updates = 0
+
+    class Timed(LiveHost):
+        """Notes when scans begin and end."""
+
+        def __init__(self) -> None:
+            self.__dict__ = host.__dict__
+
+        def before_scan(self, number: int, now_ns: int) -> None:
+            super().before_scan(number, now_ns)
+            begun.append(time.monotonic_ns())
+            taken.append(-time.thread_time_ns())
+
+        def after_scan(self, number: int, now_ns: int) -> None:
+            taken[-1] += time.thread_time_ns()
+            super().after_scan(number, now_ns)
+
+    send = Session.update
+
+    def counted(self: Session, *args: Any) -> str | None:
+        nonlocal updates
+        text = send(self, *args)
+        updates += text is not None
+        return text
+
+    Session.update = counted  # type: ignore[method-assign]
+    port, token = host.server.guard.port, host.server.guard.token
+    names = json.dumps([f"Main.a[{number}]" for number in range(1, NAMES + 1)])
+    started = [subprocess.Popen([sys.executable, "-c", PAGE, f"ws://127.0.0.1:{port}/live?token={token}", names])
+               for _ in range(pages)]  # fmt: skip
+    try:
+        end_ns = time.monotonic_ns() + round((seconds + WARM_S) * 1e9)
+        run_interactive([Running(plc, scans=1 << 60)], bench.control, Timed(), until=lambda: time.monotonic_ns() > end_ns)
+    finally:
+        for one in started:
+            one.kill()
+            one.wait()
+        live.end_power()
+        host.close()
+        network.close()
+        Session.update = send  # type: ignore[method-assign]
+    first = next(number for number, at_ns in enumerate(begun) if at_ns > begun[0] + WARM_S * 1e9)
+    period = plc.cycle_ns
+    late = [now - before - period for before, now in pairwise(begun[first:])]
+    return [max(0, one) for one in late], taken[first:], updates
+
+
 def main() -> None:
     arguments = argparse.ArgumentParser()
     arguments.add_argument("--updates", type=int, default=300)
-    updates = arguments.parse_args().updates
+    arguments.add_argument("--seconds", type=float, default=10)
+    given = arguments.parse_args()
+    updates = given.updates
     print(f"{PAGES} pages, {NAMES} names and {RUNGS} rungs each, {updates} updates; processor time, median, at 99 %, longest")
     for said, pages, is_observed in (("no page", 0, False), ("values", PAGES, False), ("values and rungs", PAGES, True)):
         slices, scans = measured(pages, updates, is_observed)
         print(f"{said:17} scan {at(scans, 0.5)} {at(scans, 0.99)} {at(scans, 1)}"
               + (f"   slice of a page {at(slices, 0.5)} {at(slices, 0.99)} {at(slices, 1)}" if slices else ""))  # fmt: skip
+    print(f"real time, {given.seconds:g} s, period 10 ms; median, at 99 %, longest")
+    for pages in (0, PAGES):
+        late, scans, sent = in_real_time(pages, given.seconds)
+        print(f"{pages} pages{'':10} scan {at(scans, 0.5)} {at(scans, 0.99)} {at(scans, 1)}   late {at(late, 0.5)} "
+              f"{at(late, 0.99)} {at(late, 1)}   {sent / max(1, pages) / (given.seconds + WARM_S):4.1f} updates/s")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -202,6 +202,18 @@ def test_read_only_pages_only_look(live: Any) -> None:
     assert level.get_by_role("button", name="Write once").is_disabled() and page.locator("#pause").is_disabled()
 
 
+def test_what_is_typed_before_there_is_a_connection_is_searched_when_there_is_one(live: Any) -> None:
+    run = live("--paused")
+    page = run.window("about:blank")
+    page.add_init_script("""addEventListener("DOMContentLoaded", () => {
+        document.getElementById("find").value = "Main.Level";
+        document.getElementById("find").dispatchEvent(new Event("input"));
+    })""")
+    page.goto(run.url)
+    page.locator("#found button", has_text="Main.Level").wait_for(timeout=10_000)
+    assert run.complaints == []
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1400, "dark"), (2560, "light")])
 def test_no_panel_is_wider_than_the_window(live: Any, width: int, scheme: str) -> None:
     page = live().window(viewport={"width": width, "height": 900}, color_scheme=scheme)
@@ -228,10 +240,57 @@ def test_a_thousand_signals_are_watched(live: Any) -> None:
     page = (run := live("--speed", "100", text=text)).window()
     state(page, "run")
     row = watch(page, "Main.a")
-    row.get_by_role("button", name="Watch the parts of").click()
+    row.get_by_role("button", name="Show the parts of").click()
     page.locator("#watched tr").nth(500).wait_for()
     page.locator("#where", has_text=re.compile(r"scan \d{4,}")).wait_for()
     assert run.complaints == []
+
+
+def test_a_structure_is_opened_kept_in_a_group_and_measured(live: Any) -> None:
+    text = """TYPE Valve : STRUCT Open : BOOL; Ways : ARRAY[1..2] OF INT; END_STRUCT END_TYPE
+        PROGRAM Main VAR v : Valve; END_VAR v.Ways[2] := v.Ways[2] + 3; END_PROGRAM"""
+    page = (run := live("--paused", text=text)).window()
+    watch(page, "Main.v").get_by_role("button", name="Show the parts of Main.v").click()
+    page.get_by_role("button", name="Show the parts of Main.v.Ways").click()
+    row = page.locator("#watched tr[data-name='Main.v.Ways[2]']")
+    page.fill("#groupName", "valve")
+    page.click("#keepGroup")
+    page.locator("#group option", has_text="valve").wait_for(state="attached")
+    assert "pump/Main.v" in run.file.with_name("pump.watch.toml").read_text()
+    page.locator("#where").click()
+    page.keyboard.press("S")
+    value(row, "30")
+    page.click("#exact")
+    page.locator("#cursorA").fill("2")
+    page.locator("#cursorB").fill("6")
+    page.locator("figure[data-name='Main.v.Ways[2]'] .between", has_text="A 9  B 21, B − A 12").wait_for()
+    page.locator("#measured", has_text="B − A: 4 scans, 40.000 ms").wait_for()
+    page.reload()
+    row.wait_for()
+    page.select_option("#group", "valve")
+    page.click("#ungroup")
+    page.locator("#group option", has_text="valve").wait_for(state="detached")
+    assert run.complaints == []
+
+
+PROJECT = Path(__file__).parents[2] / "examples" / "pair"
+
+
+def test_all_plcs_of_a_project_stand_side_by_side(live: Any, tmp_path: Path) -> None:
+    shutil.copytree(PROJECT, tmp_path / "pair")
+    page = (run := live(str(tmp_path / "pair"))).window()
+    state(page, "run")
+    cards = page.locator("#plcs .card")
+    cards.nth(1).wait_for()
+    page.locator("#plan text", has_text="frames").first.wait_for()
+    page.click("[data-panel=watch]" if page.locator("#watch.shown").count() == 0 else "#find")
+    first, second = (card.locator("button").inner_text() for card in cards.all())
+    page.fill("#find", f"{second}/Main.")
+    page.locator("#found button").first.click()
+    page.locator("#watched tr .value", has_text=re.compile(".")).first.wait_for()
+    cards.nth(1).locator("button").click()
+    page.wait_for_function("name => document.getElementById('plc').value === name", arg=second)
+    assert first != second and run.complaints == []
 
 
 KEPT = "PROGRAM Main VAR RETAIN n : INT; END_VAR VAR m : INT; END_VAR\nn := n + 1;\nm := m + 1;\nEND_PROGRAM\n"

@@ -6,6 +6,7 @@ import { LessonPanel } from "/lesson.js";
 import { MemoryPanel } from "/memory.js";
 import { NetworkPanel } from "/network.js";
 import { PicturePanel } from "/picture.js";
+import { PlantPanel } from "/plant.js";
 import { ProgramPanel } from "/program.js";
 import { ScanTools } from "/scan.js";
 import { Connection } from "/socket.js";
@@ -15,8 +16,7 @@ import { UnitsPanel } from "/units.js";
 import { WatchPanel } from "/watch.js";
 
 const PANELS = { lesson: "Lesson", program: "Program", watch: "Watch", trend: "Trend", units: "Units", network: "Network", memory: "Memory",
-  picture: "Picture",
-  times: "Scan times", acts: "What was done" };
+  plant: "Plant", picture: "Picture", times: "Scan times", acts: "What was done" };
 const isWide = () => matchMedia("(min-width: 70rem)").matches;
 
 class Page {
@@ -29,7 +29,7 @@ class Page {
     this.state = {};
     this.panels = { program: new ProgramPanel(this), watch: new WatchPanel(this), trend: new TrendPanel(this),
       units: new UnitsPanel(this), network: new NetworkPanel(this), memory: new MemoryPanel(this), picture: new PicturePanel(this),
-      times: new TimesPanel(), lesson: new LessonPanel(this) };
+      plant: new PlantPanel(this), times: new TimesPanel(), lesson: new LessonPanel(this) };
     this.scan = new ScanTools(this);
     this.change = new ChangeBar(this);
     at("tabs").append(...Object.entries(PANELS).map(([id, name]) =>
@@ -55,6 +55,7 @@ class Page {
     at("log").replaceChildren();
     document.querySelector("[data-panel=picture]").hidden = !this.about.pictures;
     document.querySelector("[data-panel=lesson]").hidden = !this.about.lesson;
+    if (this.about.plcs.length > 1 && this.isNew && isWide()) this.open("plant");
     if (this.about.lesson && this.isNew) this.open("lesson");
     if (this.about.pictures && this.isNew) this.open("picture");
     this.isNew = false;
@@ -75,7 +76,8 @@ class Page {
   async look() {
     if (!this.about) return;
     const seen = { plc: this.plc, names: [...this.names()], units: this.shown.has("units"), network: this.shown.has("network"),
-      pictures: this.shown.has("picture"), times: this.shown.has("times") };
+      pictures: this.shown.has("picture"), times: this.shown.has("times"),
+      plant: this.shown.has("plant") };
     if (this.shown.has("program")) Object.assign(seen, { scan: true, instance: this.panels.program.instance });
     if (this.shown.has("memory")) Object.assign(seen, this.panels.memory.seen());
     const found = await this.ask("look", seen);
@@ -85,6 +87,7 @@ class Page {
   names() {
     const names = new Set(this.panels.watch.names());
     if (this.shown.has("program")) for (const name of this.panels.program.names()) names.add(name);
+    if (this.shown.has("plant")) for (const name of this.panels.plant.beside()) names.add(name);
     return [...names].slice(0, 1000);
   }
 

@@ -2,7 +2,7 @@
 
 import { at, options, save } from "/dom.js";
 
-const NAMES = { run: "running", pause: "paused", past: "in the past", trap: "stopped by a trap", halt: "inside a scan", ended: "at its end" };
+export const NAMES = { run: "running", pause: "paused", past: "in the past", trap: "stopped by a trap", halt: "inside a scan", ended: "at its end" };
 
 export class ScanTools {
   constructor(page) {
@@ -43,6 +43,7 @@ export class ScanTools {
     at("others").hidden = !about.futures.length;
     at("future").replaceChildren(new Option("this one", "-1"), ...about.futures.map((name, number) => new Option(name, String(number))));
     at("test").hidden = !about.tests;
+    at("test").disabled = false;
   }
 
   update(update, state) {

@@ -9,8 +9,9 @@ from fbvm import LoopNetwork, ModbusPeer, Peer, Plc, Recording, compile_text
 from fbvm.live.connection import Connection
 from fbvm.live.guard import Guard
 from fbvm.live.plcs import LivePlc
-from fbvm.live.session import UPDATE_NS, Session
+from fbvm.live.session import Session
 from fbvm.live.stops import forget_statement
+from fbvm.live.updates import UPDATE_NS
 from fbvm.live.workbench import Workbench
 from fbvm.machine.backplane import usual_units
 from fbvm.run.interactive import Control
@@ -77,9 +78,9 @@ def answered(data: bytes, bind: str = "127.0.0.1") -> tuple[int, bytes]:
 
 
 class Page:
-    """A page's session at a PLC with an ETN21 and a Modbus server in memory, in virtual time."""
+    """A page's session at a PLC with an ETN21 and a Modbus server in memory, in virtual time; or as if connections were real."""
 
-    def __init__(self, text: str = PUMP, **settings: Any) -> None:
+    def __init__(self, text: str = PUMP, real: bool = False, **settings: Any) -> None:
         image = compile_text(text).image
         assert image is not None
         self.plc = Plc(image)
@@ -87,6 +88,7 @@ class Page:
         self.network.place(Peer("192.168.250.1", 502), ModbusPeer())
         for unit in usual_units([]):
             self.plc.attach(unit, self.network)
+        self.network.virtual_time = not real
         self.recording = Recording()
         file = image.sites[0].file
         self.live = LivePlc("pump", self.plc, self.recording.add("pump", self.plc), {file: text})
@@ -97,7 +99,9 @@ class Page:
 
     def ask(self, do: str, **fields: Any) -> dict[str, Any]:
         """The whole reply."""
-        reply: dict[str, Any] = json.loads(self.session.answer(json.dumps({"id": 1, "do": do, **fields})))
+        text = self.session.answer(json.dumps({"id": 1, "do": do, **fields})) or self.session.update(self.now_ns)
+        assert text is not None
+        reply: dict[str, Any] = json.loads(text)
         return reply
 
     def done(self, do: str, **fields: Any) -> dict[str, Any]:
@@ -111,7 +115,7 @@ class Page:
         """Scans as the loop of a run does."""
         for _ in range(scans):
             self.live.before_scan()
-            self.plc.scan()
+            self.plc.scan(self.plc.now_ns + self.plc.cycle_ns if self.live.is_real else None)
             self.live.after_scan()
 
     def run(self, turns: int) -> None:

@@ -155,7 +155,7 @@ def test_a_broken_message_gets_an_error_and_changes_nothing(text: str) -> None:
     page = Page()
     page.scan(3)
     before = bytes(page.plc.memory.map[:])
-    reply = json.loads(page.session.answer(text))
+    reply = json.loads(page.session.answer(text) or "")
     assert set(reply) == {"re", "error"} and reply["error"]
     assert bytes(page.plc.memory.map[:]) == before
     assert page.bench.acts == [] and not page.control.is_paused and page.network.faults == []

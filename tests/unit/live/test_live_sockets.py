@@ -10,8 +10,8 @@ import pytest
 from browsers import Page, frame
 
 from fbvm.live.host import LiveHost
-from fbvm.live.session import UPDATE_NS
 from fbvm.live.sockets import IDLE_SERVES, MOST_CONNECTIONS
+from fbvm.live.updates import UPDATE_NS
 
 WAIT_NS = 2_000_000_000
 
@@ -61,7 +61,7 @@ def test_a_browser_that_never_reads_gets_one_update_and_holds_nothing_up(host: L
         live = host.workbench.plcs["pump"]
         for number in range(1, 200):
             live.plc.scan()
-            host.update(number * UPDATE_NS)
+            host.update(number * UPDATE_NS, lambda: False)
         assert len(host.server.sessions) == 1
 
 

@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import base64
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from browsers import Page
 
 from fbvm.live.futures import Future, run_again
+from fbvm.live.groups import WatchGroups
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
-from fbvm.live.session import UPDATE_NS
+from fbvm.live.updates import UPDATE_NS
 from fbvm.run.running import Running
+
+RUNGS = """PROGRAM Main
+VAR on, off, out : BOOL; n : UINT := 7; END_VAR
+LADDER
+LD on
+AND> n &5
+OUT out
+END_LADDER
+END_PROGRAM"""
 
 
 @pytest.fixture
@@ -320,3 +332,70 @@ def test_a_past_that_cannot_be_done_again_has_one_future(page: Page) -> None:
     page.scan(3)
     page.done("view", plc="pump", scan=1)
     assert "cannot be done again" in page.ask("branch", plc="pump")["error"]
+
+
+def test_with_real_connections_machine_code_notes_the_power_of_rungs_until_nobody_looks() -> None:
+    page = Page(RUNGS, real=True)
+    page.done("hello", version=1)
+    page.done("look", plc="pump", instance="Main", scan=True)
+    page.plc.write("Main.on", True)
+    page.update()
+    page.scan(2)
+    assert page.live.power is not None
+    update = page.update()["inside"]
+    (_, svg), = update["pictures"]
+    assert update["scan"] == 1 and "power" in svg and ">= 7<" in svg
+    page.done("break", plc="pump", kind="condition", where="Main.n > 100")
+    page.scan()
+    assert page.live.power is None
+    page.done("unbreak", plc="pump")
+    for _ in range(3):  # at most each 250 ms somebody asks for it
+        page.update()
+    assert page.live.power is not None
+    page.live.end_power()
+    page.scan(2)
+    assert page.live.power is None
+
+
+def test_an_update_is_of_one_moment_though_it_takes_many_slices(page: Page) -> None:
+    page.done("look", plc="pump", names=[*(f"D{number}" for number in range(100, 130)), "Main.Level"])
+    assert page.session.update(UPDATE_NS, lambda: True) is None
+    slices = 1
+    while (text := page.session.update(UPDATE_NS + slices, lambda: True)) is None:
+        page.scan()
+        slices += 1
+    update = json.loads(text)["update"]
+    assert slices > 3 and (update["scan"], update["values"]["Main.Level"]) == (-1, "20")
+    assert not page.session.is_behind
+
+
+def test_names_of_another_plc_stand_beside() -> None:
+    page, other = Page(), Page()
+    page.bench.plcs["tank"] = other.live
+    page.done("hello", version=1)
+    found = page.done("look", plc="pump", names=["tank/Main.Level", "tank/x", "none/x"], plant=True)
+    assert list(found["rows"]) == ["tank/Main.Level"] and len(found["unknown"]) == 2
+    other.scan(3)
+    update = page.update()
+    assert update["values"] == {"tank/Main.Level": "23"}
+    assert [row["units"][0]["plugged"] for row in update["plant"]["plcs"]] == [True, True]
+
+
+def test_groups_are_kept_in_a_file_and_read_again_when_it_changes(page: Page, tmp_path: Path) -> None:
+    file = tmp_path / "watch.toml"
+    assert "no file" in page.ask("group", name="a", names=["D10"])["error"]
+    page.bench.groups = WatchGroups(file)
+    page.done("group", name='The "pump"', names=["pump/Main.Level", "D10"])
+    page.done("group", name="b", names=["D10"])
+    page.done("group", name="b", names=[])
+    assert page.update()["groups"] == {'The "pump"': ["pump/Main.Level", "D10"]} == WatchGroups(file).rows
+    file.write_text("[[group]]\nname = 'by hand'\nnames = ['D20', 5]\n[[group]]\nname = 7\n")
+    page.bench.groups.look()
+    assert page.update()["groups"] == {"by hand": ["D20"]}
+    file.write_text("[[group")
+    page.bench.groups.look()
+    assert page.bench.groups.rows == {"by hand": ["D20"]}
+    assert "characters" in page.ask("group", name="x" * 61, names=["D10"])["error"]
+    file.unlink()
+    page.bench.groups.look()
+    assert page.bench.groups.rows == {}

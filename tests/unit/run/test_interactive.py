@@ -33,7 +33,7 @@ class Hands:
     def after_scan(self, number: int, now_ns: int) -> None:
         self.scanned += 1
 
-    def update(self, now_ns: int) -> None:
+    def update(self, now_ns: int, is_late: Callable[[], bool]) -> None:
         """Nothing to do."""
 
 

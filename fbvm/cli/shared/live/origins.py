@@ -29,6 +29,9 @@ from fbvm.run.plant import Plant
 from fbvm.run.project import PlcRow, Project
 from fbvm.run.running import Running
 
+GROUPS_FILE = "watch.toml"
+"""Beside the file of a project; beside a program with its name in front: pump.watch.toml."""
+
 
 @dataclass
 class SeenPlc:
@@ -37,6 +40,8 @@ class SeenPlc:
     plc: Plc
     texts: dict[str, str]
     text: ProgramText
+    watch: tuple[str, ...] = ()
+    """What a page watches at first."""
 
 
 @dataclass
@@ -57,6 +62,10 @@ class Origin(Protocol):
     def files(self) -> Sequence[Path]:
         """The files whose change makes another program; none for a program that is not begun again."""
 
+    @property
+    def groups_file(self) -> Path | None:
+        """Where groups of watched names are kept; None if nowhere."""
+
     def matters(self, changed: Sequence[Path]) -> bool:
         """True if these changed files make another program."""
 
@@ -76,6 +85,7 @@ class BuiltOrigin:
 
     built: Built
     files: Sequence[Path] = ()
+    groups_file: Path | None = None
 
     def matters(self, changed: Sequence[Path]) -> bool:
         return False
@@ -108,6 +118,10 @@ class FileOrigin:
     @property
     def files(self) -> Sequence[Path]:
         return self.given
+
+    @property
+    def groups_file(self) -> Path:
+        return self.given[0].with_name(f"{self.given[0].stem}.{GROUPS_FILE}")
 
     def matters(self, changed: Sequence[Path]) -> bool:
         return bool(changed)
@@ -152,6 +166,10 @@ class ProjectOrigin:
     def files(self) -> Sequence[Path]:
         rows = self.project.plcs if self.project else ()
         return [self.file, *(source for row in rows for source in row.sources)]
+
+    @property
+    def groups_file(self) -> Path:
+        return self.file.with_name(GROUPS_FILE)
 
     def matters(self, changed: Sequence[Path]) -> bool:
         if any(file != self.file for file in changed) or self.project is None:
@@ -202,7 +220,7 @@ class ProjectOrigin:
             texts = source_texts(kind.runs[0].plc.image, own, row.libraries)
             text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect)
             for name, run in zip(kind.names, kind.runs, strict=True):
-                plcs[name] = SeenPlc(run.plc, texts, text)
+                plcs[name] = SeenPlc(run.plc, texts, text, tuple(row.watch))
         return Built(plcs, [self.bound(run) for run in plant.runs], plant.close)
 
 

@@ -139,6 +139,8 @@ class _Page:
             return False
 
         bench.held_by = "a debugger"
+        for live in bench.plcs.values():
+            live.end_power()
         try:
             if port.serve(debugged, look_on):
                 return True
@@ -196,6 +198,7 @@ class _Page:
 
     def _workbench(self) -> Any:
         from fbvm.live.changes import SourceChanges
+        from fbvm.live.groups import WatchGroups
         from fbvm.live.pictures import Pictures
         from fbvm.live.plcs import LivePlc
         from fbvm.live.pytest_text import pytest_text
@@ -205,7 +208,7 @@ class _Page:
         for (name, seen), run in zip(self.built.plcs.items(), self.built.runs, strict=True):
             told = Described(seen.text, source_lines(seen.plc.image, seen.texts))
             recorded = self._recording.add(self._segment(name), seen.plc, told)
-            lives.append(LivePlc(name, seen.plc, recorded, seen.texts, partial(_has_ended, run)))
+            lives.append(LivePlc(name, seen.plc, recorded, seen.texts, partial(_has_ended, run), seen.watch))
         test = None
         if self.built.repeated:
             files, program = self.built.repeated
@@ -220,6 +223,8 @@ class _Page:
         except UnknownPlace as error:
             raise click.UsageError(f"--allow-write: {error}") from None
         bench.lesson = self._lesson
+        if file := origin.groups_file:
+            bench.groups = WatchGroups(file)
         bench.can_branch = self._has_past and bool(origin.files) and not any(live.is_real for live in lives)
         return bench
 
