@@ -192,6 +192,8 @@ class _Reader:
         else:
             row = instruction_set().rows.get(mnemonic)
             self._box(Box(number, prefix + mnemonic, operands), row.inputs if row else 1)
+            if row and row.ends_condition:
+                self.now = _Condition(self.bar, Series())
 
     def _box(self, box: Box, count: int) -> None:
         """Add a box as an output.  If it has several inputs, these are the last blocks; all but the first of these begin at
