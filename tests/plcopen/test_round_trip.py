@@ -306,3 +306,11 @@ def test_enumerations_and_subranges_of_variables_have_names_that_other_tools_can
     plc = machine(back.files, program)
     plc.scan()
     assert plc.read("Main.s") is True
+
+
+def test_what_ladder_of_other_tools_does_not_have_is_said() -> None:
+    for rung, what in (("LD P_On\nBPRG 0\nBEND", "block program (BPRG)"),
+                       ("LD 0.00\nOUT TR0\nAND 0.01\nLD TR0\nAND 0.02\nCNT 5 #2",
+                        "CNT of which two inputs begin at a branch point")):  # fmt: skip
+        made = export_xml([Source("a.st", f"PROGRAM Main\nLADDER\n{rung}\nEND_LADDER\nEND_PROGRAM")])
+        assert [d.message for d in made.errors] == [f"Main: ladder of PLCopen XML has no {what}"]

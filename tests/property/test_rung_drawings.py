@@ -53,7 +53,17 @@ class Maker:
         if kind < 0.6:
             name, count, inputs = self.random.choice(COUNTERS)
             return Box(-1, name, self.some(OPERANDS, count), tuple(self.series(1, 3) for _ in range(inputs - 1)))
+        if kind < 0.67:
+            return self.joined()
         return self.coil()
+
+    def joined(self) -> Point:
+        """A path to a box whose lower inputs begin where the path does."""
+        path = self.series(1, 2) if self.random.random() < 0.8 else Series()
+        outs: list[Coil | Box | Point] = [self.coil()] if path.parts and self.random.random() < 0.3 else []
+        name, count, inputs = self.random.choice(COUNTERS)
+        lower = [Series(self.series(1, 3).parts, True) for _ in range(inputs - 1)]
+        return Point(path, [*outs, Box(-1, name, self.some(OPERANDS, count), tuple(lower))])
 
     def coil(self) -> Coil:
         return Coil(-1, self.random.choice(COILS), self.some(NAMES, 1))

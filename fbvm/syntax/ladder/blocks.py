@@ -74,20 +74,20 @@ class LadderBlocks:
         context = self.context
         first = row.operands[:1]
         numbered = first in ("t", "c")
-        operands = self._numbered(first) if numbered else [context.operand(0)]
+        operands = self.numbered(first) if numbered else [context.operand(0)]
         operands += [context.operand(position) for position in range(1, len(row.operands))]
-        name = self._named(row, self._number(first)) if numbered else context.name("block")
+        name = self.instance_name(row, self.number(first)) if numbered else context.name("block")
         conditions = context.inputs(row.inputs)
         instance = context.variable(name, row.does)
         off = (context.truth(False),) * row.inputs
-        inhibited = context.if_reachable(self._called(instance, [*off, *operands])) if row.kind == "FB" else ()
+        inhibited = context.if_reachable(self.called(instance, [*off, *operands])) if row.kind == "FB" else ()
         passed: tuple[Statement, ...] = ()
-        number = self._number(first) if numbered else 0
+        number = self.number(first) if numbered else 0
         if first == "t" and row.kind == "FB" and isinstance(number, int) and number < REFRESHED:
-            passed = (self._update(instance, operands[:2]),)
-        context.emit(*context.if_reachable(self._called(instance, [*conditions, *operands])), inhibited=inhibited, passed=passed)
+            passed = (self.update(instance, operands[:2]),)
+        context.emit(*context.if_reachable(self.called(instance, [*conditions, *operands])), inhibited=inhibited, passed=passed)
 
-    def _update(self, instance: Expr, flag_and_value: list[Expr], **pins: bool) -> CallStatement:
+    def update(self, instance: Expr, flag_and_value: list[Expr], **pins: bool) -> CallStatement:
         """A call of a timer with its flag and present value and these pins; its other inputs keep their values."""
         context = self.context
         start, end = context.start, context.end
@@ -96,16 +96,17 @@ class LadderBlocks:
                       for pin, value in zip(("Flag", "PV"), flag_and_value, strict=True)]
         return CallStatement(start, end, Call(start, end, instance, tuple(arguments)))
 
-    def _named(self, row: Instruction, number: int | str) -> str:
+    def instance_name(self, row: Instruction, number: int | str) -> str:
         """The name of the instance of a timer or counter; two mnemonics with one number have an instance each."""
         return f"${row.mnemonic}{number}" if isinstance(number, int) else f"${row.mnemonic}:{number}"
 
-    def _called(self, instance: Expr, arguments: list[Expr]) -> CallStatement:
+    def called(self, instance: Expr, arguments: list[Expr]) -> CallStatement:
+        """A call of an instance with its inputs in their order."""
         context = self.context
         call = Call(context.start, context.end, instance, tuple(Argument(a.start, a.end, "", None, a) for a in arguments))
         return CallStatement(context.start, context.end, call)
 
-    def _number(self, letter: str) -> int | str:
+    def number(self, letter: str) -> int | str:
         """The number of the timer or counter in the first operand, or the name of one that each instance has."""
         text = self.context.line.step.operands[0]
         number = self._timer(text, letter)
@@ -125,11 +126,11 @@ class LadderBlocks:
         digits = text[1:] if text[:1].upper() == letter.upper() else text
         return whole_number(digits) if digits.isdecimal() and whole_number(digits) < TIMERS else None
 
-    def _numbered(self, letter: str) -> list[Expr]:
+    def numbered(self, letter: str) -> list[Expr]:
         """The completion flag and the present value of the timer or counter in the first operand."""
         start, end = self.context.line.places[0]
         flag, value = ("TF", "T") if letter == "t" else ("CNF", "C")
-        number = self._number(letter)
+        number = self.number(letter)
         if isinstance(number, str):
             _, value = self.context.operands.own[number]
             return [NameRef(start, end, self.context.line.step.operands[0]), NameRef(start, end, value)]
@@ -137,13 +138,13 @@ class LadderBlocks:
 
     def reset_timer(self) -> None:
         """TRSET: restarts the timer, as if its condition had been OFF for one cycle."""
-        context, number = self.context, self._number("t")
+        context, number = self.context, self.number("t")
         row = self._timers.get(number)
         if row is None:
             raise OperandError(f"there is no timer {number} in these rungs", "TRSET stands in the rungs of its timer")
-        instance = context.variable(self._named(row, number), row.does)
+        instance = context.variable(self.instance_name(row, number), row.does)
         pins = {"In": False, "Reset": True} if row.inputs == 2 else {"In": False}
-        context.emit(context.when(context.variation(context.power()), self._update(instance, self._numbered("t"), **pins)))
+        context.emit(context.when(context.variation(context.power()), self.update(instance, self.numbered("t"), **pins)))
 
     def reset_numbers(self) -> None:
         """CNR and CNRX: turn the timers or counters of a range of numbers OFF and set their present values to the maximum."""

@@ -7,10 +7,11 @@ instructions and import the context; this module puts them together.
 from __future__ import annotations
 
 from fbvm.syntax.ladder.bits import BitLogic
+from fbvm.syntax.ladder.block_programs import BlockPrograms
 from fbvm.syntax.ladder.blocks import LadderBlocks
 from fbvm.syntax.ladder.context import RungContext, StepRefused
 from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set, spelling
-from fbvm.syntax.ladder.mnemonics import RungText, is_input, read_rungs
+from fbvm.syntax.ladder.mnemonics import ALONE, LAST, RungText, is_input, read_rungs
 from fbvm.syntax.ladder.operands import OperandError
 from fbvm.syntax.ladder.sequences import Sequences
 from fbvm.syntax.ladder.spans import Spans
@@ -31,8 +32,10 @@ class LadderLowering:
         self.blocks = LadderBlocks(context)
         self.spans = Spans(context)
         self.sequences = Sequences(context, self.spans)
-        self._instructions = {**self.bits.instructions, **self.blocks.instructions, **self.spans.instructions,
-                              **self.sequences.instructions, ".end": self._end, ".nop": self._nothing}
+        self.programs = BlockPrograms(context, self.spans, self.blocks)
+        self._instructions = {
+            **self.bits.instructions, **self.blocks.instructions, **self.spans.instructions, **self.sequences.instructions,
+            **self.programs.instructions, ".end": self._end, ".nop": self._nothing}  # fmt: skip
         """By the word of the front end in the table of instructions, what lowers a step."""
 
     def ladder(self, texts: list[RungText], start: int, end: int) -> Ladder:
@@ -51,12 +54,14 @@ class LadderLowering:
         self.blocks.find_timers(texts)
         rungs = []
         before = sum(len(ladder.rungs) for ladder in self.builder.ladders)
+        self.programs.find_places(enumerate(texts, before + 1))
         for position, text in enumerate(texts, 1):
             context.rung = before + position
             rung = self._rung(text, position if text.number is None else text.number)
             rungs.append(rung)
             self.spans.add_rung(rung)
         self.sequences.close()
+        self.programs.finish()
         body = self.spans.finish()
         located = tuple(context.operands.located.values())
         return Ladder(start, end, tuple(rungs), body, (*located, *context.variables.values()),
@@ -69,6 +74,7 @@ class LadderLowering:
             context.begin_step(step, line)
             before = len(context.out)
             try:
+                self._check_alone(text, step)
                 self._step(line.row)
             except (StepRefused, OperandError) as refusal:
                 place = refusal.place if isinstance(refusal, OperandError) and refusal.place else (context.start, context.end)
@@ -95,10 +101,17 @@ class LadderLowering:
             context.report("S0110", last.start, last.end, "a condition is left that no AND LD, OR LD or output has used",
                            "a block that begins with LD is joined to the one before by AND LD or OR LD")
 
+    def _check_alone(self, text: RungText, step: int) -> None:
+        """Refuse an instruction that begins or ends more than its rung beside others: a drawing is not parted there."""
+        row, last = text.lines[step].row, len(text.lines) - 1
+        if last and row.does in ALONE or step < last and row.does in LAST:
+            raise StepRefused(f"{row.mnemonic} stands in one drawing with other instructions", "it is a rung of its own")
+
     def _step(self, row: Instruction) -> None:
         context = self.context
         if not row.does:
             raise StepRefused(f"{row.mnemonic} is understood and not executed", row.words)
+        self.programs.enter(row)
         self._check(row)
         if row.kind == "?":
             self.bits.join(row.join, context.element(context.state_if_reachable(context.call())))
@@ -106,6 +119,7 @@ class LadderLowering:
             self._instructions[row.does]()
         else:
             self.blocks.execute(row)
+        self.programs.exit(row)
 
     def _check(self, row: Instruction) -> None:
         """Refuse a step with too many or too few operands, or without the execution condition that it needs."""

@@ -89,8 +89,12 @@ class RungText:
         return max(self.lines[-1].row.least - len(self.lines[-1].step.operands), 0)
 
 
-ALONE = (".end", ".jump_end", ".for", ".next", ".step", ".subroutine", ".return")
+ALONE = (".end", ".jump_end", ".for", ".next", ".step", ".subroutine", ".return", ".loop")
 """Instructions that begin or end more than a rung, and are therefore rungs of their own, whatever a line RUNG says."""
+LAST = (*ALONE, ".loop_end")
+"""Instructions behind which another rung begins."""
+INSIDE = (".block_end", ".if", ".else", ".if_end", ".wait", ".exit")
+"""Instructions at the bus bar that go on with a rung, in the lines of a block program."""
 
 
 class Refusal(Exception):
@@ -342,12 +346,13 @@ class _LineReader:
              operands: list[Token], remark: Token | None) -> None:
         written = prefix.text if prefix else ""
         self._refuse_statement(mnemonic, operands)
-        row = instruction("", mnemonic.text, mnemonic.start, mnemonic.end)
+        name, operands = _with_not(mnemonic.text, operands)
+        row = instruction("", name, mnemonic.start, mnemonic.end)
         if code and whole_number(code.text[1:-1]) != int(row.code or 1000):
             raise Refusal(code.start, code.end,
                           f"{row.mnemonic} has the function code {row.code or 'none'}, not {code.text[1:-1]}",
                           "leave the code out, or write the mnemonic that belongs to it")
-        instruction(written, mnemonic.text, mnemonic.start - len(written), mnemonic.end)
+        instruction(written, name, mnemonic.start - len(written), mnemonic.end)
         operands = _joined(operands, len(row.operands)) if row.does != ".call" else operands
         if not (operands and _is_branch(operands[0].text)):
             self._begin(row, mnemonic)
@@ -383,9 +388,17 @@ class _LineReader:
     def _begin(self, row: Instruction, mnemonic: Token) -> None:
         """Begin another rung if this instruction does."""
         rung = self.rungs[-1]
-        apart = rung.lines and (row.does in ALONE or rung.lines[-1].row.does in ALONE)
-        if rung.picture or rung.lines and (apart or not rung.declared) and row.inputs == 0 and rung.may_end:
+        apart = rung.lines and (row.does in ALONE or rung.lines[-1].row.does in LAST)
+        begins = row.inputs == 0 and row.does not in INSIDE or rung.lines and rung.lines[-1].row.does in LAST
+        if rung.picture or rung.lines and (apart or not rung.declared) and begins and rung.may_end:
             self.rungs.append(RungText(mnemonic.start, is_guessed=not rung.picture and not apart))
+
+
+def _with_not(mnemonic: str, operands: list[Token]) -> tuple[str, list[Token]]:
+    """The mnemonic and the operands of `IF(802) NOT 0.01`, where NOT belongs to the mnemonic."""
+    if operands and operands[0].text.upper() == "NOT" and f"{spelling(mnemonic)}NOT" in instruction_set().rows:
+        return f"{mnemonic}NOT", operands[1:]
+    return mnemonic, operands
 
 
 def _joined(operands: list[Token], wanted: int) -> list[Token]:

@@ -279,6 +279,18 @@ class Spans:
                               f"numbers are 0 to {numbers - 1}")
         return number
 
+    def begin_repeat(self, what: str, again: str) -> None:
+        """The rungs behind the one at work are repeated, up to the one of `end_repeat`; `again` names the variable that says
+        whether."""
+        self._opening = Span(what, again=self.context.temporary(again))
+
+    def end_repeat(self) -> NameRef:
+        """The variable to be set behind the last rung that is repeated; the rung at work is that rung."""
+        again = self.open[-1].again
+        assert again is not None
+        self._closing = "JMP"
+        return self.context.temporary(again.text)
+
     def _close_jump_back(self) -> None:
         context, span = self.context, self.open.pop()
         assert span.again is not None
@@ -325,6 +337,7 @@ class Spans:
 
 
 _OPEN = {"FOR": ("FOR without NEXT", "FOR and NEXT stand in pairs"),
+         "LOO": ("LOOP without LEND", "LOOP and LEND stand in pairs"),
          "SBN": ("SBN without RET", "RET ends a subroutine")}
 """By the beginning of `Span.what`, message and hint for a span without its end."""
 

@@ -38,6 +38,7 @@ class EndCode(IntEnum):
     NORMAL = 0x0000
     NOT_IN_NETWORK = 0x0101
     NO_UNIT = 0x0202
+    BUSY = 0x0204
     TIMED_OUT = 0x0205
     UNDEFINED = 0x0401
     NOT_SUPPORTED = 0x0402

@@ -48,6 +48,15 @@ DRAWINGS = {
         │      │   d        e    │
         │      └──┤/├──────(@S)──┤
     """),
+    "a box whose inputs begin at a branch point": ("LD a\nOUT TR0\nAND b\nLD TR0\nAND c\nCNT 5 #10\nLD TR0\nAND b\nOUT d", """
+        │   a      b       ┌─────┐ │
+        ├──┤ ├─┬──┤ ├──────┤ CNT │ │
+        │      │   c       │ 5   │ │
+        │      ├──┤ ├──────┤ #10 │ │
+        │      │           └─────┘ │
+        │      │   b           d   │
+        │      └──┤ ├─────────( )──┤
+    """),
     "edges": ("@LD a\n%AND b\nUP\nDIFU c", """
         │   a      b    ┌────┐       c   │
         ├──┤↑├────┤↓├───┤ UP ├──────(↑)──┤

@@ -215,3 +215,17 @@ def test_a_good_client_is_served_beside_one_that_brings(rig: FinsRig, name: str)
     rig.plc.run(scans=5)
     assert rig.plc.read("CIO 1523") == 1
     assert error_of(TcpClient(rig, 140).connect()) == 0
+
+
+def test_more_commands_than_the_unit_has_buffers_are_answered_and_not_executed(rig: FinsRig) -> None:
+    """Of two clients with a hundred writes each, those behind 192 find the destination busy."""
+    clients = [TcpClient(rig, number) for number in (100, 101)]
+    for client in clients:
+        client.connect()
+    for client in clients:
+        client.say(b"".join(Message(Kind.FRAME, bytes.fromhex(f"80 00 02 00 01 00 00 EF 00 {number:02X} 01 03 82 00 {number:02X} 00 "
+                                                              "00 01 00 01")).to_bytes() for number in range(100)))
+    rig.plc.scan()
+    ends = [[message.body[12:].hex() for message in Splitter().feed(client.hear()) if isinstance(message, Message)]
+            for client in clients]
+    assert ends == [["0000"] * 100, ["0000"] * 92 + ["0204"] * 8]

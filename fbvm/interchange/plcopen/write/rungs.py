@@ -136,6 +136,8 @@ class RungWriter:
     def _step(self, step: Step) -> None:
         row = instruction_set().rows[step.mnemonic]
         prefix = step.prefix.replace("!", "")
+        if row.ends_condition:
+            raise self._not_exportable(f"block program ({step.mnemonic})")
         if join := re.fullmatch(r"(LD|AND|OR)(NOT)?", step.mnemonic):
             self._join(join[1], bool(join[2]), step)
         elif row.kind == "?":
@@ -164,6 +166,8 @@ class RungWriter:
         name = step.operands[0]
         if how == "LD" and name.upper() in self.kept:
             kept = self.kept[name.upper()]
+            if self.now is not None:
+                self.saved.append(self.now)
             self.now = Power(kept.ends, [], kept.column, self.rows)
             return
         self._joined(how, self._contact(name, negated, step.prefix.replace("!", "")))
@@ -343,6 +347,8 @@ class RungWriter:
         column = place = 0
         if row.inputs:
             powers = [*[self.saved.pop() for _ in range(row.inputs - 1)][::-1], self.power]
+            if any(power.ends is not None for power in powers[1:]):
+                raise self._not_exportable(f"{step.mnemonic} of which two inputs begin at a branch point")
             for power in powers[:-1]:
                 self._drawn(power)
                 self.rows += 1

@@ -61,6 +61,8 @@ class Coil:
 @dataclass(eq=False)
 class Series:
     parts: list[Part] = field(default_factory=list)
+    from_branch: bool = False
+    """Of a lower input of a box: it begins at the point before the one that the box hangs on, not at the bus bar."""
 
 
 @dataclass(eq=False)
@@ -74,6 +76,11 @@ class Point:
 
     path: Series
     outs: list[Out] = field(default_factory=list)
+
+    @property
+    def is_joined(self) -> bool:
+        """Whether a box on it has lower inputs that begin at the point before."""
+        return any(path.from_branch for out in self.outs if isinstance(out, Box) for path in out.inputs)
 
 
 Part = Contact | Box | Parallel
@@ -116,6 +123,8 @@ class _Reader:
         self.now = _Condition(self.bar, Series())
         self.stack: list[_Condition] = []
         self.kept: dict[str, Point] = {}
+        self.before: dict[Point, Point] = {}
+        """The point before each point but the bus bar."""
         self.lost = False
         """Whether the condition is that of the last input of a box, behind which nothing can be drawn."""
 
@@ -168,8 +177,13 @@ class _Reader:
         """The point at which the execution condition is; made if there is none yet."""
         if self.now.is_empty():
             return self.now.start
+        return self._made()
+
+    def _made(self) -> Point:
+        """A new point at the end of the present path, which may be empty."""
         point = Point(self.now.path)
         self.now.start.outs.append(point)
+        self.before[point] = self.now.start
         self.now = _Condition(point, Series())
         return point
 
@@ -192,28 +206,48 @@ class _Reader:
         else:
             row = instruction_set().rows.get(mnemonic)
             self._box(Box(number, prefix + mnemonic, operands), row.inputs if row else 1)
+            if row and row.ends_condition:
+                self.now = _Condition(self.bar, Series())
 
     def _box(self, box: Box, count: int) -> None:
         """Add a box as an output.  If it has several inputs, these are the last blocks; all but the first of these begin at
-        the bus bar."""
+        the bus bar, or all at the point from which power comes to the box."""
         if count < 2:
             start = self.bar if box.instance and not count else self._point()
             start.outs.append(box)
             return
         blocks = [*self.stack[len(self.stack) - count + 1:], self.now]
-        if len(blocks) < count or any(block.start is not self.bar or block.is_empty() for block in blocks[1:]):
+        if len(blocks) < count:
             raise Undrawable
         del self.stack[len(self.stack) - count + 1:]
         self.now = blocks[0]
         box.inputs = tuple(block.path for block in blocks[1:])
+        if any(block.start is not self.bar for block in blocks[1:]):
+            self._join_branch(blocks)
+        elif any(block.is_empty() for block in blocks[1:]):
+            raise Undrawable
         self._point().outs.append(box)
         self.lost = self.now.start is not self.bar
         self.now = self.now if self.lost else _Condition(self.bar, Series())
+
+    def _join_branch(self, blocks: Sequence[_Condition]) -> None:
+        """Let the lower inputs of a box begin at the point from which power comes to the box."""
+        branch = blocks[1].start
+        if any(block.start is not branch for block in blocks[1:]):
+            raise Undrawable
+        if self.now.start is branch:
+            self._made()
+        elif not self.now.is_empty() or self.before.get(self.now.start) is not branch:
+            raise Undrawable
+        for block in blocks[1:]:
+            block.path.from_branch = True
 
     def finish(self) -> None:
         """Make a point at the end of a path that no output follows, such as a block whose ENO is not used."""
         if not self.now.is_empty():
             self._point()
+        if any(point.is_joined and not Point(Series(), point.outs[-1:]).is_joined for point in self.before):
+            raise Undrawable  # the lines of the lower inputs would cross what hangs on the point below the box
 
 
 def _branches(path: Series) -> list[Series]:

@@ -57,6 +57,14 @@ class _Rest(NamedTuple):
     power: bool | None
 
 
+class _Branch(NamedTuple):
+    """Where a point has been drawn: the column and row at which its paths begin, and its power."""
+
+    x: int
+    y: int
+    power: bool | None
+
+
 class _Drawing:
     """Draws one rung.  Power is True, False, or None at rest."""
 
@@ -92,20 +100,21 @@ class _Drawing:
     # --- branch points and outputs ----------------------------------------------------------------------------------
 
     def _outs(self, point: Point, x: int, y: int, power: bool | None, is_open: bool = False, below: int = 0,
-              trunk: bool = False) -> int:
+              trunk: bool = False, before: _Branch | None = None) -> int:
         """What hangs on a point in column x whose line is in the row below y; the row behind it all.
 
-        `is_open`: a line passes below what is drawn here, so nothing may come from the left; else it may below `below`."""
+        `is_open`: a line passes below what is drawn here, so nothing may come from the left; else it may below `below`.
+        `before` is the point before, from which lower inputs of boxes may come."""
         first = last = y + 1
         for position, out in enumerate(point.outs):
             last = y + 1
             passed = is_open or not trunk and position + 1 < len(point.outs)
             if isinstance(out, Point):
-                y = self._point(out, x, y, power, passed, below)
-            elif isinstance(out, Box) and out.inputs and passed:
+                y = self._point(out, x, y, power, passed, below, _Branch(x, first, power))
+            elif isinstance(out, Box) and passed and any(not path.from_branch for path in out.inputs):
                 y = self._leave(Point(Series(), [out]), x, y, power)
             else:
-                y = self._output(out, x, y, power, below)
+                y = self._output(out, x, y, power, below, before)
         if not trunk:
             self.surface.down(x, first, last, bool(power))
         if not point.outs:
@@ -113,18 +122,20 @@ class _Drawing:
             y += 2
         return y
 
-    def _point(self, point: Point, x: int, y: int, power: bool | None, is_open: bool = False, below: int = 0) -> int:
-        """A path and the point at its end; what does not fit is left for another line."""
+    def _point(self, point: Point, x: int, y: int, power: bool | None, is_open: bool = False, below: int = 0,
+               before: _Branch | None = None) -> int:
+        """A path and the point at its end; what does not fit is left for another line, unless lower inputs join it."""
         depth, parts = y, point.path.parts
         for at, part in enumerate(parts):
             behind = LINK if at + 1 < len(parts) else self.widths.needed(point) + SLACK
-            if x + self.widths.part(part) + behind > self.width and x > max(self._start, LINK):
+            fits = x + self.widths.part(part) + behind <= self.width or point.is_joined
+            if not fits and x > max(self._start, LINK):
                 return max(depth, self._leave(Point(Series(parts[at:]), point.outs), x, y, power))
             wide = self._fitting(part, self.width - behind - x)
             height, power = self._part(part, x, y, power, wide)
             x, depth = x + wide, max(depth, y + height)
             self._take(x + behind - (SLACK if at + 1 == len(parts) else 0))
-        return max(depth, self._outs(point, x, y, power, is_open, max(depth, below)))
+        return max(depth, self._outs(point, x, y, power, is_open, max(depth, below), before=before))
 
     def _leave(self, rest: Point, x: int, y: int, power: bool | None) -> int:
         """End a line with an arrow and a number; its rest begins with the same arrow, below all lines that were begun."""
@@ -149,7 +160,7 @@ class _Drawing:
         if columns > self.width:
             self.need = max(self.need, columns)
 
-    def _output(self, out: Coil | Box, x: int, y: int, power: bool | None, below: int) -> int:
+    def _output(self, out: Coil | Box, x: int, y: int, power: bool | None, below: int, before: _Branch | None) -> int:
         seen = None if isinstance(out, Box) and out.inputs else self._state(out.step, 0)  # of several inputs it is the last
         on = bool(power if seen is None else seen)
         end = self.width - 1
@@ -165,15 +176,20 @@ class _Drawing:
         at = end - made.right - made.wide - 2
         if out.entries or not out.instance:
             self.surface.across(x, at, y + 1, on)
-        rows, bottom = self._more_inputs(out, y, at, below)
+        rows, bottom = self._more_inputs(out, y, at, below, before)
         return max(bottom, y + self._box(made, at, y, [1, *rows]))
 
-    def _more_inputs(self, box: Box, y: int, until: int, below: int) -> tuple[list[int], int]:
-        """The conditions below the first one, each from the bus bar to the box; the rows of their lines, counted from y,
-        and the row behind them all."""
+    def _more_inputs(self, box: Box, y: int, until: int, below: int, before: _Branch | None) -> tuple[list[int], int]:
+        """The conditions below the first one, each from the bus bar or from the point before to the box; the rows of their
+        lines, counted from y, and the row behind them all."""
         rows, row = [], max(y + 2, below)
         for path in box.inputs:
-            height, power, line, x = self._series(path, 0, row, self.annotations.states is not None or None, until - 1)
+            begins = _Branch(0, row + 1, self.annotations.states is not None or None)
+            if path.from_branch:
+                assert before is not None
+                begins = before
+                self.surface.down(before.x, before.y, row + 1, bool(before.power))
+            height, power, line, x = self._series(path, begins.x, row, begins.power, until - 1)
             self.surface.across(x, until, line, bool(power))
             self._take(x + self.width - until + 1)
             rows.append(line - y)

@@ -65,7 +65,7 @@ class Nets(ABC):
             pass
         self._check()
         bar = Point(Series())
-        self._hang(bar, BUS)
+        self._hang(bar, BUS, None)
         return bar
 
     # --- reduction --------------------------------------------------------------------------------------------------
@@ -131,32 +131,40 @@ class Nets(ABC):
     def _others(self) -> dict[Hashable, Net]:
         return {net.name: net for leaves in self.leaves.values() for leaf in leaves for net in leaf.others}
 
-    def _hang(self, point: Point, net: Hashable) -> None:
-        """Add to a point what follows its net, from above."""
-        others = self._others()
+    def _hang(self, point: Point, net: Hashable, before: Hashable) -> None:
+        """Add to a point what follows its net, from above; `before` is the net of the point before."""
+        others = {name for name in self._others() if name not in self.leaves and all(edge.start != name for edge in self.edges)}
         outs: list[tuple[Order, Coil | Box | Point]] = []
         for leaf in self.leaves.get(net, ()):
             if leaf.others:
                 assert isinstance(leaf.out, Box)
-                leaf.out.inputs = tuple(self._input(other, leaf.out) for other in leaf.others)
+                branch = net if any(self._begins(other) == net for other in leaf.others) else before
+                leaf.out.inputs = tuple(self._input(other, leaf.out, branch) for other in leaf.others)
+                if branch == net != BUS:
+                    outs.append((leaf.order, Point(Series(), [leaf.out])))
+                    continue
             outs.append((leaf.order, leaf.out))
         for edge in self.edges:
             if edge.start == net and edge.end not in others:
                 behind = Point(Series(edge.parts))
                 if edge.end != SINK:
-                    self._hang(behind, edge.end)
+                    self._hang(behind, edge.end, net)
                 outs.append((edge.order, behind))
         point.outs = [out for _, out in sorted(outs, key=lambda pair: pair[0])]
 
-    def _input(self, net: Net, box: Box) -> Series:
-        """The condition of a lower input of a box."""
+    def _begins(self, net: Net) -> Hashable:
+        """The net at which the condition of a lower input begins."""
+        return next((edge.start for edge in self.edges if edge.end == net.name), net.name)
+
+    def _input(self, net: Net, box: Box, branch: Hashable) -> Series:
+        """The condition of a lower input of a box; it begins at the bus bar, or at the net `branch`."""
+        if net.name in (BUS, branch):
+            return Series([], net.name != BUS)
         into = [edge for edge in self.edges if edge.end == net.name]
-        if net.name == BUS:
-            return Series()
-        if net.name in self.leaves or any(edge.start == net.name for edge in self.edges) or into[0].start != BUS:
+        if net.name in self.leaves or any(edge.start == net.name for edge in self.edges) or into[0].start not in (BUS, branch):
             self.bad(box, "a lower input of this box hangs on a wire that leads elsewhere, too",
                       "each of its inputs has a line of its own from the left rail")
-        return Series(into[0].parts)
+        return Series(into[0].parts, into[0].start != BUS)
 
 
 class Network(Nets):

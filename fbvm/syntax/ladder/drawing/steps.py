@@ -32,10 +32,12 @@ class _Coder:
         self.steps: list[Coded] = []
         self.points = 0
 
-    def outs(self, point: Point, at_bar: bool = False) -> None:
-        """The outputs and paths of a point whose condition has been made; a TR bit keeps the condition if it is needed again."""
+    def outs(self, point: Point, at_bar: bool = False, before: str = "") -> None:
+        """The outputs and paths of a point whose condition has been made; a TR bit keeps the condition if it is needed again.
+        `before` is the TR bit of the point before."""
         kept = ""
-        if not at_bar and any(isinstance(out, Point) or isinstance(out, Box) and out.inputs for out in point.outs[:-1]):
+        again = any(isinstance(out, Point) or isinstance(out, Box) and out.inputs for out in point.outs[:-1])
+        if not at_bar and (again or any(isinstance(out, Point) and out.is_joined for out in point.outs)):
             kept = f"TR{self.points}"
             self.points += 1
             self.add("OUT", kept)
@@ -46,12 +48,14 @@ class _Coder:
             used = isinstance(out, Point) or isinstance(out, Box) and bool(out.inputs)
             if isinstance(out, Point):
                 self.series(out.path, not at_bar)
-                self.outs(out)
+                self.outs(out, before=kept)
             elif isinstance(out, Coil):
                 self.steps.append(coil(out))
             else:
                 for path in out.inputs:
-                    self.series(path, False)
+                    if path.from_branch:
+                        self.add("LD", before)
+                    self.series(path, path.from_branch)
                 self.box(out)
 
     def add(self, mnemonic: str, *operands: str) -> None:

@@ -12,6 +12,9 @@ from fbvm.base.data import data_folder
 JOINS = ("LD", "AND", "OR")
 """Prefixes of a comparison or a bit test that say how it joins the execution condition."""
 
+IN_BLOCK_PROGRAMS = (".if", ".else", ".if_end", ".wait", ".exit", ".loop", ".loop_end", ".pause", ".restart", ".timer_wait",
+                     ".counter_wait", ".block_end")
+"""What instructions do that stand in block programs only."""
 
 KINDS = {
     "b": "a bit", "B": "a bit", "w": "a word or constant", "W": "a word", "d": "two words or a constant",
@@ -47,6 +50,11 @@ class Instruction(NamedTuple):
         """What an operand is, for messages."""
         name = self.names[position]
         return self.mnemonic if name == "B" else f"{name} of {self.mnemonic}"
+
+    @property
+    def ends_condition(self) -> bool:
+        """Whether the next instruction begins at the bus bar, as in block programs."""
+        return self.does == ".block_program" or self.does in IN_BLOCK_PROGRAMS
 
     @property
     def described(self) -> str:
@@ -90,7 +98,7 @@ def _kind(what: str) -> tuple[str, str]:
     return (kind, does) if colon else ("", what)
 
 
-_SPACED = re.compile(r"(LD|AND|OR|OUT)(NOT|LD|TSTN?)")
+_SPACED = re.compile(r"(LD|AND|OR|OUT|IF|WAIT|EXIT|LEND)(NOT|LD|TSTN?)")
 
 
 def _pattern(rows: dict[str, Instruction]) -> re.Pattern[str]:

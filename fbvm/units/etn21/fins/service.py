@@ -35,7 +35,8 @@ from fbvm.wire.link import (
 )
 
 MOST_FRAMES = 192
-"""That one servicing takes from the network: as many as the unit has buffers (W465 8-1 p199)."""
+"""Commands that are executed in one servicing: as many as the unit has buffers (W465 8-1 p199).  Those behind them are
+answered at once: 0204, the destination is busy."""
 BUFFER_BYTES = 4096
 """Of each connection."""
 PATIENCE_NS = 10_000_000_000
@@ -53,7 +54,7 @@ class FinsService:
         self.state = state or FinsState()
         self._requests: list[Request] = []
         self._frames = 0
-        """Frames of this servicing."""
+        """Commands of this servicing."""
         self.asks_restart = False
         """True if a command restarts the unit; who does so resets it."""
         self._cpu: CpuUnit
@@ -124,10 +125,7 @@ class FinsService:
         self._requests, self._frames, self._cpu, self._now_ns = [], 0, cpu, now_ns
         state = self.state
         events, state.events = state.events, []
-        for number, event in enumerate(events):
-            if self._frames >= MOST_FRAMES:
-                state.events = events[number:]
-                break
+        for event in events:
             self._event(event)
         if state.connections:
             self._expire()
@@ -173,7 +171,6 @@ class FinsService:
 
     def _received(self, event: Received) -> None:
         if event.channel == UDP_CHANNEL:
-            self._frames += 1
             if response := self._frame(event.data, event.remote, None):
                 self._requests.append(SendTo(UDP_CHANNEL, event.remote, response))
         elif found := self.state.connections.get(event.channel):
@@ -219,7 +216,6 @@ class FinsService:
         elif message.is_wrong:
             self._refuse(channel, found, tcp.Error.TOO_LONG)
         else:
-            self._frames += 1
             if response := self._frame(message.body, found.remote, found):
                 self._requests.append(Send(channel, tcp.Message(tcp.Kind.FRAME, response).to_bytes()))
 
@@ -274,9 +270,12 @@ class FinsService:
         if not isinstance(frame, Command):
             return b""
         header = frame.header
+        self._frames += 1
         end_code, found = routing.refusal(self.settings, frame, len(data)), b""
         if not end_code and connection is None:
             end_code = routing.learn(self.settings, self.state, header.source.node, remote)
+        if not end_code and self._frames > MOST_FRAMES:
+            end_code = EndCode.BUSY
         if not end_code:
             end_code, found = routing.execute(self.settings, frame, self._cpu)
             self.asks_restart = self.asks_restart or routing.restarts(frame, end_code)
