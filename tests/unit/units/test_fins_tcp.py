@@ -223,8 +223,9 @@ def test_more_commands_than_the_unit_has_buffers_are_answered_and_not_executed(r
     for client in clients:
         client.connect()
     for client in clients:
-        client.say(b"".join(Message(Kind.FRAME, bytes.fromhex(f"80 00 02 00 01 00 00 EF 00 {number:02X} 01 03 82 00 {number:02X} 00 "
-                                                              "00 01 00 01")).to_bytes() for number in range(100)))
+        written = [bytes.fromhex(f"80 00 02 00 01 00 00 EF 00 {number:02X} 01 03 82 00 {number:02X} 00 00 01 00 01")
+                   for number in range(100)]  # fmt: skip
+        client.say(b"".join(Message(Kind.FRAME, one).to_bytes() for one in written))
     rig.plc.scan()
     ends = [[message.body[12:].hex() for message in Splitter().feed(client.hear()) if isinstance(message, Message)]
             for client in clients]
