@@ -12,7 +12,7 @@ from fbvm.analysis.calls import open_call, pins
 from fbvm.analysis.hover import all_located
 from fbvm.analysis.names import key_of
 from fbvm.analysis.program import Program
-from fbvm.analysis.scopes import Scope, scope_at
+from fbvm.analysis.scopes import Member, Scope, scope_at
 from fbvm.base.areas import AREAS
 from fbvm.base.types import ELEMENTARY, EnumType, fold
 from fbvm.check import block_pages
@@ -29,9 +29,12 @@ DECLARATIONS = {
     "FUNCTION_BLOCK": "FUNCTION_BLOCK ${1:Name}\nVAR_INPUT\n\t$2\nEND_VAR\nVAR_OUTPUT\nEND_VAR\n$0\nEND_FUNCTION_BLOCK",
     "FUNCTION": "FUNCTION ${1:Name} : ${2:INT}\nVAR_INPUT\n\t$3\nEND_VAR\n$0\nEND_FUNCTION",
     "PROGRAM": "PROGRAM ${1:Main}\nVAR\n\t$2\nEND_VAR\n$0\nEND_PROGRAM",
+    "INTERFACE": "INTERFACE ${1:Name}\nMETHOD ${2:Do} : ${3:BOOL}\nEND_METHOD\nEND_INTERFACE",
     "TYPE": "TYPE\n\t${1:Name} : STRUCT\n\t\t$0\n\tEND_STRUCT;\nEND_TYPE", "VAR_GLOBAL": "VAR_GLOBAL\n\t$0\nEND_VAR"}
 SECTIONS = {word: f"{word}\n\t$0\nEND_VAR" for word in (
     "VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR CONSTANT")}
+METHODS = {"METHOD": "METHOD ${1:Name} : ${2:INT}\nVAR_INPUT\n\t$3\nEND_VAR\n\t$0\nEND_METHOD",
+           "PROPERTY": "PROPERTY ${1:Name} : ${2:INT}\nGET\n\t$0\nEND_GET\nEND_PROPERTY"}
 OPERATORS = ("AND", "OR", "XOR", "NOT", "MOD", "TRUE", "FALSE")
 _PATH = re.compile(r"([A-Za-z_]\w*(?:\s*\[[^\[\]]*\]|\^|\.[A-Za-z_]\w*)*)\.\w*\Z")
 _TYPED = re.compile(r"([A-Za-z_]\w*)#\w*\Z")
@@ -44,8 +47,8 @@ _WORD = re.compile(r"[@%!\w]*\Z")
 @dataclass(frozen=True)
 class Item:
     """Something that can be written.  `insert` is a snippet (`$0` is where the cursor goes) if it is not the label itself;
-    `kind` is "variable", "pin", "function", "block", "type", "enumerator", "keyword", "address", "instruction" or "action";
-    `page` is the name under which `documentation` finds more."""
+    `kind` is "variable", "pin", "function", "block", "type", "enumerator", "keyword", "address", "instruction", "action",
+    "method" or "property"; `page` is the name under which `documentation` finds more."""
 
     label: str
     kind: str
@@ -66,8 +69,7 @@ def complete(program: Program, name: str, offset: int) -> list[Item]:
     if _in_comment(line):
         return []
     if path := _PATH.search(line):
-        return [Item(each.name, each.kind if each.kind != "field" else "variable", each.type, rank=1)
-                for each in scope.members(path[1])]
+        return [_member(each, rank=1) for each in scope.members(path[1])]
     if typed := _TYPED.search(line):
         return [Item(each.name, each.kind, each.type, rank=1) for each in scope.members(typed[1]) if each.kind == "enumerator"]
     if at := _AT.search(line):
@@ -81,6 +83,11 @@ def complete(program: Program, name: str, offset: int) -> list[Item]:
     if _is_outside(text):
         return [Item(word, "keyword", insert=snippet) for word, snippet in DECLARATIONS.items()]
     return [*_pins(program, name, offset), *_named(program, scope, text)]
+
+
+def _member(member: Member, rank: int) -> Item:
+    insert = f"{member.name}($0)" if member.kind == "method" else ""
+    return Item(member.name, "variable" if member.kind == "field" else member.kind, member.type, insert, rank=rank)
 
 
 def documentation(page: str) -> str:
@@ -129,6 +136,7 @@ def _named(program: Program, scope: Scope, text: str) -> Iterator[Item]:
     if scope.pou is not None:
         yield from (Item(each.tree.name.text, "action", "ACTION", f"{each.tree.name.text}();", rank=3)
                     for each in scope.pou.owner.actions.values())
+    yield from (_member(each, rank=3) for each in scope.methods())
     project = scope.checker.project
     for pou in list(project.pous.values()):
         if pou.is_function and not pou.source.library:
@@ -140,7 +148,7 @@ def _named(program: Program, scope: Scope, text: str) -> Iterator[Item]:
     for function in (*functions.SIGNATURES, *functions.OPERATORS):
         if not function.startswith("__"):
             yield Item(function, "function", describe.signature(function), f"{function}($0)", rank=6)
-    yield from (Item(word, "keyword", insert=snippet, rank=7) for word, snippet in {**STATEMENTS, **SECTIONS}.items())
+    yield from (Item(word, "keyword", insert=snippet, rank=7) for word, snippet in {**STATEMENTS, **SECTIONS, **METHODS}.items())
     yield from (Item(word, "keyword", rank=7) for word in OPERATORS)
     yield from (replace(item, rank=8) for item in _blocks(program, scope) if item.kind == "function")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fbvm.analysis.names import Key, declared_name
+from fbvm.analysis.names import Key, declared_name, method_of
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
 from fbvm.check.checker import Checker
@@ -44,12 +44,29 @@ def _action(checker: Checker, key: Key) -> Declared | None:
     return Declared(key, action.tree.name.text, action.source, action.tree.name, pou=action) if action is not None else None
 
 
+def _method(checker: Checker, key: Key) -> Declared | None:
+    block = checker.project.pous.get((key[1], key[2]))
+    found = method_of(block, key[3]) if block is not None else None
+    return Declared(key, found.tree.name.text, found.source, found.tree.name, pou=found) if found is not None else None
+
+
+def _owner(checker: Checker, key: Key) -> Pou | None:
+    """The POU of a variable: a method, or an accessor of a property, too."""
+    block, _, rest = key[2].partition(".")
+    found = checker.project.pous.get((key[1], key[2])) or checker.project.pous.get((key[1], block))
+    if found is None or not rest or fold(found.name) == key[2]:
+        return found
+    return next((method for method in found.methods.values() if fold(method.name) == key[2]), None)
+
+
 def _variable(checker: Checker, key: Key) -> Declared | None:
-    pou = checker.project.pous.get((key[1], key[2]))
+    pou = _owner(checker, key)
     if pou is None:
         return None
     edge = next((edge.raw for edge in pou.edges if fold(edge.raw.name) == key[3]), None)
     variable = edge or pou.variables.get(key[3])
+    if variable is None and pou.block is not None:  # a VAR_INST
+        variable = pou.block.variables.get(f"{fold(pou.tree.name.text)}.{key[3]}")
     if variable is not None:
         return Declared(key, variable.name, variable.source, variable.node, variable=variable, pou=pou)
     name = declared_name(pou.tree, key[3]) if not pou.resolved else None
@@ -83,5 +100,5 @@ def _standard(checker: Checker, key: Key) -> Declared | None:
 
 
 _FIND: dict[str, Callable[[Checker, Key], Declared | None]] = {
-    "pou": _pou, "action": _action, "variable": _variable, "global": _global, "type": _type, "member": _member,
+    "pou": _pou, "action": _action, "method": _method, "variable": _variable, "global": _global, "type": _type, "member": _member,
     "standard": _standard}

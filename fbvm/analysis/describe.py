@@ -42,7 +42,10 @@ def variable(declared: Variable) -> str:
 
 
 def head(pou: Pou) -> str:
-    """The first line of a POU and its pins."""
+    """The first line of a POU and its pins; of an accessor its property."""
+    if pou.kind in ("GET", "SET"):
+        value = pou.result or pou.order[0]
+        return f"PROPERTY {pou.name.rpartition('.')[0]} : {value.type}"
     result = f" : {pou.result.type}" if pou.result is not None else ""
     lines = [f"{pou.kind} {pou.name}{result}"]
     lines += [f"    {each.kind} {each.name} : {each.type};" for each in pou.order if each.kind in PINS and " " not in each.name]

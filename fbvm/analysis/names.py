@@ -20,8 +20,8 @@ from fbvm.syntax.tree import sfc
 from fbvm.syntax.tree.node import names_of
 
 Key = tuple[str, ...]
-"""What a name means: "pou", "type", "global" or "standard" with library and name; "variable", "action" or "member" with library,
-POU or type, and name."""
+"""What a name means: "pou", "type", "global" or "standard" with library and name; "variable", "action", "method" (of a property,
+too) or "member" with library, POU or type, and name.  The POU of a method's variable is `BLOCK.METHOD`."""
 
 
 @dataclass(frozen=True)
@@ -49,19 +49,48 @@ def uses(checker: Checker, part: Part) -> list[Use]:
 def key_of(variable: Variable) -> Key:
     """The key of a variable."""
     library = variable.source.library
+    if variable.owner is not None and variable.owner.block is not None and _stands_for(variable, variable.owner):
+        return key_of_pou(variable.owner)
     if variable.kind == "PROGRAM" and fold(variable.name) == fold(variable.type.name) or variable.kind == "RESULT":
         return "pou", library, fold(_plain(variable.owner.name if variable.owner else variable.type.name))
     if variable.owner is None:
         space = f"{fold(variable.space)}." if variable.qualified else ""
         return "global", library, space + fold(variable.name)
-    return "variable", library, fold(_plain(variable.owner.name)), fold(_plain(variable.name))
+    method, _, name = fold(_plain(variable.name)).rpartition(".")  # a VAR_INST is one of the block, called `method.name`
+    return "variable", library, fold(_plain(variable.owner.name)) + (f".{method}" if method else ""), name
+
+
+def _stands_for(variable: Variable, method: Pou) -> bool:
+    """True for the result of a method, and for the value that a property is set to: they have its name."""
+    return variable.kind == "RESULT" or method.kind == "SET" and fold(variable.name) == fold(method.tree.name.text)
 
 
 def key_of_pou(pou: Pou) -> Key:
-    """The key of a POU, or of an action."""
+    """The key of a POU, of an action, of a method, or of the property of an accessor."""
+    if pou.block is not None:
+        return "method", pou.source.library, fold(_plain(pou.block.name)), fold(pou.tree.name.text)
     if pou.home is not None:
         return "action", pou.source.library, fold(_plain(pou.home.name)), fold(pou.name.rpartition(".")[2])
     return "pou", pou.source.library, fold(_plain(pou.name))
+
+
+def method_of(block: Pou, name: str) -> Pou | None:
+    """The method of a block, its own or an inherited one, or an accessor of the property, with a folded name."""
+    return next((found for key in accessors(name) if (found := block.method(key)) is not None), None)
+
+
+def accessors(name: str) -> tuple[str, ...]:
+    """The keys of `Pou.methods` under which a folded name is found."""
+    return name, f"GET {name}", f"SET {name}"
+
+
+def inherited(block: Pou | None, name: str) -> Variable | None:
+    """The variable of a block or of one that it extends, by its folded name."""
+    while block is not None:
+        if name in block.variables:
+            return block.variables[name]
+        block = block.base
+    return None
 
 
 def _plain(name: str) -> str:
@@ -105,11 +134,20 @@ class _Names:
             item = left.pop()
             if isinstance(item, tuple):
                 left += reversed(item)
+            elif isinstance(item, tree.Pou) and item is not node:
+                yield from self.method(item)
             elif isinstance(item, tree.Node):
                 rule = _RULES.get(type(item))
                 if rule is not None:
                     yield from rule(self, item)
                 left += [getattr(item, name) for name in reversed(names_of(item)) if name not in _LEAVES]
+
+    def method(self, node: tree.Pou) -> Iterator[Use]:
+        """The names in a method or accessor."""
+        block = self.pou
+        self.pou = next((each for each in block.methods.values() if each.tree is node), None) if block is not None else None
+        yield from self.walk(node)
+        self.pou = block
 
     # --- what expressions are -----------------------------------------------------------------------------------------
 
@@ -119,6 +157,7 @@ class _Names:
         if known is not None:
             return known
         own = self.pou.owner.variables.get(fold(name.text)) if self.pou is not None else None
+        own = own or inherited(self.pou.own_block if self.pou is not None else None, fold(name.text))
         return own or next((self.project.globals[owner, fold(name.text)] for owner in self.project.owners(self.source)
                             if (owner, fold(name.text)) in self.project.globals), None)
 
@@ -139,7 +178,9 @@ class _Names:
         elif kind is None and isinstance(expr, tree.Deref):
             whole = self.kind(expr.of)
             kind = whole.target if isinstance(whole, RefType) else None
-        return kind.target if isinstance(kind, RefType) and kind.follows else kind
+        if (block := self.facts.selves.get(expr)) is not None:
+            return block.type
+        return kind.target if isinstance(kind, RefType) and (kind.follows or kind.interface) else kind
 
     def member_key(self, whole: Type | None, name: str) -> Key | None:
         """The key of a member of a structure, of a variable of an instance, or of a member of an enumeration."""
@@ -149,15 +190,25 @@ class _Names:
             return None
         field = whole.member(name)
         if field is not None and whole.block:
-            block = self.checker.block_of(whole)
-            return "variable", block.source.library, fold(block.name), fold(field.name)
+            block, folded = self.checker.block_of(whole), fold(field.name)
+            variable = inherited(block, folded)
+            return key_of(variable) if variable is not None else ("variable", block.source.library, fold(block.name), folded)
+        if field is None and whole.block and (method := method_of(self.checker.block_of(whole), fold(name))) is not None:
+            return key_of_pou(method)
         if field is None and whole.block and fold(name) in self.checker.block_of(whole).actions:
             return key_of_pou(self.checker.block_of(whole).actions[fold(name)])
         return self.in_type(whole.name, fold(field.name)) if field is not None else None
 
     def in_type(self, name: str, member: str) -> Key | None:
         entry = self.project.type_entry(name, self.source)
-        return ("member", entry.source.library, fold(name), member) if entry is not None else None
+        if entry is None:
+            return None
+        for base in entry.tree.spec.bases if isinstance(entry.tree.spec, tree.StructSpec) else ():
+            known = self.project.type_entry(base.text, entry.source)
+            if known is not None and known.resolved is not None and isinstance(whole := known.resolved[0], StructType) and \
+                    whole.member(member) is not None:
+                return self.in_type(base.text, member)
+        return "member", entry.source.library, fold(name), member
 
     def role(self, expr: tree.Node) -> str:
         return "written" if expr in self.targets else "called" if expr in self.callees else "read"
@@ -185,10 +236,13 @@ class _Names:
     def _without_variable(self, node: tree.NameRef, name: str) -> Key | None:
         """What a name means that is no variable's, or that of a generic function, whose variables are not resolved."""
         project, kind = self.project, self.facts.types.get(node)
+        block = self.pou.own_block if self.pou is not None else None
         if self.pou is not None and not self.pou.resolved and declared_name(self.pou.tree, name) is not None:
             return "variable", self.source.library, fold(self.pou.name), name
         if isinstance(kind, EnumType) and name in kind.members:
             return self.in_type(kind.name, name)
+        if block is not None and (method := method_of(block, name)) is not None:
+            return key_of_pou(method)
         if self.pou is not None and name in self.pou.owner.actions:
             return key_of_pou(self.pou.owner.actions[name])
         if (pou := project.pou(node.text, self.source)) is not None:
@@ -263,7 +317,9 @@ class _Names:
                 yield Use(name.start, name.end, key, "written")
 
     def pou_head(self, node: tree.Pou) -> Iterator[Use]:
-        if self.pou is not None and node.kind != "ACTION":
+        if self.pou is not None and self.pou.block is not None:
+            yield Use(node.name.start, node.name.end, key_of_pou(self.pou), "declared")
+        elif self.pou is not None and node.kind != "ACTION":
             yield Use(node.name.start, node.name.end, ("pou", self.source.library, fold(node.name.text)), "declared")
 
     def action(self, node: tree.Action) -> Iterator[Use]:
@@ -274,7 +330,7 @@ class _Names:
                       ("action", self.source.library, fold(self.pou.name), fold(node.name.text)), "declared")
 
     def section(self, node: tree.VarSection) -> Iterator[Use]:
-        for declared in node.variables:
+        for declared in node.variables if not node.hidden else ():
             for name in declared.names:
                 if self.pou is None or node.kind in ("VAR_EXTERNAL", "VAR_GLOBAL"):
                     variable = self._global(name.text, node)

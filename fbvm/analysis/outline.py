@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fbvm.analysis.parts import File, Part
+from fbvm.base.types import fold
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc
 from fbvm.syntax.tree.node import walk
@@ -25,8 +26,8 @@ class Symbol:
 
     name: str
     kind: str
-    """"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "ACTION", "TYPE", "CONFIGURATION", "VAR_GLOBAL", "variable", "constant", "member",
-    "enumerator", "rung", "step", "resource", "task" or "instance"."""
+    """"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "INTERFACE", "CLASS", "METHOD", "PROPERTY", "ACTION", "TYPE", "CONFIGURATION",
+    "VAR_GLOBAL", "variable", "constant", "member", "enumerator", "rung", "step", "resource", "task" or "instance"."""
     detail: str
     start: int
     end: int
@@ -47,14 +48,10 @@ def _symbol(part: Part, node: tree.Node, name: tree.Node, text: str, kind: str, 
 
 
 def _declaration(part: Part, declared: tree.Declaration) -> Iterator[Symbol]:
-    text = part.source.text
     if isinstance(declared, tree.Pou):
-        made = _symbol(part, declared, declared.name, declared.name.text, declared.kind)
-        made.detail = text[declared.result.start:declared.result.end] if declared.result is not None else ""
-        for section in declared.sections:
-            made.children += _variables(part, section) if not section.hidden else []
-        made.children += _inside(part, declared.body)
+        made = _pou(part, declared)
         made.children += [_action(part, action) for action in declared.actions if action.end > action.name.start]
+        made.children += _methods(part, declared)
         yield made
     elif isinstance(declared, tree.Action):
         yield _action(part, declared)
@@ -78,6 +75,32 @@ def _declaration(part: Part, declared: tree.Declaration) -> Iterator[Symbol]:
             made.children += [_symbol(part, run, run.name, run.name.text, "instance", run.type_name.text)
                               for run in resource.programs]
         yield made
+
+
+def _pou(part: Part, declared: tree.Pou) -> Symbol:
+    """A POU or method with its variables, rungs and steps."""
+    made = _symbol(part, declared, declared.name, declared.name.text, declared.kind)
+    made.detail = part.source.text[declared.result.start:declared.result.end] if declared.result is not None else ""
+    for section in declared.sections:
+        made.children += _variables(part, section) if not section.hidden else []
+    made.children += _inside(part, declared.body)
+    return made
+
+
+def _methods(part: Part, block: tree.Pou) -> Iterator[Symbol]:
+    """The methods and properties of a block; a property once, with what its accessors declare."""
+    properties: dict[str, Symbol] = {}
+    for method in block.methods:
+        made = _pou(part, method)
+        if method.kind == "METHOD":
+            yield made
+            continue
+        known = properties.setdefault(fold(made.name), made)
+        known.kind = "PROPERTY"
+        if known is not made:
+            known.detail, known.end = known.detail or made.detail, max(known.end, made.end)
+            known.children += made.children
+    yield from properties.values()
 
 
 def _action(part: Part, action: tree.Action) -> Symbol:

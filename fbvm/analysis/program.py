@@ -202,6 +202,8 @@ class Program:
         if before is None or after is None or self._signature(old, before) != self._signature(new, after):
             return False
         known = checked.project.pous.get(("", fold(after.name.text)))
+        if _is_object(before) or _is_object(after) or any(pou.base is known for pou in checked.project.pous.values()):
+            return False  # what derived blocks inherit, and which bodies calls may mean, is worked out for all
         return known is not None and known.source is old.source and not generics.is_generic(known, checked.project) and \
             not generics.variables(after) and not external(new.syntax, after)
 
@@ -297,6 +299,11 @@ def _moved(message: Diagnostic, file: File, base: int) -> Diagnostic:
     if related is not None and related[0] is message.source:
         related = file.source, related[1] + base, related[2]
     return replace(message, source=file.source, start=message.start + base, end=message.end + base, related=related)
+
+
+def _is_object(pou: tree.Pou) -> bool:
+    """True for what has methods, or extends or implements something."""
+    return bool(pou.methods or pou.bases or pou.interfaces or pou.kind in ("CLASS", "INTERFACE"))
 
 
 def _name(part: Part) -> str:

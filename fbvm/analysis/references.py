@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fbvm.analysis.declarations import Declared, find
-from fbvm.analysis.names import Key, Use, text_has
+from fbvm.analysis.names import Key, Use, accessors, key_of_pou, text_has
 from fbvm.analysis.parts import File, Part
 from fbvm.analysis.program import Program
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.types import fold
+from fbvm.check.symbols.facts import Pou
 from fbvm.syntax.st.lexer import lexis
 
 
@@ -44,10 +45,29 @@ def declared_at(program: Program, name: str, offset: int) -> Declared | None:
 
 
 def references(program: Program, key: Key) -> list[Place]:
-    """All places in the program's files at which a name means the same."""
+    """All places in the program's files at which a name means the same; of a method or property also its overrides."""
+    keys = family(program, key)
     return [Place(file, part.base + use.start, part.base + use.end, use.role)
             for file in program.files.values() for part in file.parts if text_has(part.source, key[-1].rpartition(".")[2])
-            for use in program.uses(part) if use.key == key]
+            for use in program.uses(part) if use.key in keys]
+
+
+def family(program: Program, key: Key) -> set[Key]:
+    """The keys that have to have one name: of a method all that it overrides or implements, and all that override these."""
+    if key[0] != "method" or program.checked is None:
+        return {key}
+    blocks = [pou for pou in program.checked.checker.project.pous.values()
+              if any(each in pou.methods for each in accessors(key[3]))]  # fmt: skip
+    found = [pou for pou in blocks if (pou.source.library, fold(pou.name)) == key[1:3]]
+    for pou in found:
+        found += [other for other in blocks if other not in found and (derives(other, pou) or derives(pou, other))]
+    return {("method", pou.source.library, fold(pou.name), key[3]) for pou in found} | {key}
+
+
+def derives(pou: Pou, other: Pou) -> bool:
+    """True if a block extends or implements another one."""
+    parents = [*([pou.base] if pou.base is not None else []), *pou.interfaces]
+    return any(parent is other or derives(parent, other) for parent in parents)
 
 
 def highlights(program: Program, name: str, offset: int) -> list[Place]:
@@ -120,7 +140,7 @@ def callers(program: Program, key: Key) -> Iterator[tuple[Key, Place]]:
         node = pou.calls.get(declared.pou)
         found = program.place(pou.source)
         if node is not None and found is not None:
-            yield _key(pou.owner.name), Place(found[0], found[1] + node.start, found[1] + node.end, "called")
+            yield key_of_pou(pou.owner), Place(found[0], found[1] + node.start, found[1] + node.end, "called")
 
 
 def called(program: Program, key: Key) -> Iterator[tuple[Key, Place]]:
@@ -132,9 +152,5 @@ def called(program: Program, key: Key) -> Iterator[tuple[Key, Place]]:
     found = program.place(declared.pou.source)
     for pou, node in declared.pou.calls.items() if found is not None else ():
         assert found is not None
-        yield (("pou", pou.source.library, fold(pou.owner.name.partition(" ")[0])),
+        yield (key_of_pou(pou.owner),
                Place(found[0], found[1] + node.start, found[1] + node.end, "called"))
-
-
-def _key(name: str) -> Key:
-    return "pou", "", fold(name.partition(" ")[0])

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from fbvm.analysis.names import Key, key_of_pou
+from fbvm.analysis.names import Key, inherited, key_of_pou, method_of
 from fbvm.analysis.parts import Part
 from fbvm.analysis.program import Program
-from fbvm.base.types import ArrayType, EnumType, OpenArrayType, RefType, StructType, Type, fold
+from fbvm.base.types import ArrayType, EnumType, OpenArrayType, RefType, StructType, Type, fold, pointer
 from fbvm.check.checker import Checker
 from fbvm.check.expressions.members import READABLE
+from fbvm.check.expressions.objects import WORDS
 from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.syntax import tree
 
@@ -21,7 +22,7 @@ _STEP = re.compile(r"\s*(\[[^\[\]]*\]|\^|\.?\s*[A-Za-z_]\w*)")
 
 @dataclass(frozen=True)
 class Member:
-    """Something behind a point: `kind` is "field", "pin", "action" or "enumerator"."""
+    """Something behind a point: `kind` is "field", "pin", "action", "method", "property" or "enumerator"."""
 
     name: str
     kind: str
@@ -31,20 +32,29 @@ class Member:
 
 @dataclass(frozen=True)
 class Scope:
-    """A place in a part: the checker that knows the program, and the POU around the place."""
+    """A place in a part: the checker that knows the program, and the POU around the place, in a method that."""
 
     checker: Checker
     part: Part
     pou: Pou | None
 
+    @property
+    def block(self) -> Pou | None:
+        """The POU whose instance the place is about: of a method its block."""
+        return self.pou.own_block if self.pou is not None else None
+
     def variable(self, name: str) -> Variable | None:
         """The variable that a name means here."""
         own = self.pou.owner.variables.get(fold(name)) if self.pou is not None else None
+        own = own or inherited(self.block, fold(name))
         return own or self.checker.global_variable(name, self.part.source)
 
     def variables(self) -> list[Variable]:
         """The variables that can be named here without a point."""
-        own = list(self.pou.owner.variables.values()) if self.pou is not None else []
+        known: dict[str, Variable] = {}
+        for pou in (self.pou, *_and_bases(self.block)):
+            known = {**(pou.owner.variables if pou is not None else {}), **known}
+        own = [each for name, each in known.items() if "." not in name]
         shared = [each for each in self.checker.project.globals.values() if not each.source.library and not each.qualified]
         return [each for each in [*own, *shared] if not each.role and each.kind != "PROGRAM"]
 
@@ -59,13 +69,23 @@ class Scope:
             elif step == "^":
                 kind = kind.target if isinstance(kind, RefType) else None
             else:
-                field = kind.member(step.lstrip(". \t")) if isinstance(kind, StructType) else None
-                kind = field.type if field is not None else None
-            if isinstance(kind, RefType) and kind.follows:
+                kind = self._part(kind, step.lstrip(". \t"))
+            if isinstance(kind, RefType) and (kind.follows or kind.interface):
                 kind = kind.target
         return kind
 
+    def _part(self, whole: Type | None, name: str) -> Type | None:
+        """The type of what stands behind a point: of a field, of a property."""
+        field = whole.member(name) if isinstance(whole, StructType) else None
+        if field is None and isinstance(whole, StructType) and whole.block:
+            found = method_of(self.checker.block_of(whole), fold(name))
+            return found.result.type if found is not None and found.result is not None else None
+        return field.type if field is not None else None
+
     def _first(self, name: str) -> Type | None:
+        if fold(name) in WORDS and self.block is not None:
+            block = self.block.base if fold(name) == "SUPER" else self.block
+            return pointer(block.type) if block is not None and block.type is not None else None
         variable = self.variable(name)
         if variable is not None:
             return variable.type
@@ -76,8 +96,19 @@ class Scope:
         pou = project.pous.get(("", fold(name)))
         return pou.type if pou is not None and pou.kind == "PROGRAM" else None
 
+    def method(self, path: str) -> Pou | None:
+        """The method, or an accessor of the property, that a path names: of the block around the place, or of an instance."""
+        whole, _, name = path.strip().rpartition(".")
+        kind = self.kind(whole) if whole else None
+        if isinstance(kind, RefType) and fold(whole.strip()) in WORDS:  # THIS.m() without ^
+            kind = kind.target
+        block = self.checker.block_of(kind) if isinstance(kind, StructType) and kind.block else self.block if not whole else None
+        return method_of(block, fold(name.strip())) if block is not None else None
+
     def callee(self, path: str) -> Pou | None:
-        """The POU that is called by `path(`: a function, the block of an instance, an action."""
+        """The POU that is called by `path(`: a function, a method, the block of an instance, an action."""
+        if (method := self.method(path)) is not None:
+            return method
         kind = self.kind(path)
         if isinstance(kind, StructType) and kind.block:
             return self.checker.block_of(kind)
@@ -89,6 +120,8 @@ class Scope:
     def members(self, path: str) -> list[Member]:
         """What can stand behind a point behind a path."""
         kind = self.kind(path)
+        if isinstance(kind, RefType) and fold(path.strip()) in WORDS:
+            kind = kind.target
         if isinstance(kind, EnumType):
             return [Member(name, "enumerator", kind.name) for name in kind.shown.values()]
         if isinstance(kind, StructType) and kind.block:
@@ -96,7 +129,8 @@ class Scope:
             readable = (*READABLE, "VAR") if block.kind == "PROGRAM" or self.checker.project.dialect.locals_are_read else READABLE
             pins = [Member(field.name, "pin", str(field.type)) for field in kind.fields.values()
                     if field.kind in readable and " " not in field.name]
-            return pins + [Member(action.tree.name.text, "action", "", key_of_pou(action)) for action in block.actions.values()]
+            actions = [Member(action.tree.name.text, "action", "", key_of_pou(action)) for action in block.actions.values()]
+            return pins + actions + self.methods(block)
         if isinstance(kind, StructType):
             return [Member(field.name, "field", str(field.type)) for field in kind.fields.values()]
         if kind is None and path.strip().isidentifier() and self.checker.project.is_space(path.strip()):
@@ -104,6 +138,28 @@ class Scope:
             return [Member(name, "field", str(found.type)) for name in project.names_in(path.strip())
                     if (found := self.checker.listed(fold(path.strip()), fold(name), self.part.source)) is not None]
         return []
+
+    def methods(self, block: Pou | None = None) -> list[Member]:
+        """The methods and properties of a block that may be named here, each once; by default of the one around the place."""
+        block = block or self.block
+        inside = block in _and_bases(self.block)
+        found: dict[str, Member] = {}
+        for each in reversed(_and_bases(block)):
+            for method in each.methods.values():
+                if inside or not method.modifiers & {"PRIVATE", "PROTECTED"}:
+                    kind, name = method.result.type if method.result is not None else "", method.tree.name.text
+                    if fold(name) not in found or kind:
+                        shown = "method" if method.kind == "METHOD" else "property"
+                        found[fold(name)] = Member(name, shown, str(kind), key_of_pou(method))
+        return list(found.values())
+
+
+def _and_bases(block: Pou | None) -> list[Pou]:
+    """A block and all that it extends and implements, itself first."""
+    if block is None:
+        return []
+    return list(dict.fromkeys([block, *(each for parent in ([block.base] if block.base is not None else []) + block.interfaces
+                                        for each in _and_bases(parent))]))  # fmt: skip
 
 
 def scope_at(program: Program, name: str, offset: int) -> Scope | None:
@@ -115,4 +171,9 @@ def scope_at(program: Program, name: str, offset: int) -> Scope | None:
     at = offset - part.base
     pous = [each for each in part.syntax.declarations if isinstance(each, tree.Pou) and each.start <= at]
     pou = checked.project.pous.get(("", fold(pous[-1].name.text))) if pous else None
+    inside = [each for each in pous[-1].methods if each.start <= at <= each.end] if pous else []
+    if pou is not None and inside:
+        method = min(inside, key=lambda each: each.end - each.start)
+        key = fold(method.name.text) if method.kind == "METHOD" else f"{method.kind} {fold(method.name.text)}"
+        pou = pou.methods.get(key, pou)
     return Scope(checked.checker, part, pou)

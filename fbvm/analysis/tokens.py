@@ -65,6 +65,8 @@ def _kind(key: Key, declared: Declared | None) -> tuple[str, frozenset[str]]:
     if key[0] == "member":
         kind = declared.type.resolved[0] if declared.type is not None and declared.type.resolved is not None else None
         return ("enumMember" if isinstance(kind, EnumType) else "property"), library
+    if declared.pou is not None and key[0] == "method":
+        return ("method" if declared.pou.kind == "METHOD" else "property"), library
     if declared.pou is not None and key[0] != "variable":
         return ("function" if declared.pou.is_function else "method" if key[0] == "action" else "class"), library
     return ("type" if key[0] == "type" else "variable"), library

@@ -28,7 +28,8 @@ _KINDS = {
     "function": types.CompletionItemKind.Function, "block": types.CompletionItemKind.Class,
     "type": types.CompletionItemKind.Struct, "enumerator": types.CompletionItemKind.EnumMember,
     "keyword": types.CompletionItemKind.Keyword, "address": types.CompletionItemKind.Reference,
-    "instruction": types.CompletionItemKind.Operator, "action": types.CompletionItemKind.Method}
+    "instruction": types.CompletionItemKind.Operator, "action": types.CompletionItemKind.Method,
+    "method": types.CompletionItemKind.Method, "property": types.CompletionItemKind.Property}
 
 
 # --- completion -----------------------------------------------------------------------------------------------------------

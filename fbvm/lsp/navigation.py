@@ -24,7 +24,9 @@ from fbvm.run.project import FILE
 
 _KINDS = {
     "FUNCTION": types.SymbolKind.Function, "FUNCTION_BLOCK": types.SymbolKind.Class, "PROGRAM": types.SymbolKind.Module,
-    "ACTION": types.SymbolKind.Method, "TYPE": types.SymbolKind.Struct, "CONFIGURATION": types.SymbolKind.Package,
+    "CLASS": types.SymbolKind.Class, "INTERFACE": types.SymbolKind.Interface, "METHOD": types.SymbolKind.Method,
+    "PROPERTY": types.SymbolKind.Property, "ACTION": types.SymbolKind.Method,
+    "TYPE": types.SymbolKind.Struct, "CONFIGURATION": types.SymbolKind.Package,
     "VAR_GLOBAL": types.SymbolKind.Namespace, "variable": types.SymbolKind.Variable, "constant": types.SymbolKind.Constant,
     "member": types.SymbolKind.Field, "enumerator": types.SymbolKind.EnumMember, "rung": types.SymbolKind.Event,
     "step": types.SymbolKind.Event, "task": types.SymbolKind.Event, "instance": types.SymbolKind.Object}

@@ -133,14 +133,10 @@ def test_who_calls_whom() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("objects", [
-    False,
-    pytest.param(True, marks=pytest.mark.xfail(strict=True, reason="names of methods and properties are not followed yet")),
-])
-def test_every_name_of_the_corpus_has_a_declaration(objects: bool) -> None:
+def test_every_name_of_the_corpus_has_a_declaration() -> None:
     lost = []
     for each in programs():
-        if each.runs and each.name.startswith("objects/") is objects:
+        if each.runs:
             program = Program(dialect=each.dialect)
             program.replace(each.path.name, each.text)
             program.check_all()

@@ -62,7 +62,7 @@ def test_hover_over_a_library_block_shows_its_page() -> None:
     ("P1(‸", ["Level :=", "Runs =>"], []),
     ("P1(Level := 3, ‸", ["Runs =>"], ["Level :="]),
     ("‸", ["D", "On", "P1", "T1"], ["hidden", "END_VAR"]),
-    ("LADDER\n‸\nEND_LADDER", ["*", "*B"], ["IF"]),
+    ("LADDER\n‸\nEND_LADDER", ["*", "*B"], ["WHILE"]),
 ])
 def test_completion_offers_what_fits(line: str, first: list[str], absent: list[str]) -> None:
     program, offset = at_mark(HEAD + line + "\nEND_PROGRAM\n")
