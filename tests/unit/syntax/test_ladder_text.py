@@ -57,6 +57,13 @@ DRAWINGS = {
         │      │   b           d   │
         │      └──┤ ├─────────( )──┤
     """),
+    "blocks that begin at a branch point": ("LD a\nOUT TR0\nAND b\nLD TR0\nUP\nORLD\nOUT c", """
+        │   a       b            c   │
+        ├──┤ ├──┬──┤ ├────┬─────( )──┤
+        │       │ ┌────┐  │          │
+        │       └─┤ UP ├──┘          │
+        │         └────┘             │
+    """),
     "edges": ("@LD a\n%AND b\nUP\nDIFU c", """
         │   a      b    ┌────┐       c   │
         ├──┤↑├────┤↓├───┤ UP ├──────(↑)──┤

@@ -159,11 +159,12 @@ class _Reader:
     def block(self, how: str) -> None:
         """AND LD, OR LD."""
         before = self.stack.pop()
-        if self.now.start is not self.bar:
+        is_branch = how == "OR" and before.start is self.now.start and not self.now.is_empty()
+        if self.now.start is not self.bar and not is_branch:
             raise Undrawable
         if how == "AND":
             before.path.parts += self.now.path.parts
-        elif before.start is not self.bar or before.is_empty():
+        elif before.start is not self.now.start or before.is_empty():
             raise Undrawable
         else:
             before.path = Series([Parallel([*_branches(before.path), *_branches(self.now.path)])])

@@ -72,10 +72,24 @@ class _Coder:
             self.steps.append(contact(part, how))
         elif isinstance(part, Box):
             self.box(part)
+        elif how == "AND" and any(isinstance(branch.parts[0], Box) for branch in part.branches if branch.parts):
+            self.forked(part)
         else:
             self.parallel(part)
             if how == "AND":
                 self.add("ANDLD")
+
+    def forked(self, part: Parallel) -> None:
+        """Branches behind a condition of which one begins with a box, as UP: each begins at a TR bit with the condition."""
+        kept = f"TR{self.points}"
+        self.points += 1
+        self.add("OUT", kept)
+        for number, branch in enumerate(part.branches):
+            if number:
+                self.add("LD", kept)
+            self.series(branch, True)
+            if number:
+                self.add("ORLD")
 
     def parallel(self, part: Parallel) -> None:
         first, *more = part.branches
