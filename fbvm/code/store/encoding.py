@@ -195,7 +195,7 @@ class _Reader:
 
 
 def _target(kind: RefType, writer: _Writer) -> list[Any]:
-    return [None if kind.target is None else writer.number(kind.target), kind.moves, kind.follows]
+    return [None if kind.target is None else writer.number(kind.target), kind.moves, kind.follows, kind.interface]
 
 
 def _structure(kind: StructType, writer: _Writer) -> list[Any]:
@@ -228,6 +228,7 @@ KINDS: dict[str, _Kind] = {
             **common, base=ELEMENTARY[parts[0]], low=parts[1], high=parts[2])),
     RefType.__name__: _Kind(
         _target, lambda common, parts, r: RefType(
-            **common, target=None if parts[0] is None else r.type(parts[0]), moves=parts[1], follows=parts[2])),
+            **common, target=None if parts[0] is None else r.type(parts[0]), moves=parts[1], follows=parts[2],
+            interface=parts[3])),
 }  # fmt: skip
 """A row for each class of types."""
