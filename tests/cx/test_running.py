@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -85,3 +86,13 @@ def test_a_debugger_opens_a_project_with_the_texts_of_its_programs(tmp_path: Pat
     with pytest.raises(LaunchError, match="cannot be taken over") as told:
         open_launch({"program": str(file)})
     assert "it is cut" in told.value.output
+
+
+def test_a_run_begins_with_the_memory_window_if_asked_to(tmp_path: Path) -> None:
+    dump = " ".join(f"{byte:02X}" for byte in b"[OMRON.Data Monitor.Component]\nD=200:1f4\n")
+    keys = f"  Memory:=\n  BEGIN\n   Data:=\n$?St$Bk?_#[900]\n{dump}\n$?St$Bk?_#[900]\n  END;"
+    file = tmp_path / "line3.cxt"
+    file.write_bytes(replace(SAMPLE, plc_keys=keys).bytes())
+    for options, value in (([], 0), (["--memory"], 500)):
+        done = CliRunner().invoke(main, ["run", str(file), *options, "--for", "10ms", "--show", "D200"])
+        assert (done.exit_code, done.output.split()[:3]) == (0, ["D200", "=", str(value)])

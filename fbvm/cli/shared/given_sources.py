@@ -16,31 +16,33 @@ from fbvm.syntax.text import read
 def within(path: Path) -> given.Within | None:
     """The sources within a file of another tool; None for all others.
 
-    The option --resource of the present command chooses a PLC where the project has several.  Ends the verb with status 2 if the
-    file cannot be read."""
+    The options --resource and --memory of the present command choose a PLC where the project has several, and the contents of
+    its memory window.  Ends the verb with status 2 if the file cannot be read."""
     try:
-        return given.within(path, _resource())
+        return given.within(path, *_options())
     except OSError as error:
         raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
 
 
-def _resource() -> str | None:
+def _options() -> tuple[str | None, bool]:
+    """What --resource and --memory say."""
     context = click.get_current_context(silent=True)
-    return context.meta.get("fbvm.resource") if context else None
+    meta = context.meta if context else {}
+    return meta.get("fbvm.resource"), bool(meta.get("fbvm.memory"))
 
 
 def given_sources(paths: Sequence[Path]) -> dict[str, Path | str]:
     """By the name that messages use, each source of these files: its path, or its text if it stands within a project."""
     for path in paths:
         within(path)
-    return given.given_sources(paths, _resource())
+    return given.given_sources(paths, *_options())
 
 
 def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]]:
     """What the compiler takes for these files, and what is said about projects among them."""
     for path in paths:
         within(path)
-    return given.inputs(paths, _resource())
+    return given.inputs(paths, *_options())
 
 
 def families(paths: Sequence[Path]) -> list[tuple[str, str]]:

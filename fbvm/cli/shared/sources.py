@@ -37,7 +37,7 @@ def _switch_cache_off(context: click.Context, parameter: click.Parameter, wanted
         context.call_on_close(lambda: cache.switch(True))
 
 
-def _keep_in_context(context: click.Context, parameter: click.Parameter, value: str | None) -> None:
+def _keep_in_context(context: click.Context, parameter: click.Parameter, value: str | bool | None) -> None:
     context.meta[f"fbvm.{parameter.name}"] = value
 
 
@@ -55,13 +55,15 @@ def compile_options(files: Sequence[Path]) -> dict[str, Any]:
 
 
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--program, --resource, --dialect, --library and --no-cache."""
+    """--program, --resource, --memory, --dialect, --library and --no-cache."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR",
                      type=ExistingPath(file_okay=False),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
         click.option("--no-cache", is_flag=True, expose_value=False, callback=_switch_cache_off,
                      help="Compile anew, and keep nothing of it on disk."),
+        click.option("--memory", is_flag=True, expose_value=False, callback=_keep_in_context,
+                     help="Take the memory window of a project of CX-Programmer as initial values of D, H, W and E."),
         click.option("--resource", metavar="NAME", expose_value=False, callback=_keep_in_context,
                      help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
         click.option("--dialect", type=click.Choice([*DIALECTS, AUTO]), expose_value=False, callback=_keep_in_context,

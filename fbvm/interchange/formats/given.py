@@ -46,11 +46,12 @@ def is_cx_project(path: Path) -> bool:
     return path.suffix.lower() in CX_SUFFIXES or path.is_file() and is_project(read_file(path, SOURCE_BYTES))
 
 
-def within(path: Path, resource: str | None = None) -> Within | None:
+def within(path: Path, resource: str | None = None, memory: bool = False) -> Within | None:
     """The sources within a file: a project of CX-Programmer or TwinCAT, an object of TwinCAT, a document in PLCopen XML; None for
     all others.
 
-    `resource` is the name of the PLC where a project has several.  Raises OSError if a file that is called so cannot be read."""
+    `resource` is the name of the PLC where a project has several; with `memory` the contents of CX-Programmer's memory window are
+    initial values.  Raises OSError if a file that is called so cannot be read."""
     suffix = path.suffix.lower()
     if suffix == PROJECT_SUFFIX:
         project = read_project(path)
@@ -62,11 +63,11 @@ def within(path: Path, resource: str | None = None) -> Within | None:
         if suffix in SUFFIXES:
             raise
         return None
-    return _within(data, str(path), suffix, resource)
+    return _within(data, str(path), suffix, resource, memory)
 
 
 @lru_cache(maxsize=4)
-def _within(data: bytes, name: str, suffix: str, resource: str | None) -> Within | None:
+def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: bool) -> Within | None:
     if suffix in TWINCAT_SUFFIXES:
         made = twincat.read_object(data, name)
         source = task_source(name, [made.task]) if made.task else made.source
@@ -77,17 +78,17 @@ def _within(data: bytes, name: str, suffix: str, resource: str | None) -> Within
         return Within({f"{name}/{file}": text for file, text in document.files.items()}, document.diagnostics,
                       document.family, document.because)  # fmt: skip
     if suffix in CX_SUFFIXES or is_project(data):
-        project = import_project(data, name, resource)
+        project = import_project(data, name, resource, memory=memory)
         return Within({f"{name}/{file}": text for file, text in project.files.items()}, project.diagnostics)
     return None
 
 
-def given_sources(paths: Sequence[Path], resource: str | None = None) -> dict[str, Path | str]:
-    """By the name that messages use, each source of these files: its path, or its text if it stands within another file.
-    Raises OSError if a project cannot be read."""
+def given_sources(paths: Sequence[Path], resource: str | None = None, memory: bool = False) -> dict[str, Path | str]:
+    """By the name that messages use, each source of these files: its path, or its text if it stands within another file; see
+    `within`.  Raises OSError if a project cannot be read."""
     found: dict[str, Path | str] = {}
     for path in paths:
-        made = within(path, resource)
+        made = within(path, resource, memory)
         if made is None:
             found[str(path)] = path
         else:
@@ -95,9 +96,10 @@ def given_sources(paths: Sequence[Path], resource: str | None = None) -> dict[st
     return found
 
 
-def inputs(paths: Sequence[Path], resource: str | None = None) -> tuple[list[Path | Source], list[Diagnostic]]:
-    """What the compiler takes for these files, and what is said about projects among them.  Raises OSError if a project
-    cannot be read."""
-    diagnostics = [one for path in paths if (made := within(path, resource)) is not None for one in made.diagnostics]
-    given = given_sources(paths, resource)
+def inputs(paths: Sequence[Path], resource: str | None = None,
+           memory: bool = False) -> tuple[list[Path | Source], list[Diagnostic]]:
+    """What the compiler takes for these files, and what is said about projects among them; see `within`.  Raises OSError if a
+    project cannot be read."""
+    diagnostics = [one for path in paths if (made := within(path, resource, memory)) is not None for one in made.diagnostics]
+    given = given_sources(paths, resource, memory)
     return [Source(name, one) if isinstance(one, str) else one for name, one in given.items()], diagnostics
