@@ -1,7 +1,7 @@
 'use strict';
 // The extension: starts the language server, gives VS Code the debugger, the tests, the tasks and the commands.
 
-const { execFile } = require('child_process');
+const { execFile, spawn } = require('child_process');
 const fs = require('fs');
 const path = require('path');
 const vscode = require('vscode');
@@ -140,6 +140,39 @@ async function chart(given, program) {
   });
 }
 
+// The page of the running PLC beside the code.  Its process ends with its panel.
+async function live(given, program) {
+  const uri = await saved(given);
+  if (!uri) return;
+  const [command, ...first] = commandOf(folder());
+  const project = projectOf(uri);
+  const inBrowser = vscode.env.uiKind === vscode.UIKind.Web;
+  const frames = ['vscode-webview:', 'vscode-file:', ...(inBrowser ? ['http://127.0.0.1:*', 'http://localhost:*', 'https://*.vscode-cdn.net'] : [])];
+  const running = spawn(command, [...first, 'live', project || uri.fsPath, ...(project ? [] : chosen(program)), ...frames.flatMap((each) => ['--frame', each])],
+    { cwd: path.dirname(project || uri.fsPath) });
+  const panel = vscode.window.createWebviewPanel('fbvm.live', `${path.basename(project ? path.dirname(project) : uri.fsPath)} live`, vscode.ViewColumn.Beside,
+    { enableScripts: true, retainContextWhenHidden: true });
+  let told = '';
+  let said = '';
+  panel.onDidDispose(() => running.kill());
+  running.stderr.on('data', (data) => { told += data; output.append(String(data)); });
+  running.stdout.on('data', async (data) => {
+    const isNew = !/^http:\S+\n/m.test(said);
+    said += data;
+    const found = /^(http:\/\/127\.0\.0\.1:\d+)(\/#token=[\w-]+)\r?\n/m.exec(said);
+    if (!isNew || !found) return;
+    const outside = String(await vscode.env.asExternalUri(vscode.Uri.parse(found[1]))).replace(/\/$/, '');
+    panel.webview.html = `<!doctype html><meta http-equiv="Content-Security-Policy" content="default-src 'none'; frame-src ${outside}; style-src 'unsafe-inline'">
+<style>html, body, iframe { margin: 0; padding: 0; border: 0; width: 100%; height: 100vh; display: block }</style>
+<iframe title="The PLC" sandbox="allow-scripts allow-same-origin allow-forms allow-downloads" src="${outside}${found[2]}"></iframe>`;
+  });
+  running.on('error', (error) => vscode.window.showErrorMessage(`${command} does not start: ${error.message}`));
+  running.on('exit', (code) => {
+    if (code && !said) vscode.window.showErrorMessage(`fbvm live ended with status ${code}: ${told.trim().split('\n')[0]}`);
+    panel.dispose();
+  });
+}
+
 function debug(given, more) {
   const uri = target(given);
   const configuration = { type: 'fbvm', request: 'launch', name: uri ? path.basename(uri.fsPath) : 'fbvm', ...(uri ? { program: uri.fsPath } : {}), ...more };
@@ -212,7 +245,7 @@ async function activate(context) {
   const on = (name, action) => vscode.commands.registerCommand(`fbvm.${name}`, action);
   context.subscriptions.push(
     output, ...view, ...debugging.register(SELECTOR.filter((each) => each.language)),
-    on('run', runProgram), on('chart', chart), on('explain', explain), on('import', importProject), on('restart', restart),
+    on('run', runProgram), on('chart', chart), on('live', live), on('explain', explain), on('import', importProject), on('restart', restart),
     on('debug', (given, program) => debug(given, typeof program === 'string' ? { main: program } : {})),
     on('check', async () => { const uri = await saved(); if (uri) await execute(uri, 'check', ['check', uri.fsPath]); }),
     on('test', (uri, name) => runner.runTest(uri, name)),

@@ -115,7 +115,7 @@ class Connection:
             self._protocol.send_response(response)
             self.is_open = response.status_code == HTTPStatus.SWITCHING_PROTOCOLS
         else:
-            self._protocol.send_response(file_response(request.path))
+            self._protocol.send_response(file_response(request.path, self._guard.headers))
         if not self.is_open:
             self.ends = True
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from http import HTTPStatus
 from pathlib import Path
@@ -29,12 +30,12 @@ def _content(name: str) -> bytes:
     return (FOLDER / name).read_bytes()
 
 
-def file_response(path: str) -> Response:
-    """The answer to a request for a file; 404 for a path that is not in the table."""
+def file_response(path: str, headers: Mapping[str, str] = SECURITY_HEADERS) -> Response:
+    """The answer to a request for a file; 404 for a path that is not in the table.  `headers` are those of `guard`."""
     found = FILES.get(path.partition("?")[0])
     if found is None:
         return text_response(HTTPStatus.NOT_FOUND, "there is no such file")
-    return _response(HTTPStatus.OK, found[1], _content(found[0]))
+    return _response(HTTPStatus.OK, found[1], _content(found[0]), headers)
 
 
 def text_response(status: HTTPStatus, text: str) -> Response:
@@ -42,6 +43,6 @@ def text_response(status: HTTPStatus, text: str) -> Response:
     return _response(status, "text/plain; charset=utf-8", f"{text}\n".encode())
 
 
-def _response(status: HTTPStatus, kind: str, body: bytes) -> Response:
-    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close", **SECURITY_HEADERS})
-    return Response(status.value, status.phrase, headers, body)
+def _response(status: HTTPStatus, kind: str, body: bytes, headers: Mapping[str, str] = SECURITY_HEADERS) -> Response:
+    said = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close", **headers})
+    return Response(status.value, status.phrase, said, body)

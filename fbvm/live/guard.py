@@ -6,6 +6,7 @@ The token is a secret in the address.  Host and Origin are checked besides, so t
 from __future__ import annotations
 
 import hmac
+import re
 import secrets
 from collections.abc import Sequence
 from http import HTTPStatus
@@ -25,7 +26,23 @@ SECURITY_HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }  # fmt: skip
-"""What every answer says to the browser.  No Access-Control header is among them: other sites read nothing."""
+"""What answers say to the browser, as long as nobody may hold the page in a frame.  No Access-Control header is among them: other
+sites read nothing."""
+FRAME = re.compile(r"[a-z][a-z0-9+.-]*:(?://(?:\*\.)?[a-z0-9.-]+(?::(?:\d{1,5}|\*))?)?", re.I)
+"""Who may hold the page in a frame: a scheme such as `vscode-webview:`, or an origin; `*` is any port or subdomain."""
+
+
+def security_headers(frames: Sequence[str] = ()) -> dict[str, str]:
+    """What every answer says to the browser; pages of `frames` may hold the page in a frame.  Raises ValueError for what is no
+    scheme and no origin."""
+    for frame in frames:
+        if not FRAME.fullmatch(frame):
+            raise ValueError(f"{frame!r} is no scheme and no origin, such as vscode-webview: or http://127.0.0.1:8080")
+    if not frames:
+        return SECURITY_HEADERS
+    policy = SECURITY_HEADERS["Content-Security-Policy"].replace("frame-ancestors 'none'", f"frame-ancestors {' '.join(frames)}")
+    held = ("X-Frame-Options", "Cross-Origin-Resource-Policy")
+    return {name: text for name, text in SECURITY_HEADERS.items() if name not in held} | {"Content-Security-Policy": policy}
 
 
 def new_token() -> str:
@@ -34,9 +51,11 @@ def new_token() -> str:
 
 
 class Guard:
-    """Checks requests.  `port` is the server's, `bind` the address at which it listens, `token` the secret."""
+    """Checks requests.  `port` is the server's, `bind` the address at which it listens, `token` the secret; pages of `frames`
+    may hold the page in a frame."""
 
-    def __init__(self, port: int, bind: str = "127.0.0.1", token: str | None = None) -> None:
+    def __init__(self, port: int, bind: str = "127.0.0.1", token: str | None = None, frames: Sequence[str] = ()) -> None:
+        self.headers = security_headers(frames)
         self.token = token or new_token()
         self.port = port
         self._names = {name for name in (*LOOPBACK, bind) if name != "0.0.0.0"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from fbvm.live.session import Session
 from fbvm.live.sockets import LiveServer
@@ -16,13 +16,13 @@ LOOK_TICKS = 3
 
 class LiveHost:
     """Serves the pages of a workbench at `bind` and `port`.  Raises OSError if that cannot be used.  `tick` is called every
-    100 ms, between scans."""
+    100 ms, between scans; pages of `frames` may hold the page in a frame."""
 
     def __init__(self, workbench: Workbench, bind: str = "127.0.0.1", port: int = 0, token: str | None = None,
-                 tick: Callable[[], None] = lambda: None) -> None:  # fmt: skip
+                 tick: Callable[[], None] = lambda: None, frames: Sequence[str] = ()) -> None:  # fmt: skip
         self.workbench, self._tick, self._ticked_ns, self._ticks = workbench, tick, 0, 0
         self._plcs = list(workbench.plcs.values())
-        self.server = LiveServer(lambda: Session(self.workbench), bind, port, token)
+        self.server = LiveServer(lambda: Session(self.workbench), bind, port, token, frames)
 
     def show(self, workbench: Workbench) -> None:
         """Shows other PLCs on the pages that are open."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections import deque
 from collections.abc import Callable, Generator
+from pathlib import PurePath
 from typing import Any
 
 from fbvm.base.areas import FLAG_AREAS
@@ -222,7 +223,10 @@ class Session:
             raise MessageError("no scan has been recorded yet")
         scan = self._seen.past[0] if self._seen.past else held.stop - 1
         trace = RecordedScans(live.recorded, live.past.lines, first=max(held.start, scan - WHY_SCANS))
-        return {"text": cause_text(trace, why(trace, place, scan))}
+        text = cause_text(trace, why(trace, place, scan))
+        for file in live.texts:  # a page has little room for folders
+            text = text.replace(f"{file}:", f"{PurePath(file).name}:")
+        return {"text": text}
 
     def _test(self, plc: str) -> dict[str, Any]:
         """The acts so far as a pytest, with the values that the page sees now."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import selectors
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from fbvm.live.connection import Connection
@@ -36,14 +36,14 @@ class LiveServer:
     `new_session` is called for each WebSocket."""
 
     def __init__(self, new_session: Callable[[], Session], bind: str = "127.0.0.1", port: int = 0,
-                 token: str | None = None) -> None:  # fmt: skip
+                 token: str | None = None, frames: Sequence[str] = ()) -> None:  # fmt: skip
         self._new_session = new_session
         self._selector = selectors.DefaultSelector()
         self._listener = socket.create_server((bind, port), backlog=16)
         self._listener.setblocking(False)
         self._selector.register(self._listener, selectors.EVENT_READ, None)
         self._browsers: list[_Browser] = []
-        self.guard = Guard(self._listener.getsockname()[1], bind, token)
+        self.guard = Guard(self._listener.getsockname()[1], bind, token, frames)
 
     @property
     def sessions(self) -> list[Session]:

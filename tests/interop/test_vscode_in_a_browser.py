@@ -152,3 +152,15 @@ def test_from_a_mistake_to_a_step_back_and_a_green_test(page: Any) -> None:
     page.locator(".testing-run-glyph").first.click()
     page.locator(".codicon-testing-passed-icon, .testing-passed, .codicon-testing-passed").first.wait_for()
     assert page.locator(".squiggly-error").count() == 0
+
+
+def test_the_live_page_stands_beside_the_code_and_ends_with_its_panel(page: Any) -> None:
+    row(page, "test_level.st").dblclick()
+    page.locator(".view-line", has_text="ASSERT").first.click()
+    page.keyboard.press("F1")
+    page.keyboard.type("fbvm: Live page")
+    page.keyboard.press("Enter")
+    inner = page.frame_locator("iframe.webview").frame_locator("#active-frame").frame_locator("iframe")
+    inner.locator("#source td", has_text="Level := Level + 1;").first.wait_for()
+    inner.locator("#failure", has_text="ASSERT").or_(inner.locator("#state[data-state=trap]")).first.wait_for()
+    assert inner.locator("h1 select").input_value() == "test_level"

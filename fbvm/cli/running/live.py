@@ -38,6 +38,8 @@ from fbvm.run.running import Running
 @click.option("--read-only", is_flag=True, help="Let pages look and nothing else.")
 @click.option("--allow-write", "writable", multiple=True, metavar="NAME",
               help="Let pages write and force this variable or address and what is in it, and nothing else; may be repeated.")
+@click.option("--frame", "frames", multiple=True, metavar="SOURCE",
+              help="Let pages of this scheme or origin, such as vscode-webview:, show the page in a frame; may be repeated.")
 @click.option("--paused", is_flag=True, help="Wait before the first scan.")
 @click.option("--speed", type=click.FloatRange(0, 1000), default=1.0, show_default=True, metavar="N",
               help="How fast virtual time passes: 1 as the clock, 0.1 ten times slower, 0 as fast as it goes.")
@@ -47,7 +49,7 @@ from fbvm.run.running import Running
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, net: str,
     mappings: tuple[Mapping, ...], doors: tuple[Door, ...], port: int, bind: str, read_only: bool, writable: tuple[str, ...],
-    paused: bool, speed: float, debug_port: int | None, trace: Path | None,
+    frames: tuple[str, ...], paused: bool, speed: float, debug_port: int | None, trace: Path | None,
 ) -> None:  # fmt: skip
     """Run a program or a PROJECT and print the address of a page on which it lives: values, rungs with power, the scan that
     stops, steps and goes back, units, frames and faults.  When the files change, the page offers to begin the changed program.
@@ -55,10 +57,15 @@ def command(
     Ends by Ctrl-C.  The address has a token: who does not have it sees nothing.  Status 3 if the program has errors, 5 if the
     network or the port of the page cannot be used."""
     check_installed()
+    from fbvm.live.guard import FRAME
+
     if debug_port is not None and trace:
         raise click.UsageError("--debug looks into scans itself: leave out --trace")
+    for frame in frames:
+        if not FRAME.fullmatch(frame):
+            raise click.UsageError(f"--frame {frame}: write a scheme or an origin, such as vscode-webview: or http://127.0.0.1:8080")
     control = Control(is_paused=paused, speed=speed)
-    options = PageOptions(bind, port, read_only, writable, debug_port)
+    options = PageOptions(bind, port, read_only, writable, frames, debug_port)
     if project := project_argument(files):
         if mappings or doors:
             raise click.UsageError("--map and --door are for FILE: what a project does stands in its file")

@@ -50,7 +50,11 @@ export function save(name, text, kind = "text/plain") {
 }
 
 export function remember(key, value) {
-  sessionStorage.setItem(`fbvm.${key}`, JSON.stringify(value));
+  try {
+    sessionStorage.setItem(`fbvm.${key}`, JSON.stringify(value));
+  } catch {
+    // a frame of an editor may have no storage: then nothing is remembered
+  }
 }
 
 export function remembered(key, otherwise) {

@@ -38,7 +38,8 @@ export class MemoryPanel {
     const form = at("form").value;
     const shown = (word) => form === "t" ? [word >> 8, word & 255].map((one) => one > 31 && one < 127 ? String.fromCharCode(one) : ".").join("")
       : word.toString(Number(form)).toUpperCase().padStart(form === "16" ? 4 : form === "2" ? 16 : 1, "0");
-    const wide = form === "2" ? 4 : 10;
+    const isNarrow = matchMedia("(max-width: 45rem)").matches;
+    const wide = form === "2" ? (isNarrow ? 2 : 4) : isNarrow ? 5 : 10;
     const rows = [];
     for (let row = 0; row < this.words.length; row += wide) {
       rows.push(make("tr", {}, make("th", { scope: "row" }, `${at("area").value}${this.from + row}`),

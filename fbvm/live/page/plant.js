@@ -41,7 +41,7 @@ export class PlantPanel {
     const focused = document.activeElement?.closest("#plcs") ? document.activeElement.textContent : "";
     at("plcs").replaceChildren(...this.plant.plcs.map((plc) => this.card(plc)));
     if (focused) [...at("plcs").querySelectorAll("button")].find((one) => one.textContent === focused)?.focus();
-    at("plan").replaceChildren(this.picture());
+    at("plan").replaceChildren(this.picture(), this.plant.links.length ? "" : make("p", { class: "dim" }, "Nobody has sent a frame yet."));
     at("doors").replaceChildren(...this.plant.doors.map(([unit, host]) => make("li", {}, `${unit} is reached from outside at ${host}`)));
   }
 
@@ -71,7 +71,7 @@ export class PlantPanel {
     const top = 12;
     const below = top + HIGH + GAP;
     const place = (count, number) => (wide - count * (BOX + 20)) / 2 + 10 + number * (BOX + 20);
-    const svg = inSvg("svg", { viewBox: `0 0 ${wide} ${peers.length ? below + HIGH + 10 : top + HIGH + 34}`, width: wide, role: "img",
+    const svg = inSvg("svg", { viewBox: `0 0 ${wide} ${peers.length ? below + HIGH + 10 : top + HIGH + (links.length ? 34 : 10)}`, width: wide, role: "img",
       "aria-label": `${plcs.length} PLCs, ${peers.length} peers. ${links.map(([one, other, frames]) => `${one} and ${other}: ${frames} frames`).join(". ")}` });
     const middle = (host) => (homes.has(host) ? [place(plcs.length, homes.get(host)) + BOX / 2, top + HIGH] : [place(peers.length, peers.indexOf(host)) + BOX / 2, below]);
     links.forEach(([one, other, frames, info], number) => {

@@ -208,6 +208,18 @@ def test_a_page_that_never_takes_an_update_gets_one_and_no_more() -> None:
     assert [text is not None for text in texts] == [True] + [False] * 98
 
 
+def test_only_pages_that_are_named_may_hold_the_page_in_a_frame() -> None:
+    made = Connection(Guard(PORT, token=TOKEN, frames=("vscode-webview:", "http://127.0.0.1:*")))
+    made.receive(request("/", upgrade=False))
+    head = said(made).partition(b"\r\n\r\n")[0]
+    assert b"frame-ancestors vscode-webview: http://127.0.0.1:*\r\n" in head and b"X-Frame-Options" not in head
+    _, usual = answered(request("/", upgrade=False))
+    assert b"frame-ancestors 'none'" in usual and b"X-Frame-Options: DENY" in usual
+    for wrong in ("*", "a; script-src *", "http://a b", "'self'", "evil.example", "https:\r\nX: y"):
+        with pytest.raises(ValueError, match="no origin"):
+            Guard(PORT, frames=(wrong,))
+
+
 def test_read_only_refuses_every_action_that_changes_anything() -> None:
     page = Page(read_only=True)
     for action in ("write", "force", "release", "run", "pause", "step", "speed", "mode", "start", "cable", "fault", "mend"):

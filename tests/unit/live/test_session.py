@@ -106,6 +106,23 @@ def test_an_observed_scan_says_which_lines_it_executed(page: Page) -> None:
     assert any("Curve[1] := Level" in text for text in executed)
 
 
+def test_lines_of_methods_and_properties_belong_to_their_instance() -> None:
+    text = """FUNCTION_BLOCK Counter VAR n : INT; END_VAR
+METHOD PUBLIC Add VAR_INPUT Step : INT; END_VAR
+n := n + Step;
+END_METHOD
+PROPERTY Count : INT GET
+Count := n;
+END_GET END_PROPERTY END_FUNCTION_BLOCK
+PROGRAM Main VAR c : Counter; seen : INT; END_VAR c.Add(Step := 2); IF seen < 3 THEN seen := c.Count; END_IF END_PROGRAM"""
+    page = Page(text)
+    page.done("hello", version=1)
+    page.done("look", plc="pump", names=[], instance="Main.c", scan=True)
+    assert page.done("source", plc="pump", instance="Main.c")["lines"][2]["names"] == ["Main.c.n"]
+    page.scan()
+    assert page.update()["inside"]["executed"] == [3, 6]
+
+
 def test_the_past_is_looked_at_and_not_written(page: Page) -> None:
     page.done("look", plc="pump", names=["Main.Level"])
     page.scan(30)

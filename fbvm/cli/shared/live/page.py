@@ -46,6 +46,8 @@ class PageOptions:
     port: int = 0
     read_only: bool = False
     writable: tuple[str, ...] = ()
+    frames: tuple[str, ...] = ()
+    """Whose pages may hold the page in a frame."""
     debug_port: int | None = None
     """Where debuggers may attach meanwhile."""
 
@@ -114,7 +116,7 @@ class _Page:
             tick()
 
         try:
-            self.host = LiveHost(self._workbench(), bind, self._options.port, tick=both)
+            self.host = LiveHost(self._workbench(), bind, self._options.port, tick=both, frames=self._options.frames)
         except OSError as error:
             unusable(OSError(f"the page cannot be served at {bind}:{self._options.port}: {error.strerror}"))
 
