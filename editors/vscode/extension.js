@@ -161,7 +161,9 @@ async function live(given, program) {
     said += data;
     const found = /^(http:\/\/127\.0\.0\.1:\d+)(\/#token=[\w-]+)\r?\n/m.exec(said);
     if (!isNew || !found) return;
-    const outside = String(await vscode.env.asExternalUri(vscode.Uri.parse(found[1]))).replace(/\/$/, '');
+    // A remote VS Code forwards the port; a proxy with a path of its own is of no use, since the page asks for / on its own port.
+    const forwarded = String(await vscode.env.asExternalUri(vscode.Uri.parse(found[1]))).replace(/\/$/, '');
+    const outside = /^http:\/\/(127\.0\.0\.1|localhost):\d+$/.test(forwarded) ? forwarded : found[1];
     panel.webview.html = `<!doctype html><meta http-equiv="Content-Security-Policy" content="default-src 'none'; frame-src ${outside}; style-src 'unsafe-inline'">
 <style>html, body, iframe { margin: 0; padding: 0; border: 0; width: 100%; height: 100vh; display: block }</style>
 <iframe title="The PLC" sandbox="allow-scripts allow-same-origin allow-forms allow-downloads" src="${outside}${found[2]}"></iframe>`;
