@@ -15,9 +15,11 @@ from __future__ import annotations
 import argparse
 import ast
 import difflib
+import math
 import os
 import random
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -25,6 +27,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,7 +46,7 @@ TESTS = {
     "fblib": ("tests/fblib", "tests/unit/units"), "base": ("tests/unit/base", "tests/lang"),
     "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"),
     "wire": ("tests/unit/wire", "tests/unit/net"),
-    "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/plcopen", "tests/cx"),
+    "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/unit/interchange", "tests/plcopen", "tests/cx", "tests/twincat"),
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
@@ -212,14 +215,18 @@ class Copy:
 
     def passes(self, tests: list[str], limit_s: float) -> bool:
         """True if the tests pass; False for a failure, and for tests that take more than `limit_s` seconds."""
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", *tests]
+        # `ulimit -t` holds for every process that a test starts, also for one in a session of its own, which killpg does not reach.
+        pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", *tests]
+        command = ["sh", "-c", f"ulimit -t {math.ceil(limit_s)}; exec {shlex.join(pytest)}"]
         with subprocess.Popen(command, cwd=self.folder, env=self._environment, stdout=subprocess.DEVNULL,
                               stderr=subprocess.DEVNULL, start_new_session=True) as running:
             try:
                 return running.wait(limit_s) == 0
             except subprocess.TimeoutExpired:
-                os.killpg(running.pid, signal.SIGKILL)
                 return False
+            finally:
+                with suppress(ProcessLookupError):
+                    os.killpg(running.pid, signal.SIGKILL)
 
     def survives(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
         """True if no test finds a mutant; afterwards the file is as it was."""
