@@ -64,6 +64,12 @@ def test_narrow_terminals_have_one_below_the_other() -> None:
     assert [line[0] for line in lines[1:]] == ["-"] * 3 + ["+"] * 3
 
 
+def test_symbols_are_added_and_removed() -> None:
+    old, new = "VAR_GLOBAL a, b : INT; END_VAR", "VAR_GLOBAL b : INT; c AT D5 : WORD; END_VAR"
+    assert shown(old, new) == ["global symbols: 1 symbol removed, 1 symbol added", "- a : INT", "+ c AT D5 : WORD"]
+    assert shown("", old)[0] == "global symbols: 2 symbols added"
+
+
 def test_symbols_comments_and_texts_differ_too() -> None:
     new = OLD.replace("// start", "// go").replace("2 * x", "3 * x")
     assert shown(OLD, new) == [

@@ -47,13 +47,12 @@ def _symbols(where: str, old: Mapping[str, Declared], new: Mapping[str, Declared
         if first == second:
             continue
         counts[0 if first and second else 1 if first else 2] += 1
-        lines += [f"- {_row(first)}"] * bool(first) + [f"+ {_row(second)}"] * bool(second)
+        lines += [f"{sign} {_row(one)}" for sign, one in (("-", first), ("+", second)) if one is not None]
     if lines:
         yield Difference(where, _counted("symbol", *counts), tuple(lines))
 
 
-def _row(one: Declared | None) -> str:
-    assert one is not None
+def _row(one: Declared) -> str:
     return f"{one.name}{f' AT {one.address}' if one.address else ''} : {one.type}{f'  // {one.comment}' if one.comment else ''}"
 
 
