@@ -118,7 +118,7 @@ class _Property:
     def place(self, place: Place) -> Term:
         """What lies at a place behind the scan."""
         kind = machine(base(place.type))
-        if not kind:
+        if kind != "b" and kind not in _BYTES:
             raise Refused(f"{place.name} is {place.type.name}, and texts cannot be followed")
         found: list[tuple[Term, int, int | None]] = [(self.terms.true, place.offset, place.bit)]
         for distance in place.hops:

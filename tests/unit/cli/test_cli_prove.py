@@ -94,6 +94,14 @@ def test_wrong_use_has_status_2(arguments: list[str]) -> None:
     assert "Error: " in result.stderr
 
 
+@pytest.mark.parametrize("kind", ["STRING[3]", "WSTRING[3]"])
+def test_a_property_of_a_text_cannot_be_followed(tmp_path: Path, kind: str) -> None:
+    program = tmp_path / "program.st"
+    program.write_text(f"PROGRAM Main VAR s, t : {kind}; END_VAR END_PROGRAM\n", encoding="utf-8")
+    result = proved(str(program), "--never", "Main.s = Main.t")
+    assert (result.exit_code, f"Main.s is {kind}, and texts cannot be followed" in result.stderr) == (3, True)
+
+
 def test_a_program_that_cannot_be_followed_has_status_3_and_its_line(tmp_path: Path) -> None:
     program = tmp_path / "program.st"
     text = "PROGRAM Main\nVAR i AT %ID0 : DINT; a : ARRAY [0..9999] OF INT; END_VAR\n    a[i] := 1;\nEND_PROGRAM\n"
