@@ -29,6 +29,7 @@ def pou(types: Types, declared: tree.Pou) -> Element:
         raise NotExportable(refused, f"{refused.what} is not exported", "")
     if declared.accesses:
         raise NotExportable(declared.accesses[0], "VAR_ACCESS of a POU is not exported", "")
+    _refuse_objects(declared)
     sections = [section for section in declared.sections if not section.hidden]
     variables = [variable for section in sections for variable in section.variables]
     types.note(sections)
@@ -48,6 +49,19 @@ def pou(types: Types, declared: tree.Pou) -> Element:
     return element("pou", element("interface", result, *lists), _unless_empty("actions", actions),
                    _unless_empty("transitions", transitions), element("body", inner),
                    name=declared.name.text, pouType=TYPES_OF_POUS[declared.kind])
+
+
+def _refuse_objects(declared: tree.Pou) -> None:
+    """TC6 2.01 is older than the objects of edition 3: it has neither kinds of POUs nor elements for them."""
+    hint = "put what other tools are to read into function blocks and functions without objects"
+    if declared.kind not in TYPES_OF_POUS:
+        raise NotExportable(declared.name, f"{declared.kind} is not exported", hint)
+    for nodes, what in ((declared.bases, "EXTENDS"), (declared.interfaces, "IMPLEMENTS"), (declared.modifiers, "")):
+        if nodes:
+            raise NotExportable(nodes[0], f"{what or nodes[0].text.upper()} is not exported", hint)
+    if declared.methods:
+        method = declared.methods[0]
+        raise NotExportable(method.name, f"{method.kind} {method.name.text} is not exported", hint)
 
 
 def _is_hidden(action: tree.Action) -> bool:

@@ -84,10 +84,15 @@ class Types:
                       for name, value in spec.members]
             return element("enum", element("values", *values), element("baseType", self.spec(spec.base)) if spec.base else None)
         if isinstance(spec, tree.StructSpec) and not spec.overlap:
-            return element("struct", *(made for member in spec.members for made in self.variables(member)))
+            return self._struct(spec)
         if isinstance(spec, tree.RefSpec) and spec.kind == "POINTER TO":
             return element("pointer", element("baseType", self.spec(spec.target)))
         raise NotExportable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
+
+    def _struct(self, spec: tree.StructSpec) -> Element:
+        for base in spec.bases:
+            raise NotExportable(base, "EXTENDS is not exported", "write the members of the base into the structure")
+        return element("struct", *(made for member in spec.members for made in self.variables(member)))
 
     def _array(self, spec: tree.ArraySpec) -> Element:
         dimensions = []
