@@ -46,7 +46,8 @@ TESTS = {
     "fblib": ("tests/fblib", "tests/unit/units"), "base": ("tests/unit/base", "tests/lang"),
     "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"),
     "wire": ("tests/unit/wire", "tests/unit/net"),
-    "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/unit/interchange", "tests/plcopen", "tests/cx", "tests/twincat"),
+    "check": ("tests/unit/check", "tests/lang", "tests/unit/code"),
+    "interchange": ("tests/unit/interchange", "tests/plcopen", "tests/cx", "tests/twincat"),
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
@@ -215,7 +216,7 @@ class Copy:
 
     def passes(self, tests: list[str], limit_s: float) -> bool:
         """True if the tests pass; False for a failure, and for tests that take more than `limit_s` seconds."""
-        # `ulimit -t` holds for every process that a test starts, also for one in a session of its own, which killpg does not reach.
+        # `ulimit -t` holds for every process that a test starts, also for one in a session of its own, out of killpg's reach.
         pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", *tests]
         command = ["sh", "-c", f"ulimit -t {math.ceil(limit_s)}; exec {shlex.join(pytest)}"]
         with subprocess.Popen(command, cwd=self.folder, env=self._environment, stdout=subprocess.DEVNULL,
