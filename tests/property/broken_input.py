@@ -22,9 +22,12 @@ from pathlib import Path
 from random import Random
 
 if __name__ == "__main__":
-    sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parents[1] / "unit/rigs")]
+    TESTS = Path(__file__).parents[1]
+    sys.path[:0] = [str(TESTS.parent), *(str(TESTS / name) for name in ("unit/rigs", "twincat", "cx"))]
 
+import twincat_files
 from click.testing import CliRunner
+from cx_text import Cxt
 from old_files import write_old_journal, write_old_trace
 
 from fbvm import Depth
@@ -35,9 +38,46 @@ ROOT = Path(__file__).parents[2]
 LIMIT_S = 2.0
 """Processor time that a verb may take for a small file."""
 STATUSES = range(6)
+GOOD_CX = Cxt(
+    symbols=["start,0.00,BOOL,,,", "level,D100,INT,,,"], local=["lamp,W1.00,BOOL,,,"],
+    sections=[("Sec1", ["# first\nLD start\nOR lamp\nOUT lamp", "LD lamp\nTIM 0 #10\nMOV &5 level"])],
+).bytes()  # fmt: skip
 COUNTER = """PROGRAM Main VAR n : INT; d : INT := 3; s : STRING := 'x'; END_VAR n := n + 6 / d;
 %D5 := INT_TO_WORD(n); END_PROGRAM
 """
+LIST = """FUNCTION_BLOCK Lamp VAR_INPUT a, b : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR
+LD a
+ANDN ( b
+OR q
+)
+ST q
+END_FUNCTION_BLOCK
+PROGRAM Main VAR n : INT; t : TON; lamp1 : Lamp; END_VAR
+LD n
+ADD 1
+ST n
+GT 100
+JMPCN on
+LD 0
+ST n
+on: CAL t(IN := TRUE, PT := T#1s)
+CAL lamp1(a := t.Q, b := FALSE)
+END_PROGRAM
+"""
+OBJECTS = """INTERFACE IRun METHOD Step : INT VAR_INPUT delta : INT; END_VAR END_METHOD END_INTERFACE
+FUNCTION_BLOCK ABSTRACT Base IMPLEMENTS IRun
+VAR PROTECTED n : INT; END_VAR
+METHOD PUBLIC ABSTRACT Step : INT VAR_INPUT delta : INT; END_VAR END_METHOD
+PROPERTY PUBLIC Count : INT GET Count := n; END_GET SET n := Count; END_SET END_PROPERTY
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK FINAL Own EXTENDS Base
+METHOD PUBLIC OVERRIDE Step : INT VAR_INPUT delta : INT; END_VAR n := n + delta; Step := n; END_METHOD
+END_FUNCTION_BLOCK
+PROGRAM Main VAR own1 : Own; run : IRun; n : INT; END_VAR
+run := own1; IF run <> NULL THEN n := run.Step(delta := 2); END_IF; own1.Count := own1.Count + 1;
+END_PROGRAM
+"""
+PROPERTY = b"Main.n < 100 AND Main.d = 3 OR D5 <> 16#12 AND NOT (Main.s = 'x')"
 PROJECT = """[run]
 net = "loop"
 for = "20ms"
@@ -87,11 +127,14 @@ WORDS = (
     "\t", "\u00e4", "\U0001f600", "\u2028", "\ufeff", "null", "true", "{}", "[]", '"x"', "1.5", "-0", "<!--", "&amp;", "</pou>",
     "<variable/>", "[[", "]]", "=", "nan", "inf", ",", "{{script}}",
 )  # fmt: skip
+TEXT = "<text>"
+"""Stands for what is in the file, as an argument."""
 KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "source": ("text.st", (
         ("check",), ("check", "--json"), ("fmt", "--diff"), ("fmt",), ("list",), ("list", "--native"), ("ladder",), ("sfc",),
         ("ladder", "--svg", "out.svg"), ("sfc", "--svg", "out.svg"), ("export", "-o", "out.xml"),
         ("run", "--scans", "3", "--ladder", "0..2", "--sfc", "0..2", "--chart", "D5"), ("step",),
+        ("diff", "use.st"), ("prove", "--no-trap", "--scans", "3", "--budget", "500ms"),
         ("run", "--scans", "3", "--trace", "out.fbtrace", "--depth", "statements", "--html", "out.html",
          "--journal", "out.journal"),
     )),
@@ -108,6 +151,21 @@ KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
         ("convert", "", "out.csv"), ("convert", "", "out.vcd"), ("convert", "", "out.pcapng"),
     )),
     "csv": ("run.csv", (("convert", "", "back.fbtrace"),)),
+    "object": ("POUs/FB_Counter.TcPOU", (
+        ("check",), ("check", "--json"), ("list",), ("fmt", "--diff"), ("export", "-o", "out.xml"), ("run", "--scans", "3"),
+        ("run", "Plant.plcproj", "--scans", "3", "--"),
+    )),
+    "plcproj": ("Plant.plcproj", (("check",), ("check", "--json"), ("run", "--scans", "3"), ("diff", "use.st"))),
+    "cx": ("text.cxt", (
+        ("import", "-o", "out", "--force"), ("import", "-o", "out", "--force", "--json"), ("diff", "", "good.cxt"),
+        ("export", "counter.st", "-o", "out.cxt", "--into"),
+    )),
+    "property": ("property.txt", (
+        ("prove", "counter.st", "--scans", "5", "--budget", "500ms", "--never", TEXT, "--"),
+        ("prove", "counter.st", "--scans", "5", "--budget", "500ms", "--assume", TEXT, "--no-trap", "--"),
+        ("prove", "counter.st", "--scans", "5", "--budget", "500ms", "--no-trap", "--free", TEXT, "--"),
+        ("run", "counter.st", "--scans", "5", "--until", TEXT, "--"),
+    )),
     "image": ("image.json", (("serve", "--bind", "nobody", "--image"),)),
 }  # fmt: skip
 """By kind of file: its name, and the verbs that read it; "" stands for the name, which is the last argument without one."""
@@ -119,9 +177,11 @@ def seeds() -> dict[str, list[bytes]]:
     examples = [ROOT / "examples" / f"{name}.st" for name in ("demo", "ladder", "sfc", "client")]
     sources = [*examples, *sorted((ROOT / "examples/classics").glob("*.st")), *sorted((ROOT / "fblib/iec").rglob("*.st")),
                *sorted((ROOT / "tests/golden").rglob("*.st"))]
-    found = {"source": [path.read_bytes() for path in sources] + [COUNTER.encode()],
+    found = {"source": [path.read_bytes() for path in sources] + [text.encode() for text in (COUNTER, LIST, OBJECTS)],
              "xml": [path.read_bytes() for path in sorted((ROOT / "tests/plcopen/documents").glob("*.xml"))],
-             "project": [PROJECT.encode()], "library": [LIBRARY.encode()]}  # fmt: skip
+             "project": [PROJECT.encode()], "library": [LIBRARY.encode()], "property": [PROPERTY], "cx": [GOOD_CX],
+             "object": [text.encode() for name, text in twincat_files.FILES.items() if "POUs" in name],
+             "plcproj": [twincat_files.PROJECT.encode()]}  # fmt: skip
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         Path("counter.st").write_text(COUNTER, encoding="utf-8")
         for path in (*examples[1:3], Path("counter.st")):
@@ -235,6 +295,8 @@ def furnish() -> None:
     Path("counter.st").write_text(COUNTER, encoding="utf-8")
     Path("use.st").write_text("PROGRAM Main VAR t : Twice; END_VAR t(IN := 1); END_PROGRAM\n", encoding="utf-8")
     Path("own/Twice.st").write_text("FUNCTION_BLOCK Twice VAR_INPUT x : INT; END_VAR\nEND_FUNCTION_BLOCK\n", encoding="utf-8")
+    Path("good.cxt").write_bytes(GOOD_CX)
+    twincat_files.write_project(Path())
     Path("own/lists.st").write_text("VAR_GLOBAL own_list : INT; END_VAR\n", encoding="utf-8")
 
 
@@ -246,7 +308,8 @@ def complaint(kind: str, data: bytes) -> str | None:
         Path(name).write_bytes(data)
         arguments = [argument or name for argument in given] if "" in given else [*given, name]
         if given[-1] == "--":
-            arguments = list(given[:-1])
+            text = data.decode(errors="replace").replace("\0", "")
+            arguments = [text if argument == TEXT else argument for argument in given[:-1]]
         began_s = time.process_time()
         try:
             status, output = verb(*arguments)
