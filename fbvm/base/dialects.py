@@ -47,6 +47,7 @@ class Dialect:
     no_open_inputs: bool = False
     instances_are_values: bool = False
     action_inputs: bool = False
+    subranges_unchecked: bool = False
     empty_bodies: bool = False
     in_outs_are_read: bool = False
     narrowing: bool = False
@@ -98,14 +99,17 @@ QUESTIONS = {
     "no_open_inputs": ("ARRAY [*] as VAR_INPUT of a FUNCTION",
                        "taken: the function reads the argument where it lies, without a copy, and cannot write it",
                        "refused (S0903); VAR_IN_OUT takes it"),
-    "instances_are_values": ("VAR_INPUT t : TON of a FUNCTION_BLOCK or PROGRAM: an instance as an input",
-                             "read where the argument lies: its outputs are read, it is not called",
+    "instances_are_values": ("VAR_INPUT t : TON of a FUNCTION_BLOCK or PROGRAM: an instance as an input; a := b of two instances; "
+                             "an instance as a result",
+                             "read where the argument lies: its outputs are read, it is not called; an error",
                              "an instance of the block's own, which may be called; an argument is copied into it in front of "
-                             "the body"),
+                             "the body; all variables are copied"),
     "in_outs_are_read": ("an in-out of a function block, read through an instance", "an error",
                          "the variable that the last call passed; in front of the first call the program stops (R0110)"),
     "action_inputs": ("motor.Stop(now := TRUE): an ACTION of an instance, called with inputs of the instance", "an error",
                       "the inputs are written, then the action is called"),
+    "subranges_unchecked": ("a variable of INT(1..10) gets 0", "stops the program (R0103); of a constant it is an error (S0702)",
+                            "it is 0: CODESYS checks nothing unless a project has CheckRangeSigned"),
     "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
                      "runs nothing"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
@@ -132,7 +136,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
                    bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
-                   instances_are_values=True, action_inputs=True, empty_bodies=True)
+                   instances_are_values=True, action_inputs=True, empty_bodies=True, subranges_unchecked=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

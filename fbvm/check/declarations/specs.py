@@ -26,6 +26,7 @@ from fbvm.base.types import (
     reference,
     string,
 )
+from fbvm.check.declarations.construction import INIT_KEY
 from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.structures import RELATIVE, Members
 from fbvm.check.expressions.constant_integers import integer
@@ -203,7 +204,8 @@ def _subrange(scope: Scope, spec: tree.SubrangeSpec, name: str) -> Resolved | No
     if not kind.low <= low <= high <= kind.high:
         scope.error("S0704", spec, f"{low}..{high} is not a range within {kind}")
         return None
-    made = SubrangeType(name or f"{kind} ({low}..{high})", kind.size, kind.align, kind, low, high)
+    made = SubrangeType(name or f"{kind} ({low}..{high})", kind.size, kind.align, kind, low, high,
+                        not scope.dialect.subranges_unchecked)
     return made, default(made)
 
 
@@ -212,6 +214,8 @@ def _constructed(scope: Scope, spec: tree.TypeSpec, base: tree.NamedType, values
     """A type with something in parentheses: initial values of an instance, arguments of FB_init, or a subrange or
     enumeration that is written wrongly."""
     resolved = resolve(scope, base)
+    if resolved is not None and _has_init(scope, resolved[0]):
+        return resolved
     if resolved is not None and values is not None and _has_inputs(resolved[0], values):
         return resolved[0], initial_bytes(scope, resolved[0], values, resolved[1])
     if resolved is not None and is_block(resolved[0]):
@@ -228,15 +232,21 @@ def _instances(scope: Scope, spec: tree.ConstructedSpec) -> Resolved | None:
     if resolved is None or spec.values is None:
         return _constructed(scope, spec, spec.base, None)
     given = [value for _, value in spec.values.items if value is not None]
+    if _has_init(scope, resolved[0]) and all(isinstance(value, tree.StructInit) for value in given):
+        return resolved
     if is_block(resolved[0]) and not all(isinstance(v, tree.StructInit) and _has_inputs(resolved[0], v) for v in given):
         _refuse_arguments(scope, spec, spec.base)
         return None
     return resolved
 
 
+def _has_init(scope: Scope, kind: Type) -> bool:
+    """True for a block with FB_init, its own or an inherited one, which takes the arguments of a declaration."""
+    return isinstance(kind, StructType) and kind.block and scope.context.block_of(kind).method(INIT_KEY) is not None
+
+
 def _refuse_arguments(scope: Scope, spec: tree.TypeSpec, base: tree.NamedType) -> None:
-    scope.error("S0902", spec, f"arguments for FB_init of {base.text} are object-oriented text, which fbvm "
-                "does not execute", f"initial values of its inputs are written {base.text} := (name := value)")
+    scope.error("S1011", spec, f"{base.text} has no FB_init that takes arguments", f"initial values of its inputs are written {base.text} := (name := value)")
 
 
 def _array(scope: Scope, spec: tree.ArraySpec, name: str) -> Resolved | None:

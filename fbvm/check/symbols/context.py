@@ -172,7 +172,7 @@ class Context:
             if key in project.globals:
                 project.dependencies.record("global", folded)
                 return project.globals[key]
-        return None
+        return self.global_variable(name, source) if project.load_list(folded) else None
 
     def listed(self, space: str, name: str, source: Source) -> Variable | None:
         """The global variable `space.name`, both folded: of the list (file) of that name, of any list for a library's name."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from fbvm.base.types import ANY_SIZE, UDINT, AnyType, OpenArrayType, RefType, Type, machine
 from fbvm.check.declarations.interfaces import OBJECTS_AT
 from fbvm.check.expressions.values import is_null
-from fbvm.check.symbols.facts import Holder
+from fbvm.check.symbols.facts import Holder, Start
 from fbvm.code.builder.places import Place
 from fbvm.code.lowering import any_parameters
 from fbvm.code.lowering.arrays import size_of
@@ -64,6 +64,11 @@ def reference_to(body: BodyContext, expr: tree.Expr) -> Node:
         return _from_bits(("add", "u64", _bits(reference), _word((number[2] - BUFFER_OBJECT) << OBJECT_SHIFT)))
     moved = ("mul", "u64", ("sub", "u64", number, _word(BUFFER_OBJECT)), _word(1 << OBJECT_SHIFT))
     return _from_bits(("add", "u64", _bits(reference), moved))
+
+
+def initial(body: BodyContext, start: Start) -> Node:
+    """The reference of an initial value: of an interface to an instance as a whole, of others to a variable."""
+    return body.value(start.place, start.kind) if start.kind.interface else reference_to(body, start.place)
 
 
 def binding(body: BodyContext, expr: tree.Expr) -> Node:

@@ -85,6 +85,23 @@ def hides_inside(text: str, start: int) -> bool:
     return before.rstrip().endswith("}") and _HIDDEN.search(before) is not None
 
 
+_ATTRIBUTE = re.compile(r"""\{\s*attribute\s*'([^']*)'\s*(?::=\s*'([^']*)')?\s*\}""", re.IGNORECASE)
+_FAR = 2_000
+"""Characters in front of a declaration in which its attributes are searched."""
+
+
+def attributes_before(text: str, start: int) -> dict[str, str]:
+    """The attributes directly in front of what begins at `start` in a text, among blanks and comments: names in small letters
+    and values."""
+    before = text[max(0, start - _FAR):start]
+    if "{" not in before:
+        return {}
+    at = len(before)
+    while match := re.search(r"\{[^{}]*\}(?:\s|//[^\n]*\n|\(\*(?:(?!\*\)).)*\*\))*\Z", before[:at], re.DOTALL):
+        at = match.start()
+    return {found[1].lower(): found[2] or "" for found in _ATTRIBUTE.finditer(before[at:])}
+
+
 def attributes(text: SourceText, declaration: Declaration) -> set[str]:
     """Names of the attributes that stand directly in front of a declaration."""
     found = (_SHAPE.match(pragma) for pragma in _in_front(text, declaration))
