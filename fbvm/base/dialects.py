@@ -48,6 +48,7 @@ class Dialect:
     instances_are_values: bool = False
     action_inputs: bool = False
     subranges_unchecked: bool = False
+    padding_is_written: bool = False
     empty_bodies: bool = False
     in_outs_are_read: bool = False
     narrowing: bool = False
@@ -110,6 +111,10 @@ QUESTIONS = {
                       "the inputs are written, then the action is called"),
     "subranges_unchecked": ("a variable of INT(1..10) gets 0", "stops the program (R0103); of a constant it is an error (S0702)",
                             "it is 0: CODESYS checks nothing unless a project has CheckRangeSigned"),
+    "padding_is_written": ("p[10] := 0, where p points at an ARRAY[0..9] OF BYTE that a method or function declares",
+                           "stops the program (R0110)",
+                           "written: arrays, structures and texts there are padded to 8 bytes; what lies behind the padding stops "
+                           "the program"),
     "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
                      "runs nothing"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
@@ -136,7 +141,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
                    bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
-                   instances_are_values=True, action_inputs=True, empty_bodies=True, subranges_unchecked=True)
+                   instances_are_values=True, action_inputs=True, empty_bodies=True, subranges_unchecked=True,
+                   padding_is_written=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

@@ -14,8 +14,10 @@ from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
     AnyType,
+    ArrayType,
     Field,
     OpenArrayType,
+    StringType,
     StructType,
     base,
     fold,
@@ -37,6 +39,8 @@ OBJECTS_AT = 4
 """Where an instance has the number of the first of its objects: behind its type identifier, 32 bits each."""
 _SECTIONS = ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT")
 """Sections that every POU may have."""
+PADDED_BYTES = 8
+"""Arrays, structures and texts in frames take multiples of so many bytes where a dialect lets programs write what is left over."""
 _LOCATED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
 """Sections of blocks and programs whose variables may lie AT an address."""
 _WITH_BOUNDS = (OpenArrayType, AnyType)
@@ -389,7 +393,10 @@ class _Interface:
             _append(content, variable)
         self.pou.frame_inputs = len(content)
         for variable in rest:
+            pads = self.scope.dialect.padding_is_written and isinstance(variable.type, ArrayType | StructType | StringType)
+            content += bytes(-len(content) % PADDED_BYTES if pads else 0)
             _append(content, variable)
+            content += bytes(-len(content) % PADDED_BYTES if pads else 0)
         for variable in variables:
             variable.place = "frame"
         self.pou.frame_size = len(content)
