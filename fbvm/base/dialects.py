@@ -49,6 +49,7 @@ class Dialect:
     action_inputs: bool = False
     subranges_unchecked: bool = False
     padding_is_written: bool = False
+    unsigned_ltime: bool = False
     empty_bodies: bool = False
     in_outs_are_read: bool = False
     narrowing: bool = False
@@ -111,6 +112,8 @@ QUESTIONS = {
                       "the inputs are written, then the action is called"),
     "subranges_unchecked": ("a variable of INT(1..10) gets 0", "stops the program (R0103); of a constant it is an error (S0702)",
                             "it is 0: CODESYS checks nothing unless a project has CheckRangeSigned"),
+    "unsigned_ltime": ("LTIME#213503d, LTIME_TO_STRING", "an error (S0108): LTIME has a sign, and ends at 106,751 days; 'LT#1d'",
+                       "LTIME has all 64 bits for days; 'LTIME#1d'; sums and comparisons are those of LTIME with a sign"),
     "padding_is_written": ("p[10] := 0, where p points at an ARRAY[0..9] OF BYTE that a method or function declares",
                            "stops the program (R0110)",
                            "written: arrays, structures and texts there are padded to 8 bytes; what lies behind the padding stops "
@@ -146,7 +149,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
 _ROWS = (
     STANDARD,
     _CODESYS,
-    replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does"),
+    replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
+            libraries=("codesys/blocks", "twincat/blocks"), unsigned_ltime=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,

@@ -124,7 +124,7 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     pou = scope.project.pou(folded, scope.source)
     if pou is not None:
         return _block(scope, pou, spec)
-    kind = elementary_type(folded)
+    kind = BOOL if folded == "BIT" and scope.pou is not None and not scope.pou.is_function else elementary_type(folded)
     if kind is not None:
         return kind, default(kind)
     if folded in GENERIC:

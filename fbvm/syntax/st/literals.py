@@ -255,7 +255,7 @@ def duration(text: str) -> int:
         total += _scaled(part[1], part[2] or "", UNITS_NS[units[unit]], text)
         last, rest = unit, rest[part.end():]
     total = -total if negative else total
-    if not -NS_MAX - 1 <= total <= NS_MAX:
+    if not -NS_MAX - 1 <= total <= 2 * NS_MAX + 1:  # some dialects have LTIME without a sign: the check says which
         raise OutOfRange(f"`{_short(text)}` does not fit 64 bits of nanoseconds, about 292 years", "")
     return total
 
