@@ -101,7 +101,7 @@ QUESTIONS = {
     "no_open_inputs": ("ARRAY [*] as VAR_INPUT of a FUNCTION",
                        "taken: the function reads the argument where it lies, without a copy, and cannot write it",
                        "refused (S0903); VAR_IN_OUT takes it"),
-    "instances_are_values": ("VAR_INPUT t : TON of a FUNCTION_BLOCK or PROGRAM: an instance as an input; a := b of two instances; "
+    "instances_are_values": ("VAR_INPUT t : TON of a FUNCTION_BLOCK or PROGRAM: an instance as an input; a := b of instances; "
                              "an instance as a result",
                              "read where the argument lies: its outputs are read, it is not called; an error",
                              "an instance of the block's own, which may be called; an argument is copied into it in front of "
@@ -116,8 +116,8 @@ QUESTIONS = {
                        "LTIME has all 64 bits for days; 'LTIME#1d'; sums and comparisons are those of LTIME with a sign"),
     "padding_is_written": ("p[10] := 0, where p points at an ARRAY[0..9] OF BYTE that a method or function declares",
                            "stops the program (R0110)",
-                           "written: arrays, structures and texts there are padded to 8 bytes; what lies behind the padding stops "
-                           "the program"),
+                           "written: arrays, structures and texts there are padded to 8 bytes; what lies behind that stops the "
+                           "program"),
     "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
                      "runs nothing"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",

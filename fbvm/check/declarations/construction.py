@@ -51,7 +51,11 @@ def constructs(context: Context, kind: Type, phase: str = "") -> bool:
 
 def _has_own(context: Context, level: Pou, phase: str) -> bool:
     """True if a block itself, without what it extends, has something to construct."""
-    return bool(_called(level, phase)) or any(constructs(context, variable.type, phase) for variable in _declared(level))
+    key = level, phase
+    if key not in context.constructing:
+        context.constructing[key] = bool(_called(level, phase)) or \
+            any(constructs(context, variable.type, phase) for variable in _declared(level))
+    return context.constructing[key]
 
 
 def _called(level: Pou, phase: str) -> list[Pou]:
@@ -270,7 +274,7 @@ def with_construction(context: Context, pou: Pou) -> tree.Pou:
 
 
 def construct_at_start(context: Context) -> None:
-    """Let the task that runs first construct all instances that live as long as the program, if any has something to construct."""
+    """Let the task that runs first construct all instances that live as long as the program, where there is something to do."""
     variables = [each for each in context.global_order if constructs(context, each.type)]
     if not variables or not context.tasks:
         return

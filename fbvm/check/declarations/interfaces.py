@@ -40,7 +40,7 @@ OBJECTS_AT = 4
 _SECTIONS = ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT")
 """Sections that every POU may have."""
 PADDED_BYTES = 8
-"""Arrays, structures and texts in frames take multiples of so many bytes where a dialect lets programs write what is left over."""
+"""Arrays, structures and texts in frames take multiples of so many bytes where a dialect lets programs write the rest."""
 _LOCATED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
 """Sections of blocks and programs whose variables may lie AT an address."""
 _WITH_BOUNDS = (OpenArrayType, AnyType)
@@ -374,7 +374,7 @@ class _Interface:
             pou.failed_names.add(fold(pou.tree.name.text))
             return
         if is_block(resolved[0]) and not self.scope.dialect.instances_are_values:
-            self._error("S0901", spec, f"an instance as a result is taken by some dialects only: {takers('instances_are_values')}")
+            self._error("S0901", spec, f"an instance as a result is not taken here: {takers('instances_are_values')}")
             return
         name = pou.tree.name.text if pou.block is not None else pou.name
         pou.result = Variable(name, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])

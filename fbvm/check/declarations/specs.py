@@ -124,7 +124,7 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     pou = scope.project.pou(folded, scope.source)
     if pou is not None:
         return _block(scope, pou, spec)
-    kind = BOOL if folded == "BIT" and scope.pou is not None and not scope.pou.is_function else elementary_type(folded)
+    kind = BOOL if folded == "BIT" and scope.pou is not None and scope.pou.kind == "FUNCTION_BLOCK" else elementary_type(folded)
     if kind is not None:
         return kind, default(kind)
     if folded in GENERIC:
@@ -133,6 +133,10 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     if not scope.project.is_refused(folded, scope.source):
         scope.error("S0204", spec, f"there is no type or block {spec.text}", _hint(scope, spec.text))
     return None
+
+
+_ARGUMENTS = {*ELEMENTARY, "STRING"}
+"""Types for which TwinCAT has a function F_TYPE, which is no type."""
 
 
 def _without_space(scope: Scope, name: str) -> str:
@@ -148,7 +152,7 @@ def _hint(scope: Scope, name: str) -> str:
         return f"its name here is {vendor_names.TYPES[fold(name)]}{also}"
     project = scope.project
     known = (*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
-             *(pou.name for pou in project.pous.values()), *project.libraries.block_names())
+             *(pou.name for pou in project.pous.values()), *(name for name in project.libraries.block_names() if fold(name).removeprefix("F_") not in _ARGUMENTS))
     return vendor_names.library_of(name) or project.nearest(name, known)
 
 
@@ -270,7 +274,8 @@ def _array(scope: Scope, spec: tree.ArraySpec, name: str) -> Resolved | None:
     if not scope.project.size_limits.reserve(kind.count * max(1, element[0].size), "the array takes", scope.source, spec):
         return None
     content = element[1] * kind.count
-    return kind, initial_bytes(scope, kind, given.values, content) if given and given.values else content
+    return kind, initial_bytes(scope, kind, given.values, content) \
+        if given and given.values and not _has_init(scope, element[0]) else content
 
 
 def _open_array(scope: Scope, spec: tree.ArraySpec) -> Resolved | None:

@@ -74,6 +74,8 @@ class Context:
         """POUs whose bodies are checked; their `number` is the position here."""
         self.dependencies: dict[Pou, Dependencies] = {}
         """Recorded dependencies of bodies of libraries whose check can be replaced by repeating them."""
+        self.constructing: dict[tuple[Pou, str], bool] = {}
+        """Of blocks that are resolved, whether they have something to construct in a phase (see declarations.construction)."""
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}
         self._identifiers = 0

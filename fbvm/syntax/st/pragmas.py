@@ -15,8 +15,12 @@ IF, which was warned of."""
 ATTRIBUTES = {
     "qualified_only", "strict", "hide", "hide_all_locals", "conditionalshow", "conditionalshow_all_locals", "displaymode",
     "monitoring", "symbol", "linkalways", "naming", "obsolete", "analysis", "estimated-stack-usage", "to_string",
-    "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy"}
-"""Names of attributes that make no valid program do anything else: they restrict, show, hide or export."""
+    "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy", "no_copy", "no-analysis", "const_non_replaced", "tcgenerated",
+    "tcrpcenable", "pytmc", "enable_dynamic_creation", "signature_flag", "tclinkto", "tcncaxis", "tccontextname",
+    "call_after_online_change_slot", "no_assign", "no_assign_warning", "no_explicit_call",
+    "call_after_init", "reflection", "instance-path", "noinit"}
+"""Names of attributes that are obeyed, and of those that make no valid program do anything else: they restrict, show, hide,
+export."""
 
 PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 """Values of the attribute pack_mode, and the multiples of bytes at which members of a structure lie at most."""
