@@ -1,7 +1,7 @@
 """TcUnit and its verifier, in a folder that somebody has: whether they give the results here that they give in TwinCAT.
 
-`python tests/twincat/verifier.py DIR [SCANS]`, where DIR holds `TcUnit` and `TcUnit-Verifier` of https://github.com/tcunit/TcUnit, compiles
-both without a change, runs the tests in virtual time, and compares the messages with what the verifier's own classes expect of
+`python tests/twincat/verifier.py DIR [SCANS]`, where DIR holds `TcUnit` and `TcUnit-Verifier` of github.com/tcunit/TcUnit,
+compiles both without a change, runs the tests in virtual time, and compares the messages with what the verifier's own classes expect of
 TwinCAT (`TcUnit-Verifier_DotNet/**/FB_*.cs`): it prints each expectation that does not hold, and the counts.  Nothing of TcUnit
 is part of this repository."""
 
@@ -132,7 +132,8 @@ class Expectations:
 
 def _lacks(expected: Expectations, *given: object) -> bool:
     *texts, level = given
-    return not any(kind == level and all(str(text).upper() in shown.upper() for text in texts) for kind, shown in expected.messages)
+    return not any(kind == level and all(str(text).upper() in shown.upper() for text in texts)
+                   for kind, shown in expected.messages)
 
 
 _RULES = {

@@ -152,7 +152,8 @@ def _hint(scope: Scope, name: str) -> str:
         return f"its name here is {vendor_names.TYPES[fold(name)]}{also}"
     project = scope.project
     known = (*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
-             *(pou.name for pou in project.pous.values()), *(name for name in project.libraries.block_names() if fold(name).removeprefix("F_") not in _ARGUMENTS))
+             *(pou.name for pou in project.pous.values()),
+             *(name for name in project.libraries.block_names() if fold(name).removeprefix("F_") not in _ARGUMENTS))
     return vendor_names.library_of(name) or project.nearest(name, known)
 
 
@@ -250,7 +251,8 @@ def _has_init(scope: Scope, kind: Type) -> bool:
 
 
 def _refuse_arguments(scope: Scope, spec: tree.TypeSpec, base: tree.NamedType) -> None:
-    scope.error("S1011", spec, f"{base.text} has no FB_init that takes arguments", f"initial values of its inputs are written {base.text} := (name := value)")
+    scope.error("S1011", spec, f"{base.text} has no FB_init that takes arguments",
+                f"initial values of its inputs are written {base.text} := (name := value)")
 
 
 def _array(scope: Scope, spec: tree.ArraySpec, name: str) -> Resolved | None:

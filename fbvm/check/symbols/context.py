@@ -179,7 +179,8 @@ class Context:
     def listed(self, space: str, name: str, source: Source) -> Variable | None:
         """The global variable `space.name`, both folded: of the list (file) of that name, of any list for a library's name."""
         variable = self.global_variable(f"{space}.{name}", source) or self.global_variable(name, source)
-        if variable is not None and space in self.project.lists and not self.project.libraries.has_space(space) and list_name(variable.source) != space:
+        if variable is not None and space in self.project.lists and \
+                not self.project.libraries.has_space(space) and list_name(variable.source) != space:
             return None
         return variable
 
