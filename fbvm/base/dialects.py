@@ -150,7 +150,7 @@ _ROWS = (
     STANDARD,
     _CODESYS,
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
-            libraries=("codesys/blocks", "twincat/blocks"), unsigned_ltime=True),
+            libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit"), unsigned_ltime=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,

@@ -78,7 +78,7 @@ class Checker(Context):
             self._progress(len(self.bodies), len(self.bodies) + len(self.project.new_pous))
             yield
             pou = self.project.new_pous.popleft()
-            if not pou.source.library and not generics.is_generic(pou, self.project):
+            if (not pou.source.library or pou.block is not None) and not generics.is_generic(pou, self.project):
                 self.check_body(pou)
 
     def check_starts(self, first: int = 0) -> None:

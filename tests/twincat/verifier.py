@@ -1,9 +1,9 @@
 """TcUnit and its verifier, in a folder that somebody has: whether they give the results here that they give in TwinCAT.
 
 `python tests/twincat/verifier.py DIR [SCANS]`, where DIR holds `TcUnit` and `TcUnit-Verifier` of github.com/tcunit/TcUnit,
-compiles both without a change, runs the tests in virtual time, and compares the messages with what the verifier's own classes expect of
-TwinCAT (`TcUnit-Verifier_DotNet/**/FB_*.cs`): it prints each expectation that does not hold, and the counts.  Nothing of TcUnit
-is part of this repository."""
+compiles both without a change, runs the tests in virtual time, and compares the messages with what the verifier's own
+classes expect of TwinCAT (`TcUnit-Verifier_DotNet/**/FB_*.cs`): it prints each expectation that does not hold, and the
+counts.  Nothing of TcUnit is part of this repository."""
 
 from __future__ import annotations
 

@@ -73,7 +73,8 @@ class Configurations:
         for library, function in self.project.libraries.tasks():
             for number, task in enumerate(tasks, 1):
                 text = (f"PROGRAM Begins {function}(Index := {number}, CycleTime := {task.interval_ns // 100}, "
-                        f"Priority := {task.priority}, Name := '{task.name}', Application := '{application}'); END_PROGRAM")
+                        f"Priority := {min(task.priority, LOWEST - 1)}, "
+                        f"Name := '{task.name}', Application := '{application}'); END_PROGRAM")
                 source = Source(f"{library}/{function}", text, library)
                 declared = parse(source)[0].declarations[0]
                 assert isinstance(declared, tree.Pou)

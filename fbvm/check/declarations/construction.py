@@ -222,10 +222,15 @@ def level_method(context: Context, level: Pou, phase: str) -> Pou:
     made_of = Statements(context, level.source)
     body: list[tree.Statement] = []
     at = level.tree.name.start, level.tree.name.end
-    aliases: dict[str, Variable] = {}
+    kept: dict[str, dict[str, Variable]] = {}
     for variable in _declared(level):
-        aliases[fold(variable.name)] = variable
-        body += made_of.of(variable, variable.name, phase)
+        method_name, _, own = variable.name.partition(".")
+        if own:
+            kept.setdefault(method_name, {})[own] = variable
+        else:
+            body += made_of.of(variable, variable.name, phase)
+    for method_name, variables in kept.items():
+        body += _of_kept(context, level, method_name, variables, phase)
     inputs: tuple[tree.VarSection, ...] = ()
     for method in _called(level, phase):
         passed: list[tree.Argument] = []
@@ -238,8 +243,28 @@ def level_method(context: Context, level: Pou, phase: str) -> Pou:
     written = tree.Pou(*at, "METHOD", tree.Name(*at, name), None, (*inputs, *made_of.sections()), tuple(body))
     made = Pou(f"{level.name}.{phase}", "METHOD", level.source, written, as_written=False, block=level,
                modifiers=frozenset({"FINAL"}))
-    made.variables.update(aliases)
-    level.methods[fold(name)] = made
+    return _added(context, level, made)
+
+
+def _of_kept(context: Context, level: Pou, method_name: str, variables: dict[str, Variable], phase: str) -> Iterator[tree.Statement]:
+    """The call of a hidden method that constructs the VAR_INST of a method, whose arguments may name each other."""
+    if not any(constructs(context, variable.type, phase) for variable in variables.values()):
+        return
+    at = level.tree.name.start, level.tree.name.end
+    name = f"{phase} of {level.name}.{method_name}"
+    made_of = Statements(context, level.source)
+    body = [statement for own, variable in variables.items() for statement in made_of.of(variable, own, phase)]
+    written = tree.Pou(*at, "METHOD", tree.Name(*at, name), None, made_of.sections(), tuple(body))
+    made = Pou(f"{level.name}.{method_name}.{phase}", "METHOD", level.source, written, as_written=False, block=level,
+               modifiers=frozenset({"FINAL"}))
+    made.variables.update({fold(own): variable for own, variable in variables.items()})
+    _added(context, level, made)
+    yield tree.CallStatement(*at, tree.Call(*at, tree.NameRef(*at, name), ()))
+
+
+def _added(context: Context, level: Pou, made: Pou) -> Pou:
+    """A hidden method, as one of its block whose body is to be checked."""
+    level.methods[fold(made.tree.name.text)] = made
     context.project.new_pous.append(made)
     return made
 

@@ -25,6 +25,8 @@ class ImportedProject:
     """The sources of a project, in the order in which it lists them, and what could not be taken over."""
 
     sources: list[Source] = field(default_factory=list)
+    references: list[str] = field(default_factory=list)
+    """Names of the libraries that it refers to."""
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
     @property
@@ -55,6 +57,7 @@ def read_project(path: Path) -> ImportedProject:
         made.diagnostics += found.diagnostics
         made.sources += [found.source] if found.source else []
         tasks += [found.task] if found.task else []
+    made.references = [item.get("Include").partition(",")[0] for item in _references(root)]
     made.sources += [Source(f"{path}/{space}.st", SPACE) for space in _spaces(root)]
     if tasks:
         made.sources.append(task_source(str(path), tasks, _property(root, "Name")))
@@ -71,10 +74,13 @@ def _property(root: Element, name: str) -> str:
     return next((found.text.strip() for group in root.all("PropertyGroup") if (found := group.one(name)) is not None), "")
 
 
+def _references(root: Element) -> list[Element]:
+    return [item for group in root.all("ItemGroup") for item in group.all("PlaceholderReference", "LibraryReference")]
+
+
 def _spaces(root: Element) -> list[str]:
     """The names that may stand in front of names of this project, where others use it, and of the libraries it refers to."""
-    references = [item for group in root.all("ItemGroup") for item in group.all("PlaceholderReference", "LibraryReference")]
-    named = [found.text.strip() for item in references if (found := item.one("Namespace")) is not None]
+    named = [found.text.strip() for item in _references(root) if (found := item.one("Namespace")) is not None]
     named.append(_property(root, "DefaultNamespace") or _property(root, "Title"))
     return [name for name in dict.fromkeys(named) if _IDENTIFIER.fullmatch(name) and "." not in name]
 
