@@ -246,7 +246,8 @@ def level_method(context: Context, level: Pou, phase: str) -> Pou:
     return _added(context, level, made)
 
 
-def _of_kept(context: Context, level: Pou, method_name: str, variables: dict[str, Variable], phase: str) -> Iterator[tree.Statement]:
+def _of_kept(context: Context, level: Pou, method_name: str, variables: dict[str, Variable],
+             phase: str) -> Iterator[tree.Statement]:
     """The call of a hidden method that constructs the VAR_INST of a method, whose arguments may name each other."""
     if not any(constructs(context, variable.type, phase) for variable in variables.values()):
         return

@@ -137,13 +137,14 @@ _DECLARED = re.compile(r"^\s*([A-Za-z_]\w*)\s*(?:AT\b[^:]*)?:", re.M)
 
 
 def _names_in(folder: Path, lists: tuple[str, ...], described: Path) -> dict[str, str]:
-    """By folded name of a list of global variables and of each of its variables: the list's file."""
+    """By folded name of a list of global variables, and of each of its variables unless it is qualified_only: its file."""
     names: dict[str, str] = {}
     for listed in lists:
         found = read(folder / listed, listed)
         if not isinstance(found, Source):
             raise LibraryError(described, f"{listed} cannot be read")
-        for name in (Path(listed).stem, *_DECLARED.findall(found.text)):
+        variables = [] if "qualified_only" in found.text else _DECLARED.findall(found.text)
+        for name in (Path(listed).stem, *variables):
             names.setdefault(fold(name), listed)
     return names
 

@@ -156,7 +156,8 @@ class SuiteItem(pytest.Item):
         subject = self.parent.subject
         assert subject is not None
         said = self._said(made)
-        made.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, run.recorded, subject, [], said))
+        if (recorded := run.recorded) is not None:
+            made.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, recorded, subject, [], said))
         return made
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:

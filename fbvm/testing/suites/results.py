@@ -23,6 +23,8 @@ ERROR = 4
 """The kind of message that a failed assertion writes."""
 LAST = "| ====================================="
 LOG, COUNT, KEPT = "TwinCAT_Log", "TwinCAT_LogCount", 256
+OWN = "TcUnit_Execute"
+"""A function that only fbvm's own library of suites has."""
 _FAILED = re.compile(r"FAILED TEST '(.+)@(.*?)', (EXP: .*)", re.S)
 _ASSERTS, _FAILS = "FB_TESTSUITE.ASSERT", "FB_TESTSUITE.SETTESTFAILED"
 
@@ -54,7 +56,9 @@ class SuiteRun:
     """The results of one run, by path of the suite and name of the test."""
 
     plc: Plc
-    recorded: PlcRecording
+    recorded: PlcRecording | None
+    """Its scans.  None where TcUnit itself runs the suites: that executes some hundred thousand statements for each failed
+    assertion, and tells of it some cycles later, so that nothing of its run is executed again to be shown."""
     results: dict[tuple[str, str], SuiteTestResult]
     is_over: bool
     """False if the run was ended by a trap or by the limit."""
@@ -66,7 +70,8 @@ def run_suites(image: Image, suites: Sequence[str], limit_ns: int = LIMIT_NS) ->
     image: a program that runs suites.  suites: their paths.  limit_ns: virtual time."""
     intervals = [task.interval_ns for task in image.tasks if task.interval_ns]
     plc = Plc(image, min(intervals, default=CYCLE_NS), budget=BUDGET)
-    recorded = Recording().add("suites", plc)
+    is_light = any(body.name == OWN for body in image.bodies)
+    recorded = Recording().add("suites", plc) if is_light else None
     failures: list[tuple[str, str, Failure]] = []
     seen, is_over = 0, False
     while not is_over and plc.elapsed_ns < limit_ns and plc.scan() is None:
@@ -77,7 +82,8 @@ def run_suites(image: Image, suites: Sequence[str], limit_ns: int = LIMIT_NS) ->
             if (match := _FAILED.match(text)) and plc.read(f"{LOG}[{number % KEPT}].Mask") == ERROR:
                 failures.append((match[1], match[2], Failure(match[3], plc.scans - 1, plc.now_ns)))
         seen = count
-    _place(recorded, [each for _, _, each in failures])
+    if recorded is not None:
+        _place(recorded, [each for _, _, each in failures])
     results = {(path, name): result for path in suites for name, result in _results(plc, path)}
     for path, name, failure in failures:
         if (path, name) in results:
@@ -109,9 +115,7 @@ MOST_PLACED = 50
 
 
 def _place(recorded: PlcRecording, failures: list[Failure]) -> None:
-    """Finds the places of failed assertions by executing their scans again.
-
-    TcUnit itself writes failures some cycles later: their number is not that of the scan then, and they get no place."""
+    """Finds the places of failed assertions by executing their scans again."""
     for scan in list(dict.fromkeys(each.scan for each in failures))[:MOST_PLACED]:
         here = [each for each in failures if each.scan == scan]
         seen = _Assertions(recorded.plc)
