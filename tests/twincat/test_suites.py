@@ -13,6 +13,7 @@ from fbvm.testing.suites.program import find_suites
 from fbvm.testing.suites.results import SuiteRun, run_suites
 from fbvm.testing.suites.xunit import write_xunit
 
+pytest_plugins = ["pytester"]
 EXAMPLE = data_folder("fblib").parent / "examples" / "twincat"
 SUITE = """
 FUNCTION_BLOCK FB_A_Test EXTENDS TcUnit.FB_TestSuite
@@ -61,8 +62,8 @@ def test_tests_of_one_cycle_and_of_several_ordered_and_disabled_ones() -> None:
     run = ran("a : FB_A_Test;", "PRG_TEST.a")
     seen = {name: (r.finished, r.failed, r.skipped, r.asserts, r.duration_s) for (_, name), r in run.results.items()}
     assert run.is_over
-    assert seen == {"one": (True, True, False, 2, 0.0), "two": (True, False, False, 1, 0.05), "first": (True, True, False, 1, 0.0),
-                    "second": (True, False, False, 0, 0.0), "three": (False, False, True, 0, 0.0)}
+    assert seen == {"one": (True, True, False, 2, 0.0), "two": (True, False, False, 1, 0.05),
+                    "first": (True, True, False, 1, 0.0), "second": (True, False, False, 0, 0.0), "three": (False, False, True, 0, 0.0)}
     failures = [failure for result in run.results.values() for failure in result.failures]
     assert [failure.text for failure in failures] == ["EXP: 5, ACT: 4, MSG: four", "EXP: 0xAB, ACT: 0xCD, MSG: bytes"]
     assert [failure.site and failure.site.line for failure in failures] == [6, 16]
