@@ -63,7 +63,8 @@ def test_tests_of_one_cycle_and_of_several_ordered_and_disabled_ones() -> None:
     seen = {name: (r.finished, r.failed, r.skipped, r.asserts, r.duration_s) for (_, name), r in run.results.items()}
     assert run.is_over
     assert seen == {"one": (True, True, False, 2, 0.0), "two": (True, False, False, 1, 0.05),
-                    "first": (True, True, False, 1, 0.0), "second": (True, False, False, 0, 0.0), "three": (False, False, True, 0, 0.0)}
+                    "first": (True, True, False, 1, 0.0), "second": (True, False, False, 0, 0.0),
+                    "three": (False, False, True, 0, 0.0)}
     failures = [failure for result in run.results.values() for failure in result.failures]
     assert [failure.text for failure in failures] == ["EXP: 5, ACT: 4, MSG: four", "EXP: 0xAB, ACT: 0xCD, MSG: bytes"]
     assert [failure.site and failure.site.line for failure in failures] == [6, 16]
