@@ -91,6 +91,7 @@ CODES: dict[str, Code] = {
         "S1007": "ABSTRACT has no instance and no body",
         "S1008": "property used as a variable",
         "S1009": "THIS or SUPER has no meaning here",
+        "S1011": "FB_init is given other arguments than it takes",
         "P0101": "project file is not TOML",
         "P0102": "unknown key in a project file",
         "P0103": "value in a project file does not fit",

@@ -47,6 +47,9 @@ class Dialect:
     no_open_inputs: bool = False
     instances_are_values: bool = False
     action_inputs: bool = False
+    subranges_unchecked: bool = False
+    padding_is_written: bool = False
+    unsigned_ltime: bool = False
     empty_bodies: bool = False
     in_outs_are_read: bool = False
     narrowing: bool = False
@@ -98,14 +101,23 @@ QUESTIONS = {
     "no_open_inputs": ("ARRAY [*] as VAR_INPUT of a FUNCTION",
                        "taken: the function reads the argument where it lies, without a copy, and cannot write it",
                        "refused (S0903); VAR_IN_OUT takes it"),
-    "instances_are_values": ("VAR_INPUT t : TON of a FUNCTION_BLOCK or PROGRAM: an instance as an input",
-                             "read where the argument lies: its outputs are read, it is not called",
+    "instances_are_values": ("VAR_INPUT t : TON of a FUNCTION_BLOCK or PROGRAM: an instance as an input; a := b of instances; "
+                             "an instance as a result",
+                             "read where the argument lies: its outputs are read, it is not called; an error",
                              "an instance of the block's own, which may be called; an argument is copied into it in front of "
-                             "the body"),
+                             "the body; all variables are copied"),
     "in_outs_are_read": ("an in-out of a function block, read through an instance", "an error",
                          "the variable that the last call passed; in front of the first call the program stops (R0110)"),
     "action_inputs": ("motor.Stop(now := TRUE): an ACTION of an instance, called with inputs of the instance", "an error",
                       "the inputs are written, then the action is called"),
+    "subranges_unchecked": ("a variable of INT(1..10) gets 0", "stops the program (R0103); of a constant it is an error (S0702)",
+                            "it is 0: CODESYS checks nothing unless a project has CheckRangeSigned"),
+    "unsigned_ltime": ("LTIME#213503d, LTIME_TO_STRING", "an error (S0108): LTIME has a sign, and ends at 106,751 days; 'LT#1d'",
+                       "LTIME has all 64 bits for days; 'LTIME#1d'; sums and comparisons are those of LTIME with a sign"),
+    "padding_is_written": ("p[10] := 0, where p points at an ARRAY[0..9] OF BYTE that a method or function declares",
+                           "stops the program (R0110)",
+                           "written: arrays, structures and texts there are padded to 8 bytes; what lies behind that stops the "
+                           "program"),
     "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
                      "runs nothing"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
@@ -132,11 +144,13 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
                    bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
-                   instances_are_values=True, action_inputs=True, empty_bodies=True)
+                   instances_are_values=True, action_inputs=True, empty_bodies=True, subranges_unchecked=True,
+                   padding_is_written=True)
 _ROWS = (
     STANDARD,
     _CODESYS,
-    replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does"),
+    replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
+            libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit"), unsigned_ltime=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,

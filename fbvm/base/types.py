@@ -145,6 +145,8 @@ class SubrangeType(Type):
     base: Elementary
     low: int
     high: int
+    checked: bool = field(default=True, compare=False, repr=False)
+    """False in dialects that store what is outside; of no use once a program is compiled."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from fbvm.check.calls import calls, generics
-from fbvm.check.declarations import globals, inheritance, interfaces, specs, variables
+from fbvm.check.declarations import construction, globals, inheritance, interfaces, specs, variables
 from fbvm.check.declarations.configurations import Configurations
 from fbvm.check.declarations.var_config import VarConfig
 from fbvm.check.expressions import references, rules
@@ -60,18 +60,26 @@ class Checker(Context):
             if not entry.source.library:
                 self.declared_type(entry.tree.name.text, entry.source)
         globals.declare(self)
-        while self.project.new_pous:
-            self._progress(len(self.bodies), len(self.bodies) + len(self.project.new_pous))
-            yield
-            pou = self.project.new_pous.popleft()
-            if not pou.source.library and not generics.is_generic(pou, self.project):
-                self.check_body(pou)
+        yield from self._bodies()
         configurations.resolve(program)
+        globals.declare(self)
+        configurations.begin_tasks()
+        construction.construct_at_start(self)
+        yield from self._bodies()
         globals.declare(self)
         if program is None:
             self.var_config.resolve()
         self.check_starts()
         self._report_recursion()
+
+    def _bodies(self) -> Iterator[None]:
+        """Check the bodies of the user's POUs that were not checked yet, and stop in front of each."""
+        while self.project.new_pous:
+            self._progress(len(self.bodies), len(self.bodies) + len(self.project.new_pous))
+            yield
+            pou = self.project.new_pous.popleft()
+            if (not pou.source.library or pou.block is not None) and not generics.is_generic(pou, self.project):
+                self.check_body(pou)
 
     def check_starts(self, first: int = 0) -> None:
         """Check the references in initial values, from the one with the number `first` in `Facts.starts` on."""

@@ -72,6 +72,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     add_options(parser, group)
 
 
+def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
+    """Projects of TwinCAT are files of tests, too."""
+    early_config.pluginmanager.import_plugin("fbvm.testing.suites.items")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Warnings are collected; coverage is counted if an option asks for it."""
     config.pluginmanager.register(WarningPlugin(config), WARNINGS)

@@ -29,8 +29,9 @@ def wrong_with(path: Path) -> list[str]:
     described = tomllib.loads((path.parent / "library.toml").read_text(encoding="utf-8"))
     text = path.read_text(encoding="utf-8")
     pous = re.findall(r"^(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|TYPE) (\w+)", text, re.M)
+    lists = (*described["globals"], *described.get("lists", ()))
     kept = {
-        "it holds the POU that it is named after": pous == ([] if path.name in described["globals"] else [path.stem]),
+        "it holds the POU that it is named after": pous == ([] if path.name in lists else [path.stem]),
         "it says what it is for": text.startswith("//"),
         "its lines are short": max(map(len, text.splitlines())) <= 120,
     }
@@ -46,7 +47,7 @@ def test_a_library_is_described(folder: Path) -> None:
     described = tomllib.loads((folder / "library.toml").read_text(encoding="utf-8"))
     assert {"title", "sheet", "globals"} <= described.keys()
     files = {path.name for path in folder.glob("*.st") if re.search(r"^VAR_GLOBAL", path.read_text("utf-8"), re.MULTILINE)}
-    assert set(described["globals"]) == files
+    assert {*described["globals"], *described.get("lists", ())} == files
     assert (folder / "README.md").is_file()
 
 

@@ -15,7 +15,7 @@ def test_the_objects_in_the_order_of_the_project_and_the_tasks_behind_them(tmp_p
     names = [Path(source.name).name for source in made.sources]
     assert names == ["MAIN.TcPOU", "FB_Counter.TcPOU", "ST_Point.TcDUT", "GVL_Plant.TcGVL", "Tasks.st"]
     assert made.sources[-1].text.splitlines() == [
-        "CONFIGURATION TwinCAT", "RESOURCE PLC ON fbvm", "    TASK PlcTask(INTERVAL := T#20000us, PRIORITY := 20);",
+        "CONFIGURATION Plant", "RESOURCE PLC ON fbvm", "    TASK PlcTask(INTERVAL := T#20000us, PRIORITY := 20);",
         "    PROGRAM MAIN WITH PlcTask : MAIN;", "END_RESOURCE", "END_CONFIGURATION"]  # fmt: skip
     assert [(found.code, found.message) for found in made.diagnostics] == [
         ("X0190", "VISUs\\Page.TcVIS holds no program, and is left out")]  # fmt: skip

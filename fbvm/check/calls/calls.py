@@ -9,7 +9,7 @@ from fbvm.check.calls.binding import bind, bind_inputs
 from fbvm.check.expressions import names, objects, qualified
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
-from fbvm.check.symbols.facts import Pou, PouCall
+from fbvm.check.symbols.facts import Pou, PouCall, Variable
 from fbvm.syntax import tree
 
 
@@ -42,7 +42,8 @@ def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -
         return result
     if objects.is_self(scope, callee):
         return _instance(scope, call, as_value)
-    if name is None or variable is not None and variable.kind != "RESULT":
+    if name is None or variable is not None and variable.kind != "RESULT" or \
+            isinstance(callee, tree.Member) and isinstance(qualified.member(scope, callee), Variable):
         return _instance(scope, call, as_value)
     pou = scope.project.pou(name, scope.source)
     if pou is not None and pou.is_function:

@@ -8,6 +8,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Run, TaskFact, Variable
 from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
 
 LOWEST = 65536
 """Priority of what runs without a task: below every task."""
@@ -63,6 +64,23 @@ class Configurations:
             self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name)
             self.context.tasks.append(task)
             self._unconnected(programs[0], programs[0].source, programs[0].tree.name, "")
+
+    def begin_tasks(self) -> None:
+        """Let each task call, in front of its programs, what libraries that tell programs about their tasks want called."""
+        tasks = sorted(self.context.tasks, key=lambda task: task.priority)
+        configurations = self.project.configurations
+        application = configurations[0][0].name.text if configurations else "PLC"
+        for library, function in self.project.libraries.tasks():
+            for number, task in enumerate(tasks, 1):
+                text = (f"PROGRAM Begins {function}(Index := {number}, CycleTime := {task.interval_ns // 100}, "
+                        f"Priority := {min(task.priority, LOWEST - 1)}, "
+                        f"Name := '{task.name}', Application := '{application}'); END_PROGRAM")
+                source = Source(f"{library}/{function}", text, library)
+                declared = parse(source)[0].declarations[0]
+                assert isinstance(declared, tree.Pou)
+                pou = Pou(f"{task.name or 'task'} begins", "PROGRAM", source, declared)
+                self.context.check_body(pou)
+                task.runs.insert(0, Run(task.runs[0].instance, pou))
 
     def _instance(self, name: str, pou: Pou, task: TaskFact, source: Source, node: tree.Node) -> None:
         assert pou.type is not None

@@ -10,17 +10,20 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
     AnyType,
+    ArrayType,
     Field,
     OpenArrayType,
+    StringType,
     StructType,
     base,
     fold,
     followed,
 )
-from fbvm.check.declarations import initializers
+from fbvm.check.declarations import construction, initializers
 from fbvm.check.declarations.inheritance import refuse_abstract, resolve_head
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.declarations.variables import check_qualifiers, initialized, is_constant, make_variable, type_of
@@ -36,12 +39,12 @@ OBJECTS_AT = 4
 """Where an instance has the number of the first of its objects: behind its type identifier, 32 bits each."""
 _SECTIONS = ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT")
 """Sections that every POU may have."""
+PADDED_BYTES = 8
+"""Arrays, structures and texts in frames take multiples of so many bytes where a dialect lets programs write the rest."""
 _LOCATED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
 """Sections of blocks and programs whose variables may lie AT an address."""
 _WITH_BOUNDS = (OpenArrayType, AnyType)
 """Types of parameters whose slot holds a reference, and the bounds or the type of the argument."""
-_CALLED_BY_RUNTIME = ("FB_INIT", "FB_EXIT", "FB_REINIT")
-"""Methods that CODESYS calls by itself."""
 _NOT_EXECUTED = ("VAR_INST", "VAR_GENERIC", "VAR_ACCESS", "VAR_CONFIG")
 
 
@@ -80,6 +83,8 @@ class _Interface:
             pou.tree, pou.as_written = initializers.with_assignments(pou, self.at_start), False
         if pou.tree.result is not None:
             self._result(pou.tree.result)
+        if (constructed := construction.with_construction(self.context, pou)) is not pou.tree:
+            self._construct(constructed)
         if "ENO" not in pou.variables and writes_eno(pou):
             eno = Variable("ENO", BOOL, "VAR_OUTPUT", pou.source, pou.tree.name, pou, initial=b"\x01")
             self._register(eno)
@@ -92,6 +97,13 @@ class _Interface:
             self._instance()
         for action, source in pou.written_actions:
             self._action(action, source)
+
+    def _construct(self, constructed: tree.Pou) -> None:
+        """Take the tree with the construction of instances at its start, and declare what that needs."""
+        added = constructed.sections[len(self.pou.tree.sections):]
+        self.pou.tree, self.pou.as_written = constructed, False
+        for section in added:
+            self._section(section)
 
     def _inherit(self, base: Pou) -> None:
         """Take over the variables of the block that this one extends: they come first, where they lie in that."""
@@ -144,10 +156,6 @@ class _Interface:
                 self._error("S1005", written.name, f"{written.name.text} is declared twice in {pou.name}",
                             "variables, actions, methods and properties of a block share their names")
                 continue
-            if name in _CALLED_BY_RUNTIME:
-                self._error("S0901", written.name, f"{written.name.text} is called by the runtime system of CODESYS: it is "
-                            "understood but not executed",
-                            "give initial values, or call a method of another name in the first scan")
             made = Pou(shown if written.kind == "METHOD" else f"{shown}.{written.kind.capitalize()}", written.kind, pou.source,
                        written, block=pou, modifiers=frozenset(word.text for word in written.modifiers))
             pou.methods[key] = made
@@ -365,8 +373,8 @@ class _Interface:
         if resolved is None:
             pou.failed_names.add(fold(pou.tree.name.text))
             return
-        if is_block(resolved[0]):
-            self._error("S0901", spec, "an instance as a result is understood but not executed")
+        if is_block(resolved[0]) and not self.scope.dialect.instances_are_values:
+            self._error("S0901", spec, f"an instance as a result is not taken here: {takers('instances_are_values')}")
             return
         name = pou.tree.name.text if pou.block is not None else pou.name
         pou.result = Variable(name, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])
@@ -385,7 +393,10 @@ class _Interface:
             _append(content, variable)
         self.pou.frame_inputs = len(content)
         for variable in rest:
+            pads = self.scope.dialect.padding_is_written and isinstance(variable.type, ArrayType | StructType | StringType)
+            content += bytes(-len(content) % PADDED_BYTES if pads else 0)
             _append(content, variable)
+            content += bytes(-len(content) % PADDED_BYTES if pads else 0)
         for variable in variables:
             variable.place = "frame"
         self.pou.frame_size = len(content)

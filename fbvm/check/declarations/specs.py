@@ -26,6 +26,7 @@ from fbvm.base.types import (
     reference,
     string,
 )
+from fbvm.check.declarations.construction import INIT_KEY
 from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.structures import RELATIVE, Members
 from fbvm.check.expressions.constant_integers import integer
@@ -123,7 +124,7 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     pou = scope.project.pou(folded, scope.source)
     if pou is not None:
         return _block(scope, pou, spec)
-    kind = elementary_type(folded)
+    kind = BOOL if folded == "BIT" and scope.pou is not None and scope.pou.kind == "FUNCTION_BLOCK" else elementary_type(folded)
     if kind is not None:
         return kind, default(kind)
     if folded in GENERIC:
@@ -132,6 +133,10 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     if not scope.project.is_refused(folded, scope.source):
         scope.error("S0204", spec, f"there is no type or block {spec.text}", _hint(scope, spec.text))
     return None
+
+
+_ARGUMENTS = {*ELEMENTARY, "STRING"}
+"""Types for which TwinCAT has a function F_TYPE, which is no type."""
 
 
 def _without_space(scope: Scope, name: str) -> str:
@@ -147,7 +152,8 @@ def _hint(scope: Scope, name: str) -> str:
         return f"its name here is {vendor_names.TYPES[fold(name)]}{also}"
     project = scope.project
     known = (*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
-             *(pou.name for pou in project.pous.values()), *project.libraries.block_names())
+             *(pou.name for pou in project.pous.values()),
+             *(name for name in project.libraries.block_names() if fold(name).removeprefix("F_") not in _ARGUMENTS))
     return vendor_names.library_of(name) or project.nearest(name, known)
 
 
@@ -203,7 +209,8 @@ def _subrange(scope: Scope, spec: tree.SubrangeSpec, name: str) -> Resolved | No
     if not kind.low <= low <= high <= kind.high:
         scope.error("S0704", spec, f"{low}..{high} is not a range within {kind}")
         return None
-    made = SubrangeType(name or f"{kind} ({low}..{high})", kind.size, kind.align, kind, low, high)
+    made = SubrangeType(name or f"{kind} ({low}..{high})", kind.size, kind.align, kind, low, high,
+                        not scope.dialect.subranges_unchecked)
     return made, default(made)
 
 
@@ -212,6 +219,8 @@ def _constructed(scope: Scope, spec: tree.TypeSpec, base: tree.NamedType, values
     """A type with something in parentheses: initial values of an instance, arguments of FB_init, or a subrange or
     enumeration that is written wrongly."""
     resolved = resolve(scope, base)
+    if resolved is not None and _has_init(scope, resolved[0]):
+        return resolved
     if resolved is not None and values is not None and _has_inputs(resolved[0], values):
         return resolved[0], initial_bytes(scope, resolved[0], values, resolved[1])
     if resolved is not None and is_block(resolved[0]):
@@ -228,15 +237,22 @@ def _instances(scope: Scope, spec: tree.ConstructedSpec) -> Resolved | None:
     if resolved is None or spec.values is None:
         return _constructed(scope, spec, spec.base, None)
     given = [value for _, value in spec.values.items if value is not None]
+    if _has_init(scope, resolved[0]) and all(isinstance(value, tree.StructInit) for value in given):
+        return resolved
     if is_block(resolved[0]) and not all(isinstance(v, tree.StructInit) and _has_inputs(resolved[0], v) for v in given):
         _refuse_arguments(scope, spec, spec.base)
         return None
     return resolved
 
 
+def _has_init(scope: Scope, kind: Type) -> bool:
+    """True for a block with FB_init, its own or an inherited one, which takes the arguments of a declaration."""
+    return isinstance(kind, StructType) and kind.block and scope.context.block_of(kind).method(INIT_KEY) is not None
+
+
 def _refuse_arguments(scope: Scope, spec: tree.TypeSpec, base: tree.NamedType) -> None:
-    scope.error("S0902", spec, f"arguments for FB_init of {base.text} are object-oriented text, which fbvm "
-                "does not execute", f"initial values of its inputs are written {base.text} := (name := value)")
+    scope.error("S1011", spec, f"{base.text} has no FB_init that takes arguments",
+                f"initial values of its inputs are written {base.text} := (name := value)")
 
 
 def _array(scope: Scope, spec: tree.ArraySpec, name: str) -> Resolved | None:
@@ -260,7 +276,8 @@ def _array(scope: Scope, spec: tree.ArraySpec, name: str) -> Resolved | None:
     if not scope.project.size_limits.reserve(kind.count * max(1, element[0].size), "the array takes", scope.source, spec):
         return None
     content = element[1] * kind.count
-    return kind, initial_bytes(scope, kind, given.values, content) if given and given.values else content
+    return kind, initial_bytes(scope, kind, given.values, content) \
+        if given and given.values and not _has_init(scope, element[0]) else content
 
 
 def _open_array(scope: Scope, spec: tree.ArraySpec) -> Resolved | None:

@@ -72,8 +72,10 @@ def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, sec
     words = {fold(q.text) for q in section.qualifiers}
     made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
                     retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None,
-                    role=section.role)
-    if made.constant and is_block(kind):
+                    role=section.role, declared=declared)
+    if made.constant and is_block(kind) and section.kind == "VAR_IN_OUT" and context.project.dialect.instances_are_values:
+        made.constant = False  # CODESYS lets such an instance be called
+    elif made.constant and is_block(kind):
         report.add("S0206", source, name, "an instance cannot be CONSTANT")
     elif made.constant and section.kind not in ("VAR_INPUT", "VAR_IN_OUT"):  # these the caller gives
         if declared.initial is None and not isinstance(kind, StructType | ArrayType):

@@ -60,6 +60,8 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
         target = target.base if isinstance(target, EnumType) else target
         if kind == target or converts(kind, target):
             return True
+    if dialect.instances_are_values and isinstance(target, StructType) and target.block:
+        return kind == target
     kind, target = base(kind), base(target)
     return dialect.narrowing and _narrows(kind, target) or dialect.integers_and_bits and _holds_bits(kind, target)
 

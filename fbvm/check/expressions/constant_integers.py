@@ -33,7 +33,19 @@ def integer(scope: Scope, expr: tree.Expr, known: Mapping[str, int] | None = Non
                     scope.power_hint(expr, DINT) or "write a number" if value is not None else
                     "write a literal, or declare the name in a VAR CONSTANT section")
         return None
-    return value
+    exact = _exact(scope, expr)
+    return value if exact is None else exact
+
+
+def _exact(scope: Scope, expr: tree.Expr) -> int | None:
+    """The value of a constant with sums and products of any width: ARRAY[1..n * 40] of a UINT n never wraps."""
+    if isinstance(expr, tree.Binary) and expr.op in ("+", "-", "*"):
+        left, right = _exact(scope, expr.left), _exact(scope, expr.right)
+        if left is None or right is None:
+            return None
+        return left + right if expr.op == "+" else left - right if expr.op == "-" else left * right
+    value = scope.facts.constants.get(expr)
+    return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
 def is_undefined(scope: Scope, expr: tree.Expr) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.base.types import BOOL, ELEMENTARY, Elementary, EnumType, SubrangeType, Type, base, fold, string
+from fbvm.base.types import BOOL, ELEMENTARY, LINT, Elementary, EnumType, SubrangeType, Type, base, fold, string
 from fbvm.check.expressions.constants import convert, limits
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
@@ -33,12 +33,23 @@ def literal(scope: Scope, expr: tree.Literal, want: Type | None) -> Type | None:
     if is_any(kind, "ANY_REAL"):
         assert isinstance(value, int | float)
         constants[expr] = convert(value, kind)
+    if expr.kind == "time" and isinstance(value, int) and value > LINT.high:
+        return _unsigned(scope, expr, value, kind)
     span = limits(kind)
     if span and isinstance(value, int) and not span[0] <= value <= span[1]:
         scope.error("S0108", expr, f"{expr.text} is outside {kind}, which holds {span[0]} to {span[1]}")
         return None
     if expr.kind == "int" and kind == BOOL:
         constants[expr] = bool(value)
+    return kind
+
+
+def _unsigned(scope: Scope, expr: tree.Literal, value: int, kind: Type) -> Type | None:
+    """The type of a LTIME of more than 292 years, which has its 64 bits where a dialect has LTIME without a sign."""
+    if not scope.dialect.unsigned_ltime:
+        scope.error("S0108", expr, f"`{expr.text.partition('#')[2]}` does not fit 64 bits of nanoseconds, about 292 years")
+        return None
+    scope.facts.constants[expr] = value - (1 << LINT.bits)
     return kind
 
 

@@ -42,10 +42,10 @@ def member(scope: Scope, expr: tree.Member, want: Type | None) -> Type | None:
         return literals.enum_value(scope, expr, meant, expr.name)
     if isinstance(meant, Variable):
         return names.variable(scope, expr, meant)
+    if qualified.is_space(scope, of):
+        _report_unlisted(scope, qualified.last_name(of), expr.name)
+        return None
     if isinstance(of, tree.NameRef):
-        if qualified.is_space(scope, of):
-            _report_unlisted(scope, of, expr.name)
-            return None
         names.program(scope, of)
         scope.qualifiers.add(of)
     is_property, kind = objects.value_of_property(scope, expr)
@@ -61,11 +61,11 @@ def member(scope: Scope, expr: tree.Member, want: Type | None) -> Type | None:
     return _of_value(scope, expr, whole, want) if whole is not None else None
 
 
-def _report_unlisted(scope: Scope, space: tree.NameRef, name: tree.Name) -> None:
+def _report_unlisted(scope: Scope, space: str, name: tree.Name) -> None:
     """Report that a list of global variables or a library has no such name, unless its declaration has an error."""
     project = scope.project
-    if not any(project.is_failed_global(text, scope.source) for text in (name.text, f"{space.text}.{name.text}")):
-        scope.error("S0210", name, f"{space.text} has no {name.text}", project.choices(name.text, project.names_in(space.text)))
+    if not any(project.is_failed_global(text, scope.source) for text in (name.text, f"{space}.{name.text}")):
+        scope.error("S0210", name, f"{space} has no {name.text}", project.choices(name.text, project.names_in(space)))
 
 
 def _field(scope: Scope, expr: tree.Member, whole: StructType) -> Type | None:

@@ -5,8 +5,9 @@ Source: IEC 61131-3 ed. 3, 6.6.5.5 to 6.6.5.9 and 6.6.7; THIS^, SUPER^ and prope
 from __future__ import annotations
 
 from fbvm.base.types import RefType, StructType, Type, fold, pointer
+from fbvm.check.expressions import qualified
 from fbvm.check.expressions.scope import Scope
-from fbvm.check.symbols.facts import Pou, PouCall
+from fbvm.check.symbols.facts import Pou, PouCall, Variable
 from fbvm.syntax import tree
 
 WORDS = ("THIS", "SUPER")
@@ -108,12 +109,22 @@ def _may_be_instance(scope: Scope, expr: tree.Expr) -> bool:
     if isinstance(expr, tree.NameRef):
         return expr in scope.facts.types or is_self(scope, expr) or scope.variable(expr.text) is not None or \
             find(scope, expr, ("GET {}",)) is not None
-    return not (isinstance(expr, tree.Member) and isinstance(expr.of, tree.NameRef) and not _may_be_instance(scope, expr.of))
+    if isinstance(expr, tree.Member) and qualified.is_space(scope, expr.of):
+        return isinstance(qualified.member(scope, expr), Variable)
+    return not (isinstance(expr, tree.Member) and isinstance(expr.of, tree.NameRef) and not _may_be_instance(scope, expr.of)
+                and not _is_program(scope, expr.of))
+
+
+def _is_program(scope: Scope, name: tree.NameRef) -> bool:
+    """True for the name of a program, which stands for its one instance."""
+    pou = scope.project.pou(name.text, scope.source)
+    return pou is not None and pou.kind == "PROGRAM"
+
 
 
 def is_dynamic(scope: Scope, method: Pou, instance: tree.Expr | None) -> bool:
     """True if a call may execute an override: the instance is not named itself, but reached through something."""
-    if method.modifiers & {"PRIVATE", "FINAL"}:
+    if method.modifiers & {"PRIVATE", "FINAL"} or method.key == "FB_INIT":
         return False
     return may_be_derived(scope, instance)
 

@@ -2,6 +2,7 @@
 
     GVL.pressure        the VAR_GLOBAL that the file GVL.st declares
     Standard.TON        a name of a library, which says by itself what is meant
+    SysFile.SysTypes.RTS_IEC_RESULT     the same behind the name of another library
     PLC_PRG.step        a variable of a program, of which there is one instance then
     word.READY          the bit of that number, where READY is a constant
 
@@ -21,14 +22,23 @@ def bare(scope: Scope, expr: tree.Expr) -> str | None:
     """The name that an expression is, without a name space in front; None for anything else."""
     if isinstance(expr, tree.NameRef):
         return expr.text if scope.variable(expr.text) is None else None
-    if isinstance(expr, tree.Member) and isinstance(expr.of, tree.NameRef) and is_space(scope, expr.of):
+    if isinstance(expr, tree.Member) and is_space(scope, expr.of):
         return expr.name.text
     return None
 
 
-def is_space(scope: Scope, name: tree.NameRef) -> bool:
-    """True for the name of a library or of a list of global variables, where no variable is called so."""
-    return scope.variable(name.text) is None and scope.project.is_space(name.text)
+def is_space(scope: Scope, expr: tree.Expr) -> bool:
+    """True for the name of a library or of a list of global variables, where no variable is called so; also behind the name
+    of a library, as in SysFile.SysTypes."""
+    if isinstance(expr, tree.Member):
+        return scope.project.is_space(expr.name.text) and is_space(scope, expr.of)
+    return isinstance(expr, tree.NameRef) and scope.variable(expr.text) is None and scope.project.is_space(expr.text)
+
+
+def last_name(space: tree.Expr) -> str:
+    """The name of a library or list without those in front of it."""
+    assert isinstance(space, tree.NameRef | tree.Member)
+    return space.name.text if isinstance(space, tree.Member) else space.text
 
 
 def member(scope: Scope, expr: tree.Member) -> Type | Variable | None:
@@ -39,9 +49,16 @@ def member(scope: Scope, expr: tree.Member) -> Type | Variable | None:
     named = scope.named_type(outer)
     if isinstance(named, EnumType):
         return named
-    if isinstance(expr.of, tree.NameRef) and is_space(scope, expr.of):
-        return scope.context.listed(fold(expr.of.text), fold(expr.name.text), scope.source)
+    if is_space(scope, expr.of):
+        space, name = fold(last_name(expr.of)), fold(expr.name.text)
+        return scope.context.listed(space, name, scope.source) or _enumeration(scope, space, name)
     return None
+
+
+def _enumeration(scope: Scope, space: str, name: str) -> EnumType | None:
+    """The enumeration of the library `space` that has a member of that name."""
+    return next((kind for kind, _, library in scope.project.enum_members.get(name, ())
+                 if scope.project.libraries.is_in_space(library, space)), None)
 
 
 def is_bit(scope: Scope, expr: tree.Member, whole: Type) -> bool:

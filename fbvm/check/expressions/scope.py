@@ -147,7 +147,8 @@ class Scope:
     def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:
         if isinstance(target, StringType) and isinstance(value, bytes | str) and len(value) > target.capacity and code != "S0503":
             self.loses(expr, "S0790", f"the text has {len(value)} characters, and {target} keeps {target.capacity} of them")
-        if isinstance(target, SubrangeType) and isinstance(value, int) and not target.low <= value <= target.high:
+        if isinstance(target, SubrangeType) and target.checked and isinstance(value, int) and \
+                not target.low <= value <= target.high:
             self.error("S0702", expr, f"{value} is outside {target.low}..{target.high} of {target}")
             return False
         return True

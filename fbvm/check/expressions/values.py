@@ -28,10 +28,11 @@ MAKERS = ("REF", "ADR")
 
 
 def starts(kind: RefType, init: tree.Expr) -> bool:
-    """True for an initial value that is made of a place: REF(x), ADR(x), and of a REFERENCE TO the variable itself."""
+    """True for an initial value that is made of a place: REF(x), ADR(x), of a REFERENCE TO the variable itself, of an interface
+    the instance."""
     made = isinstance(init, tree.Call) and isinstance(init.callee, tree.NameRef) and fold(init.callee.text) in MAKERS and \
         len(init.arguments) == 1 and init.arguments[0].value is not None
-    return made or kind.follows and not isinstance(init, tree.Literal)
+    return made or (kind.follows or kind.interface) and not isinstance(init, tree.Literal)
 
 
 def is_null(value: tree.Expr) -> bool:

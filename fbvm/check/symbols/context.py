@@ -74,6 +74,8 @@ class Context:
         """POUs whose bodies are checked; their `number` is the position here."""
         self.dependencies: dict[Pou, Dependencies] = {}
         """Recorded dependencies of bodies of libraries whose check can be replaced by repeating them."""
+        self.constructing: dict[tuple[Pou, str], bool] = {}
+        """Of blocks that are resolved, whether they have something to construct in a phase (see declarations.construction)."""
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}
         self._identifiers = 0
@@ -172,12 +174,13 @@ class Context:
             if key in project.globals:
                 project.dependencies.record("global", folded)
                 return project.globals[key]
-        return None
+        return self.global_variable(name, source) if project.load_list(folded) else None
 
     def listed(self, space: str, name: str, source: Source) -> Variable | None:
         """The global variable `space.name`, both folded: of the list (file) of that name, of any list for a library's name."""
         variable = self.global_variable(f"{space}.{name}", source) or self.global_variable(name, source)
-        if variable is not None and space in self.project.lists and list_name(variable.source) != space:
+        if variable is not None and space in self.project.lists and \
+                not self.project.libraries.has_space(space) and list_name(variable.source) != space:
             return None
         return variable
 

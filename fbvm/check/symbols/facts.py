@@ -67,6 +67,8 @@ class Variable:
     space: str = ""
     """The name of the list that declares a global variable; with `qualified` it must stand in front of its name."""
     qualified: bool = False
+    declared: VarDecl | None = None
+    """The declaration of it, with the arguments of FB_init."""
     object: int | None = None
     """Of a variable that something refers to: the number of its object (see code.operations), or of one that every
     instance has, its position among those.  Known after layout, or when it is referred to."""

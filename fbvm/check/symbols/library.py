@@ -12,6 +12,10 @@ A library for a unit that has no words of its own in the PLC's areas declares th
 
 Names that programs put in front of its own, with a point, are its `spaces = ["Standard"]`.
 
+Files of global variables and constants that are read when a program names one of them, or their file with a point:
+`lists = ["TwinCAT_SystemInfoVarList.st"]`.  If one of these was read, each task calls in front of its programs the function
+`task = "TwinCAT_TaskBegins"` with Index (from 1 on), CycleTime (a ULINT in units of 100 ns), Priority and Name.
+
 Pins that other tools call otherwise have their other names there too:
 
     [pins]
@@ -57,6 +61,12 @@ class Library:
     """Areas that programs may only read, and this library writes."""
     by_dialect: bool = False
     """True for blocks that replace others in the dialects that name the library."""
+    lists: tuple[str, ...] = ()
+    """Files of global variables that are read when a program names the file or one of the variables."""
+    listed: dict[str, str] = field(default_factory=dict)
+    """By the folded name of such a file, and of each of its variables: the file."""
+    task: str = ""
+    """The function that each task calls in front of its programs, if one of `lists` was read."""
     shipped: bool = False
     """True for one that comes with fbvm, whose files do not change."""
     loaded: set[str] = field(default_factory=set)
@@ -79,7 +89,7 @@ class LibraryError(ValueError):
         return Diagnostic("P0201", Source(str(self.described), text), 0, len(text.partition("\n")[0]), self.why)
 
 
-_KEYS = ("globals", "mailbox", "pins", "spaces", "writes", "by_dialect")
+_KEYS = ("globals", "mailbox", "pins", "spaces", "writes", "by_dialect", "lists", "task")
 """What a `library.toml` can say to the compiler; everything else in it is for people."""
 
 
@@ -93,9 +103,11 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(source[:-len(".st")]): folder / source for source in sources}
         spaces = _listed(table, "spaces", described, "a list of names")
+        lists = _listed(table, "lists", described, "a list of file names")
         yield Library(name, folder, files, _listed(table, "globals", described, "a list of file names"),
                       _mailbox(table, described), _pins(table, described), frozenset(map(fold, spaces)),
-                      _written(table, described), _flag(table, "by_dialect", described))
+                      _written(table, described), _flag(table, "by_dialect", described),
+                      lists, _names_in(folder, lists, described), _task(table, described))
 
 
 def _described(described: Path) -> dict[str, object]:
@@ -119,6 +131,29 @@ def _listed(table: dict[str, object], key: str, described: Path, what: str) -> t
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
         raise LibraryError(described, f"{key} must be {what}")
     return tuple(listed)
+
+
+_DECLARED = re.compile(r"^\s*([A-Za-z_]\w*)\s*(?:AT\b[^:]*)?:", re.M)
+
+
+def _names_in(folder: Path, lists: tuple[str, ...], described: Path) -> dict[str, str]:
+    """By folded name of a list of global variables, and of each of its variables unless it is qualified_only: its file."""
+    names: dict[str, str] = {}
+    for listed in lists:
+        found = read(folder / listed, listed)
+        if not isinstance(found, Source):
+            raise LibraryError(described, f"{listed} cannot be read")
+        variables = [] if "qualified_only" in found.text else _DECLARED.findall(found.text)
+        for name in (Path(listed).stem, *variables):
+            names.setdefault(fold(name), listed)
+    return names
+
+
+def _task(table: dict[str, object], described: Path) -> str:
+    task = table.get("task", "")
+    if not isinstance(task, str):
+        raise LibraryError(described, "task must be the name of a function")
+    return task
 
 
 def _flag(table: dict[str, object], key: str, described: Path) -> bool:
@@ -216,6 +251,16 @@ class Libraries:
         """True if programs know a library under that name."""
         return any(fold(name) in library.spaces for library in self._libraries.values())
 
+    def is_in_space(self, owner: str, space: str) -> bool:
+        """True if programs know that library under the folded name `space`."""
+        library = self._libraries.get(owner)
+        return library is not None and space in library.spaces
+
+    def tasks(self) -> list[tuple[str, str]]:
+        """Of libraries whose lists were read: the library, and the function that each task calls in front of its programs."""
+        return [(library.name, library.task) for library in self._libraries.values()
+                if library.task and not library.loaded.isdisjoint(library.lists)]
+
     def writes(self, owner: str) -> tuple[str, ...]:
         """Areas that a library writes though programs only read them."""
         library = self._libraries.get(owner)
@@ -239,6 +284,13 @@ class Libraries:
             return []
         wanted = [library.files[fold(name)], *(library.folder / listed for listed in library.globals)]
         return [loaded for path in wanted if (loaded := self._parse(library, path, report))]
+
+    def load_list(self, name: str, report: Report) -> list[tuple[Source, tree.SourceText]]:
+        """Trees of the lists of global variables that have that folded name, or a variable of that name, as far as they
+        were not read before."""
+        wanted = [(library, library.folder / library.listed[name]) for library in self._libraries.values()
+                  if name in library.listed]
+        return [loaded for library, path in wanted if (loaded := self._parse(library, path, report))]
 
     def _parse(self, library: Library, path: Path, report: Report) -> tuple[Source, tree.SourceText] | None:
         if path.name in library.loaded:

@@ -212,10 +212,18 @@ class Project:
         return self._owners[own]
 
     def _load(self, name: str, owner: str) -> None:
-        for source, text in self.libraries.load(name, owner, self.report):
-            if source.name not in self._loaded:
-                self._loaded.add(source.name)
-                self.collect(text, source)
+        self._collect_loaded(self.libraries.load(name, owner, self.report))
+
+    def load_list(self, name: str) -> bool:
+        """Read the libraries' lists of global variables that a folded name means; False if there is nothing new."""
+        return self._collect_loaded(self.libraries.load_list(name, self.report))
+
+    def _collect_loaded(self, loaded: list[tuple[Source, tree.SourceText]]) -> bool:
+        new = [(source, text) for source, text in loaded if source.name not in self._loaded]
+        for source, text in new:
+            self._loaded.add(source.name)
+            self.collect(text, source)
+        return bool(new)
 
     def pou(self, name: str, source: Source) -> Pou | None:
         """The POU of that name as seen from `source`."""
@@ -250,8 +258,9 @@ class Project:
         return any((owner, name) in self._refused for owner in self.owners(source))
 
     def is_space(self, name: str) -> bool:
-        """True for the name of a list of global variables or of a library, which may qualify other names."""
-        return fold(name) in self.lists or self.libraries.has_space(name)
+        """True for the name of a list of global variables or of a library, which may qualify other names; also for
+        several of them with points between."""
+        return all(part in self.lists or self.libraries.has_space(part) or self.load_list(part) for part in fold(name).split("."))
 
     def is_failed_global(self, name: str, source: Source) -> bool:
         """True if a global variable that `source` sees under this name has an error that was reported."""

@@ -6,9 +6,9 @@ from fbvm.base.diagnostics import Source
 from fbvm.check.symbols.report import Report
 from fbvm.syntax import tree
 
-MAX_SIZE = 64 << 20
+MAX_SIZE = 128 << 20
 """Largest variable, structure or instance in bytes."""
-MAX_TOGETHER = 256 << 20
+MAX_TOGETHER = 1 << 30
 """Bytes that all declarations of a program may take; those of an array in a block are counted with both."""
 
 

@@ -64,7 +64,7 @@ class Place:
     def store(self, value: Node, site: int) -> Node:
         """The statement that stores a value of the machine type of this place; one of a subrange is checked at `site`."""
         kind = self.type
-        if isinstance(kind, SubrangeType) and not (value[0] == "const" and kind.low <= value[2] <= kind.high):
+        if isinstance(kind, SubrangeType) and kind.checked and not (value[0] == "const" and kind.low <= value[2] <= kind.high):
             value = ("check", machine(kind), value, kind.low, kind.high, "R0103", site)
         kind = base(kind)
         if isinstance(kind, StringType):

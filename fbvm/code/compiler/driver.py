@@ -25,6 +25,7 @@ from fbvm.code.builder.evaluation import evaluate
 from fbvm.code.compiler.follow_on_errors import FollowOnErrors
 from fbvm.code.compiler.neighbours import with_neighbours
 from fbvm.code.image import Image, ProgramRun, TaskRow
+from fbvm.code.layout.instance_paths import InstancePaths
 from fbvm.code.layout.layout import lay_out
 from fbvm.code.lowering.initial_references import InitialReferences
 from fbvm.code.lowering.program import Program
@@ -217,7 +218,8 @@ def _image(checker: Checker, library: ObjectLibrary, progress: Progress, drawn: 
     for (_, name), entry in checker.project.types.items():
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
-    return Image(placement.layout, bodies, tuple(tasks), placement.symbols, (*placement.initial, *references.in_slots()),
+    initial = (*placement.initial, *references.in_slots(), *InstancePaths(checker).rows())
+    return Image(placement.layout, bodies, tuple(tasks), placement.symbols, initial,
                  tuple(placement.retained), tuple(program.sites), types, program.objects, tuple(program.rungs),
                  tuple(program.charts), frames=placement.frames)
 

@@ -6,12 +6,44 @@ all instances share finds the others by adding."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.types import ArrayType, StructType, Type
 from fbvm.check.checker import Checker
 from fbvm.check.declarations.interfaces import OBJECTS_AT
 from fbvm.check.symbols.containment import Containment
+from fbvm.check.symbols.facts import holds_block
 from fbvm.code.operations import FIRST_OBJECT
+
+HEADER_BYTES = 8
+"""Bytes with which an instance begins: the number of its type, and that of its first object."""
+
+
+def runs(kind: Type) -> Iterator[tuple[int, int]]:
+    """Offset and number of the bytes that a copy of a value takes along: all but those with which instances in it begin."""
+    at = 0
+    for header in _headers(kind, 0):
+        if header > at:
+            yield at, header - at
+        at = header + HEADER_BYTES
+    if kind.size > at:
+        yield at, kind.size - at
+
+
+def _headers(kind: Type, at: int) -> Iterator[int]:
+    """Where the instances in a value at an offset begin, from low to high."""
+    if not holds_block(kind):
+        return
+    if isinstance(kind, ArrayType):
+        for index in range(kind.count):
+            yield from _headers(kind.element, at + index * kind.element.size)
+    elif isinstance(kind, StructType):
+        if kind.block:
+            yield at
+        for member in sorted(kind.fields.values(), key=lambda each: each.offset):
+            if not (member.reference or member.absolute):
+                yield from _headers(member.type, at + member.offset)
 
 
 class Numbering:

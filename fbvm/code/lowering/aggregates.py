@@ -20,7 +20,7 @@ def written_out(body: BodyContext, expr: tree.ArrayInit | tree.StructInit, kind:
     nodes = body.sequence(_value(body, part) for part in single)
     body.emit(("fill", place.address, whole.content))
     for at, start in body.program.references_in(place.type, whole.content):
-        body.emit(place.moved(at, start.kind).store(pointers.reference_to(body, start.place), site))
+        body.emit(place.moved(at, start.kind).store(pointers.initial(body, start), site))
     for part, node in zip(single, nodes, strict=True):
         value = body.to_temporary(node)
         body.emit(*(place.moved(at, part.kind, part.bit).store(value, site) for at in part.places))

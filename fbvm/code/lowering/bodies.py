@@ -5,7 +5,7 @@ This is the one module that knows all rules; a rule knows the context only (`con
 from __future__ import annotations
 
 from fbvm.check.checker import Checker
-from fbvm.check.symbols.facts import Edge, Pou
+from fbvm.check.symbols.facts import Edge, Pou, Start
 from fbvm.code.builder.places import Place
 from fbvm.code.image import Body, RungPicture
 from fbvm.code.lowering import aggregates, calls, loops, operators, pointers, statements, variables
@@ -41,9 +41,9 @@ def lower_body(program: Program, checker: Checker, pou: Pou) -> Body:
     return Body(pou.name, pou.kind, with_costs(tuple(body.out)), size)
 
 
-def lower_reference(program: Program, checker: Checker, pou: Pou, expr: tree.Expr) -> Node:
-    """The reference to what `expr` names in a POU, as an expression that needs no statements in front of it."""
-    return pointers.reference_to(BodyContext(program, checker, pou, RULES), expr)
+def lower_reference(program: Program, checker: Checker, pou: Pou, start: Start) -> Node:
+    """An initial reference of a variable of a POU, as an expression that needs no statements in front of it."""
+    return pointers.initial(BodyContext(program, checker, pou, RULES), start)
 
 
 def _enter(body: BodyContext) -> None:
@@ -56,7 +56,7 @@ def _enter(body: BodyContext) -> None:
         body.emit(("fill", (origin, offset + start, ()), initial))
     for offset, reference in body.program.entry_references.get(pou, ()):
         slot = Place(("abs", offset, ()), reference.kind)
-        body.emit(slot.store(pointers.reference_to(body, reference.place), body.entry_site))
+        body.emit(slot.store(pointers.initial(body, reference), body.entry_site))
     for edge in pou.edges:
         _detect(body, edge)
 

@@ -18,6 +18,7 @@ from fbvm.code.builder.conversions import implicit
 from fbvm.code.builder.emitter import Emitter
 from fbvm.code.builder.places import Place
 from fbvm.code.layout.layout import variable_bit
+from fbvm.code.layout.objects import runs
 from fbvm.code.lowering.program import Program
 from fbvm.code.operations import FLOATS, OBJECT_SHIFT, TEXT_UNITS, Block, Node
 from fbvm.code.pictures.st_rungs import Mark
@@ -187,8 +188,13 @@ class BodyContext(Emitter):
         self.out.append(("observe", "write", site, place.detail()))
 
     def copy(self, to: Place, source: Place, site: int) -> None:
-        """Copy an array or structure, and let the write be observed."""
-        self.emit(("copy", to.address, source.address, to.type.size))
+        """Copy an array, a structure or an instance, and let the write be observed.
+
+        What an instance begins with stays: its type, and the objects that pointers to its variables are moved in."""
+        for at, size in runs(to.type):
+            whole = size == to.type.size
+            self.emit(("copy", to.address, source.address, size) if whole else
+                      ("copy", to.moved(at, to.type).address, source.moved(at, to.type).address, size))
         self.observe_write(to, site)
 
     def observe_write(self, place: Place, site: int) -> None:

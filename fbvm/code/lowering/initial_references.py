@@ -64,7 +64,7 @@ class InitialReferences:
     def _made(self, start: Start, around: Instances) -> bytes:
         """The bytes of a reference that lies in certain instances."""
         pou = start.pou if start.pou is not None and start.pou.number >= 0 else self.checker.bodies[0]
-        node = lower_reference(self.program, self.checker, pou, start.place)
+        node = lower_reference(self.program, self.checker, pou, start)
         return STRUCTS["ref"].pack(value_of(self._at_power_on(node, around.get(pou, 0))))
 
     def _at_power_on(self, node: Node, instance: int) -> Node:

@@ -149,6 +149,7 @@ def _exit_if(name: str, form: str, left: Node, right: Node, leave: Block = EXIT)
 
 
 def _limits(kind: Type) -> tuple[int, int]:
+    kind = kind if isinstance(kind, SubrangeType) and kind.checked else base(kind)
     assert isinstance(kind, SubrangeType | Elementary)
     return kind.low, kind.high
 

@@ -7,10 +7,21 @@ The pointer carries that number, so that one which is kept longer traps."""
 
 from __future__ import annotations
 
-from fbvm.base.types import ANY_SIZE, UDINT, AnyType, OpenArrayType, RefType, Type, machine
-from fbvm.check.declarations.interfaces import OBJECTS_AT
+from fbvm.base.types import (
+    ANY_SIZE,
+    UDINT,
+    AnyType,
+    ArrayType,
+    OpenArrayType,
+    RefType,
+    StringType,
+    StructType,
+    Type,
+    machine,
+)
+from fbvm.check.declarations.interfaces import OBJECTS_AT, PADDED_BYTES
 from fbvm.check.expressions.values import is_null
-from fbvm.check.symbols.facts import Holder
+from fbvm.check.symbols.facts import Holder, Start, Variable
 from fbvm.code.builder.places import Place
 from fbvm.code.lowering import any_parameters
 from fbvm.code.lowering.arrays import size_of
@@ -66,6 +77,11 @@ def reference_to(body: BodyContext, expr: tree.Expr) -> Node:
     return _from_bits(("add", "u64", _bits(reference), moved))
 
 
+def initial(body: BodyContext, start: Start) -> Node:
+    """The reference of an initial value: of an interface to an instance as a whole, of others to a variable."""
+    return body.value(start.place, start.kind) if start.kind.interface else reference_to(body, start.place)
+
+
 def binding(body: BodyContext, expr: tree.Expr) -> Node:
     """The reference that a REFERENCE TO gets when it is bound to what `expr` names, or to NULL."""
     return ("const", "ref", 0) if is_null(expr) else reference_to(body, expr)
@@ -116,7 +132,7 @@ def _leased(body: BodyContext, holder: Holder, reference: Node) -> Node:
     number = body.to_temporary(("shr", "u64", bits, ("const", "i64", OBJECT_SHIFT), body.entry_site)) if passed else None
     with body.block() as taken:
         start = _offset(body, _bits(whole.reference()))
-        _take(body, holder.lease, start, _size(body, holder.expr, whole.type))
+        _take(body, holder.lease, start, _padded(body, variable, _size(body, holder.expr, whole.type)))
     needed: Node = ("eq", "b", "u64", number, _word(BUFFER_OBJECT)) if number is not None else ("const", "b", 1)
     body.emit(*([("if", ((needed, tuple(taken)),), ())] if number is not None else taken))
     current = ("load", "u32", _row(body, holder.lease, _LEASE_HELD))
@@ -145,6 +161,14 @@ def _size(body: BodyContext, expr: tree.Expr, kind: Type) -> Node:
     if isinstance(kind, AnyType):
         return any_parameters.number(body, expr, ANY_SIZE)
     return size_of(body, expr, kind) if isinstance(kind, OpenArrayType) else ("const", "i64", kind.size)
+
+
+def _padded(body: BodyContext, variable: Variable, size: Node) -> Node:
+    """The bytes that a variable of a frame takes, with what pads it where the dialect lets programs write that."""
+    if not body.dialect.padding_is_written or variable.place != "frame" or variable.reference or size[0] != "const" or \
+            not isinstance(variable.type, ArrayType | StructType | StringType):
+        return size
+    return ("const", "i64", -(-size[2] // PADDED_BYTES) * PADDED_BYTES)
 
 
 def _row(body: BodyContext, lease: int, offset: int) -> Address:

@@ -15,6 +15,8 @@ PROJECT_SUFFIX = ".plcproj"
 TASK_SUFFIX = ".tctto"
 TASKS = "Tasks.st"
 """What the source is called that says which programs run when."""
+SPACE = "// a name that stands in front of other names\nVAR_GLOBAL\nEND_VAR\n"
+"""A list of no global variables, whose file's name is known as a name space by that."""
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 
@@ -23,6 +25,8 @@ class ImportedProject:
     """The sources of a project, in the order in which it lists them, and what could not be taken over."""
 
     sources: list[Source] = field(default_factory=list)
+    references: list[str] = field(default_factory=list)
+    """Names of the libraries that it refers to."""
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
     @property
@@ -53,14 +57,32 @@ def read_project(path: Path) -> ImportedProject:
         made.diagnostics += found.diagnostics
         made.sources += [found.source] if found.source else []
         tasks += [found.task] if found.task else []
+    made.references = [item.get("Include").partition(",")[0] for item in _references(root)]
+    made.sources += [Source(f"{path}/{space}.st", SPACE) for space in _spaces(root)]
     if tasks:
-        made.sources.append(task_source(str(path), tasks))
+        made.sources.append(task_source(str(path), tasks, _property(root, "Name")))
     return made
 
 
-def task_source(name: str, tasks: list[Element]) -> Source:
-    """The source that says when the programs run, for tasks out of a file of this name."""
-    return Source(f"{name}/{TASKS}", configuration(tasks))
+def task_source(name: str, tasks: list[Element], application: str = "") -> Source:
+    """The source that says when the programs run, for tasks out of a file of this name, in the project `application`."""
+    return Source(f"{name}/{TASKS}", configuration(tasks, application))
+
+
+def _property(root: Element, name: str) -> str:
+    """A property of the project; "" if it is not given."""
+    return next((found.text.strip() for group in root.all("PropertyGroup") if (found := group.one(name)) is not None), "")
+
+
+def _references(root: Element) -> list[Element]:
+    return [item for group in root.all("ItemGroup") for item in group.all("PlaceholderReference", "LibraryReference")]
+
+
+def _spaces(root: Element) -> list[str]:
+    """The names that may stand in front of names of this project, where others use it, and of the libraries it refers to."""
+    named = [found.text.strip() for item in _references(root) if (found := item.one("Namespace")) is not None]
+    named.append(_property(root, "DefaultNamespace") or _property(root, "Title"))
+    return [name for name in dict.fromkeys(named) if _IDENTIFIER.fullmatch(name) and "." not in name]
 
 
 def _is_excluded(item: Element) -> bool:
@@ -88,10 +110,11 @@ def _object(project: Path, xml: Source, item: Element) -> ImportedObject:
         return refused("X0501", f"{written} cannot be read: {reason(error)}")
 
 
-def configuration(tasks: list[Element]) -> str:
+def configuration(tasks: list[Element], application: str = "") -> str:
     """The text of a CONFIGURATION with these tasks (`Task` of a `.TcTTO`): CycleTime is in microseconds, the smallest Priority
-    comes first, PouCall names the programs in their order."""
-    lines = ["CONFIGURATION TwinCAT", "RESOURCE PLC ON fbvm"]
+    comes first, PouCall names the programs in their order.  The configuration is named as the project, `application`."""
+    name = application if _IDENTIFIER.fullmatch(application) and "." not in application else "TwinCAT"
+    lines = [f"CONFIGURATION {name}", "RESOURCE PLC ON fbvm"]
     programs: list[str] = []
     for number, task in enumerate(tasks):
         name = task.get("Name") if _IDENTIFIER.fullmatch(task.get("Name")) else f"Task_{number + 1}"

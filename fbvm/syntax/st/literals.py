@@ -42,6 +42,8 @@ MOMENTS = {"DT": "DATE_AND_TIME", "DATE_AND_TIME": "DATE_AND_TIME", "LDT": "LDAT
 ELEMENTARY = {"BOOL", *SIGNED, *UNSIGNED, *REALS, *TEXTS, *TIMES, *DATES, *CLOCKS, *MOMENTS}
 
 SECOND_NS = 1_000_000_000
+UNSIGNED_NS_MAX = (1 << 64) - 1
+"""The longest LTIME where a dialect has it without a sign; the check says whether it has."""
 UNITS_NS = {"d": DAY_NS, "h": 3600 * SECOND_NS, "m": 60 * SECOND_NS, "s": SECOND_NS, "ms": 1_000_000, "us": 1000,
             "ns": 1}
 DAYS_1970 = 719_163
@@ -121,7 +123,7 @@ def _based(text: str) -> int:
 def typed(prefix: str, rest: str) -> Decoded:
     """`prefix#rest` of an elementary type (`prefix` in capitals, one of ELEMENTARY)."""
     if prefix in TIMES:
-        return "time", duration(rest), TIMES[prefix]
+        return "time", duration(rest, NS_MAX if TIMES[prefix] == "TIME" else UNSIGNED_NS_MAX), TIMES[prefix]
     if prefix in DATES:
         return "date", _day(rest) * DAY_NS, DATES[prefix]
     if prefix in CLOCKS:
@@ -231,7 +233,7 @@ def _without_escapes(inner: str, quote: str, digits: int) -> str:
 # --- times and dates ---
 
 
-def duration(text: str) -> int:
+def duration(text: str, most_ns: int = NS_MAX) -> int:
     """`1d2h3.5s` or `-5us300ns` as whole nanoseconds; a rest below one nanosecond is an error, not rounded away."""
     negative = text.startswith("-")
     rest = text[1:] if text[:1] in ("-", "+") else text
@@ -255,7 +257,7 @@ def duration(text: str) -> int:
         total += _scaled(part[1], part[2] or "", UNITS_NS[units[unit]], text)
         last, rest = unit, rest[part.end():]
     total = -total if negative else total
-    if not -NS_MAX - 1 <= total <= NS_MAX:
+    if not -NS_MAX - 1 <= total <= most_ns:
         raise OutOfRange(f"`{_short(text)}` does not fit 64 bits of nanoseconds, about 292 years", "")
     return total
 

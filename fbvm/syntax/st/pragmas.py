@@ -15,8 +15,12 @@ IF, which was warned of."""
 ATTRIBUTES = {
     "qualified_only", "strict", "hide", "hide_all_locals", "conditionalshow", "conditionalshow_all_locals", "displaymode",
     "monitoring", "symbol", "linkalways", "naming", "obsolete", "analysis", "estimated-stack-usage", "to_string",
-    "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy"}
-"""Names of attributes that make no valid program do anything else: they restrict, show, hide or export."""
+    "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy", "no_copy", "no-analysis", "const_non_replaced", "tcgenerated",
+    "tcrpcenable", "pytmc", "enable_dynamic_creation", "signature_flag", "tclinkto", "tcncaxis", "tccontextname",
+    "call_after_online_change_slot", "no_assign", "no_assign_warning", "no_explicit_call",
+    "call_after_init", "reflection", "instance-path", "noinit"}
+"""Names of attributes that are obeyed, and of those that make no valid program do anything else: they restrict, show, hide,
+export."""
 
 PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 """Values of the attribute pack_mode, and the multiples of bytes at which members of a structure lie at most."""
@@ -83,6 +87,23 @@ def hides_inside(text: str, start: int) -> bool:
     """Whether `{attribute 'hide'}` stands before the POU that begins at `start`: stepping does not stop inside."""
     before = text[max(0, start - _REACH):start]
     return before.rstrip().endswith("}") and _HIDDEN.search(before) is not None
+
+
+_ATTRIBUTE = re.compile(r"""\{\s*attribute\s*'([^']*)'\s*(?::=\s*'([^']*)')?\s*\}""", re.IGNORECASE)
+_FAR = 2_000
+"""Characters in front of a declaration in which its attributes are searched."""
+
+
+def attributes_before(text: str, start: int) -> dict[str, str]:
+    """The attributes directly in front of what begins at `start` in a text, among blanks and comments: names in small letters
+    and values."""
+    before = text[max(0, start - _FAR):start]
+    if "{" not in before:
+        return {}
+    at = len(before)
+    while match := re.search(r"\{[^{}]*\}(?:\s|//[^\n]*\n|\(\*(?:(?!\*\)).)*\*\))*\Z", before[:at], re.DOTALL):
+        at = match.start()
+    return {found[1].lower(): found[2] or "" for found in _ATTRIBUTE.finditer(before[at:])}
 
 
 def attributes(text: SourceText, declaration: Declaration) -> set[str]:

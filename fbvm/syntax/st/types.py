@@ -85,7 +85,7 @@ class Types(Statements):
             elif each.kind == "" and isinstance(each.value, NameRef):
                 members.append((Name(each.start, each.end, each.value.text), None))
             else:
-                return ConstructedSpec(base.start, closer.end, base, None)
+                return ConstructedSpec(base.start, closer.end, base, None, tuple(given))
         return EnumSpec(base.start, closer.end, base, tuple(members))
 
     def constructed_elements(self, base: NamedType, opener: Token, items: list[list[Item]], closer: Token) -> ConstructedSpec:

@@ -81,10 +81,11 @@ class EnumSpec(TypeSpec):
 @_node
 class ConstructedSpec(TypeSpec):
     """`FB (25)`, `FB [(n := 1), 3((n := 2))]`: a block with initial values for its inputs, for each element of an array its
-    own, or with other arguments of FB_init, which are understood and refused; `values` None for those without a name."""
+    own, or with `arguments` of FB_init; `values` None but for elements of an array."""
 
     base: NamedType
     values: ArrayInit | None
+    arguments: tuple[Argument, ...] = ()
 
 
 @_node

@@ -1,0 +1,1 @@
+"""Suites of TcUnit in projects of TwinCAT, as tests of pytest."""

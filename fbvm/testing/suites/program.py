@@ -1,0 +1,105 @@
+"""The suites of a program, found without running it: instances of blocks that extend FB_TestSuite, and the names of their tests.
+
+Source: TcUnit's user guide: a program declares its suites and calls RUN or RUN_IN_SEQUENCE; a test begins with TEST or
+TEST_ORDERED."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import fold
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
+from fbvm.syntax.tree.node import walk
+
+BASE = "FB_TESTSUITE"
+RUNS = ("RUN", "RUN_IN_SEQUENCE")
+BEGINS = ("TEST", "TEST_ORDERED")
+DISABLED = "disabled_"
+
+
+@dataclass(frozen=True)
+class FoundTest:
+    """A test that a suite begins: its name, and where that is written; `skipped` if its name begins with `disabled_`."""
+
+    name: str
+    file: str
+    line: int
+    skipped: bool = False
+
+
+@dataclass(frozen=True)
+class FoundSuite:
+    """An instance of a suite: its path in the program, its tests, and whether it has some whose names are no literals."""
+
+    path: str
+    tests: tuple[FoundTest, ...]
+    has_others: bool
+
+
+def find_suites(sources: Sequence[Source]) -> list[FoundSuite]:
+    """The suites that the programs of some sources run, in the order of declaration; none if no program runs any."""
+    declared = [(node, source) for source in sources for node in parse(source)[0].declarations]
+    pous = {fold(node.name.text): (node, source) for node, source in declared if isinstance(node, tree.Pou)}
+    programs = [(node, source) for node, source in pous.values() if node.kind == "PROGRAM"]
+    if not any(_called(call) in RUNS for node, _ in programs for call in _calls(node)):
+        return []
+    found = [_suite(f"{Path(source.name).stem}.{name}", block, pous) for node, source in declared
+             if isinstance(node, tree.GlobalVars) for name, block in _instances(node.section)]  # fmt: skip
+    found += [_suite(f"{node.name.text}.{name}", block, pous) for node, _ in programs for section in node.sections
+              for name, block in _instances(section)]  # fmt: skip
+    return [suite for suite in found if suite is not None]
+
+
+Pous = dict[str, tuple[tree.Pou, Source]]
+
+
+def _instances(section: tree.VarSection) -> Iterator[tuple[str, str]]:
+    """Name and folded type of each variable of a section that may be an instance."""
+    for declared in section.variables:
+        if isinstance(declared.spec, tree.NamedType):
+            yield from ((name.text, _last(declared.spec.text)) for name in declared.names)
+
+
+def _last(name: str) -> str:
+    return fold(name.rpartition(".")[2])
+
+
+def _suite(path: str, block: str, pous: Pous) -> FoundSuite | None:
+    """The suite at a path, if its type is one."""
+    lineage: list[tuple[tree.Pou, Source]] = []
+    while block in pous and block != BASE and len(lineage) < len(pous):
+        lineage.append(pous[block])
+        bases = pous[block][0].bases
+        block = _last(bases[0].text) if bases else ""
+    if block != BASE or not lineage:
+        return None
+    tests: dict[str, FoundTest] = {}
+    others = False
+    for node, source in lineage:
+        for call in sorted(_calls(node), key=lambda each: each.start):
+            if _called(call) not in BEGINS or not call.arguments:
+                continue
+            value = call.arguments[0].value
+            if isinstance(value, tree.Literal) and isinstance(value.value, str):
+                name, skipped = value.value.strip(), value.value.strip().lower().startswith(DISABLED)
+                name = name[len(DISABLED):] if skipped else name
+                tests.setdefault(name, FoundTest(name, source.name, source.place(call.start)[0], skipped))
+            else:
+                others = True
+    return FoundSuite(path, tuple(tests.values()), others)
+
+
+def _calls(node: tree.Node) -> Iterator[tree.Call]:
+    return (each for each in walk(node) if isinstance(each, tree.Call))
+
+
+def _called(call: tree.Call) -> str:
+    """The folded name of what is called, without the name of a library in front."""
+    callee = call.callee
+    if isinstance(callee, tree.Member) and isinstance(callee.of, tree.NameRef):
+        return fold(callee.name.text)
+    return fold(callee.text) if isinstance(callee, tree.NameRef) else ""

@@ -1,0 +1,95 @@
+"""Suites of a TwinCAT project under pytest: the shipped example, names that span cycles, suites that never finish."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.data import data_folder
+from fbvm.base.diagnostics import Source
+from fbvm.code.compiler import compile_text
+from fbvm.testing.suites.program import find_suites
+from fbvm.testing.suites.results import SuiteRun, run_suites
+from fbvm.testing.suites.xunit import write_xunit
+
+pytest_plugins = ["pytester"]
+EXAMPLE = data_folder("fblib").parent / "examples" / "twincat"
+SUITE = """
+FUNCTION_BLOCK FB_A_Test EXTENDS TcUnit.FB_TestSuite
+METHOD One
+TEST('one');
+AssertEquals_INT(Expected := 5, Actual := 5, Message := 'five');
+AssertEquals_INT(5, 4, 'four');
+TEST_FINISHED();
+END_METHOD
+METHOD Two
+VAR_INST t : TON; END_VAR
+TEST(' two ');
+t(IN := TRUE, PT := T#50ms);
+IF t.Q THEN AssertTrue(TRUE, 'x'); TEST_FINISHED(); END_IF
+END_METHOD
+METHOD InTurn
+IF TEST_ORDERED('first') THEN AssertEquals_BYTE(16#AB, 16#CD, 'bytes'); TEST_FINISHED(); END_IF
+IF TEST_ORDERED('second') THEN TEST_FINISHED(); END_IF
+TEST('disabled_three'); AssertTrue(FALSE, 'never'); TEST_FINISHED();
+END_METHOD
+One(); Two(); InTurn();
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK FB_B_Test EXTENDS FB_TestSuite
+TEST('never'); AssertTrue(TRUE, '');
+END_FUNCTION_BLOCK
+"""
+PROGRAM = "PROGRAM PRG_TEST VAR {} END_VAR TcUnit.RUN(); END_PROGRAM"
+
+
+def ran(instances: str, *suites: str, limit_ns: int = 10**9) -> SuiteRun:
+    made = compile_text(SUITE + PROGRAM.format(instances), dialect="twincat")
+    assert made.image is not None, [message.render() for message in made.errors]
+    return run_suites(made.image, suites, limit_ns)
+
+
+def test_suites_and_the_names_of_their_tests_are_found_without_running() -> None:
+    found = find_suites([Source("a.st", SUITE + PROGRAM.format("a, b : FB_A_Test; c : FB_B_Test; n : INT;"))])
+    assert [suite.path for suite in found] == ["PRG_TEST.a", "PRG_TEST.b", "PRG_TEST.c"]
+    assert [(test.name, test.skipped) for test in found[0].tests] == [
+        ("one", False), ("two", False), ("first", False), ("second", False), ("three", True)]
+    assert find_suites([Source("a.st", SUITE + "PROGRAM P VAR a : FB_A_Test; END_VAR a(); END_PROGRAM")]) == []
+
+
+@pytest.mark.slow
+def test_tests_of_one_cycle_and_of_several_ordered_and_disabled_ones() -> None:
+    run = ran("a : FB_A_Test;", "PRG_TEST.a")
+    seen = {name: (r.finished, r.failed, r.skipped, r.asserts, r.duration_s) for (_, name), r in run.results.items()}
+    assert run.is_over
+    assert seen == {"one": (True, True, False, 2, 0.0), "two": (True, False, False, 1, 0.05),
+                    "first": (True, True, False, 1, 0.0), "second": (True, False, False, 0, 0.0),
+                    "three": (False, False, True, 0, 0.0)}
+    failures = [failure for result in run.results.values() for failure in result.failures]
+    assert [failure.text for failure in failures] == ["EXP: 5, ACT: 4, MSG: four", "EXP: 0xAB, ACT: 0xCD, MSG: bytes"]
+    assert [failure.site and failure.site.line for failure in failures] == [6, 16]
+
+
+@pytest.mark.slow
+def test_a_suite_that_never_finishes_ends_at_the_limit() -> None:
+    run = ran("b : FB_B_Test;", "PRG_TEST.b", limit_ns=10**8)
+    assert (run.is_over, run.plc.elapsed_ns, run.results["PRG_TEST.b", "never"].finished) == (False, 10**8, False)
+
+
+@pytest.mark.slow
+def test_results_in_the_form_of_tcunit(tmp_path: Path) -> None:
+    write_xunit(tmp_path / "x.xml", [ran("a : FB_A_Test;", "PRG_TEST.a")])
+    text = (tmp_path / "x.xml").read_text()
+    assert '<testsuites disabled="" failures="2" tests="3" time="' in text
+    assert '<testcase name="one" classname="PRG_TEST.a" time="0.0" status="FAIL">' in text
+    assert '<failure message="EXP: 5, ACT: 4, MSG: four" type=""></failure>' in text
+
+
+@pytest.mark.slow
+def test_each_test_of_the_example_is_one_of_pytest(pytester: pytest.Pytester) -> None:
+    pytester.makeini("[pytest]")
+    done = pytester.runpytest_inprocess(str(EXAMPLE), "-p", "no:cacheprovider", "--fbvm-pages", "0", "-p", "no:randomly")
+    done.assert_outcomes(passed=3, failed=1, skipped=1)
+    done.stdout.fnmatch_lines(["*FB_Motor_Test.TcPOU:31: in PRG_TEST.fbMotors, test a motor that was stopped is started again, *",
+                               ">   AssertEquals_UDINT(Expected := 3, Actual := fbMotor.nStarts, *",
+                               "E   EXP: 3, ACT: 2, MSG: starts behind a stop"])  # fmt: skip
