@@ -85,7 +85,8 @@ class SourceBuilder(SfcElements):
         body = self._without_jumps(body, declared)
         if self.charted or any(isinstance(each, Step | Transition) for each in elements):
             body, actions = self._charts(word, body, elements, actions, declared)
-        return Pou(word.start, end.end, word.text.upper(), head.name, result, tuple(declared), body, tuple(refused),
+        kind = "FUNCTION_BLOCK" if word.type == "FUNCTION_BLOCK" else word.text.upper()
+        return Pou(word.start, end.end, kind, head.name, result, tuple(declared), body, tuple(refused),
                    tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods))
 
     def interface(self, word: Token, head: Head, members: list[Members], end: Token) -> Pou:
