@@ -13,7 +13,7 @@ from functools import cached_property
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
-from fbvm.syntax.st.lexer import comment_end
+from fbvm.syntax.st.comments import comment_end
 from fbvm.syntax.tree.node import walk
 
 _POUS = ("FUNCTION_BLOCK", "FUNCTION", "PROGRAM")

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from fbvm.syntax.st.lexer import Token, comment_end
+from fbvm.syntax.st.comments import comment_end
+from fbvm.syntax.st.lexer import Token
 
 TAB = 4
 BESIDE = "  "

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from functools import cache, lru_cache
+from functools import cache
 from typing import NamedTuple
 
+from fbvm.syntax.st.comments import CLOSERS, comment_end
 from fbvm.syntax.st.pragmas import GENERATOR, NO_EFFECT, dialectal, harmless
 from fbvm.syntax.st.tables import Terminal, tables
 from fbvm.syntax.tree import Form, Pragma
@@ -397,8 +398,8 @@ class Lexer:
     def _comment(self, start: int) -> int:
         """Where the bracket comment that begins at `start` ends; notes a comment inside it."""
         end, inner = comment_end(self.text, start)
-        first = self.text.find(_CLOSERS[self.text[start]], start) + 2
-        once_for_each = f"close it with {_CLOSERS[self.text[start]]}" + (", once for each sign of a beginning" if inner else "")
+        first = self.text.find(CLOSERS[self.text[start]], start) + 2
+        once_for_each = f"close it with {CLOSERS[self.text[start]]}" + (", once for each sign of a beginning" if inner else "")
         if end < 0 or inner and end == first and self.text[start] == "/":
             self.report("S0103", start, start + 2, "comment without end", once_for_each)
         elif inner and end == first:
@@ -408,36 +409,6 @@ class Lexer:
                 "S0103", "the comment ended at the first `*)`", "comments do not nest in this dialect: leave the inner (* and "
                 "*) out"), taken=False))
         return end if end >= 0 else len(self.text)
-
-
-_CLOSERS = {"(": "*)", "/": "*/"}
-_MARKS = {"(": re.compile(r"\(\*|\*\)"), "/": re.compile(r"/\*|\*/")}
-
-
-def comment_end(text: str, start: int) -> tuple[int, int]:
-    """Where the bracket comment ends that begins at `start`, and where the first one inside it begins: -1 if it has no end, 0 if
-    there is none inside.
-
-    Each kind nests in itself.  A comment that is not closed as often as it is opened ends at the first sign of an end."""
-    closer = _CLOSERS[text[start]]
-    first = text.find(closer, start + 2)
-    inner = text.find(text[start:start + 2], start + 2, first) if first >= 0 else -1
-    if inner < 0:
-        return (first + 2 if first >= 0 else -1), 0
-    return _nested_ends(text, text[start]).get(start, first + 2), inner
-
-
-@lru_cache(maxsize=2)
-def _nested_ends(text: str, kind: str) -> dict[int, int]:
-    """For each bracket comment of a kind that is closed as often as it is opened, where it begins and ends."""
-    open_: list[int] = []
-    ends: dict[int, int] = {}
-    for found in _MARKS[kind].finditer(text):
-        if found[0] != _CLOSERS[kind]:
-            open_.append(found.start())
-        elif open_:
-            ends[open_.pop()] = found.end()
-    return ends
 
 
 def _short(text: str) -> str:
