@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 
@@ -151,9 +152,16 @@ class _Statements:
 
     def _if(self, node: tree.If) -> None:
         for condition, body in node.branches:
-            self.scope.condition(condition, "IF")
+            self.scope.condition(condition, self._conditional(node))
             self.block(body)
         self.block(node.otherwise or ())
+
+    def _conditional(self, node: tree.If) -> str:
+        """The word whose condition is checked: IF, or an instruction of an instruction list."""
+        text, found = self.scope.source.text, None
+        if text[node.start:node.start + 2].upper() != "IF":
+            found = _CONDITIONAL.search(text, text.rfind("\n", 0, node.start) + 1, node.end)
+        return found[1].upper() if found else "IF"
 
     def _case(self, node: tree.Case) -> None:
         kind = self.scope.settle(node.selector)
@@ -305,6 +313,10 @@ _CHECK: dict[type, Callable[..., None]] = {
     ladder.Ladder: _Statements._rungs, ladder.Rung: _Statements._rungs, sfc.Sfc: _Statements._sfc,
     tree.Return: _Statements._return, tree.Empty: _Statements._empty, tree.RefusedStatement: _Statements._refused,
 }
+
+
+_CONDITIONAL = re.compile(r"(?im)^(?:[ \t]*\w+[ \t]*:)?[ \t]*((?:JMP|CAL|RET)CN?)\b")
+"""An instruction that is executed if the current result is TRUE or FALSE."""
 
 
 def _untaken(taken: list[tuple[int, int]], low: int, high: int) -> list[tuple[int, int]]:

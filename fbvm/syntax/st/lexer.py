@@ -59,6 +59,12 @@ _LIST_ENDS = re.compile(r"""(?isx) // [^\n]* | \(\* .*? \*\) | /\* .*? \*/ | \{ 
 """What is passed over in an instruction list, what ends it, and what shows that it is none."""
 _FIRST = re.compile(r"[ \t]*(?:\w+[ \t]*:[ \t]*)?")
 """What may stand on its line in front of the first instruction of an instruction list."""
+_LABEL_BEHIND = re.compile(r"[ \t]+[A-Za-z_]\w*[ \t]*(?:\r?\n|\(\*|//)")
+_FORMAL_CALL = re.compile(r"""(?isx) [ \t]* \( [ \t]* \r?\n [^()]* \n [ \t]* \) [ \t]* \r?\n \s*
+                          (?: ST | S | R | CAL | RET | JMP | ADD | SUB | MUL | DIV | AND | OR | XOR | GT | GE | EQ | NE | LE
+                          | LT) C? N? [ \t\r\n] """)
+"""What stands behind the name of a function with which an instruction list begins: arguments on lines of their own, and an
+operator on the line behind them."""
 _END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")
 
 
@@ -221,6 +227,8 @@ class Lexer:
                 if kind in in_context:
                     kind, at = self._word_in_context(lex, before, kind, start, at)
                     word = text[start:at]
+                elif before == "END_VAR" and _FORMAL_CALL.match(text, at) and (last := self._instruction_list(start)):
+                    kind, at, word = "INSTRUCTION_LIST", last, text[start:last]
                 elif before == "AT" or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
                     word = text[start:at]
@@ -245,6 +253,8 @@ class Lexer:
         """The terminal of a word that depends on the text behind the word, and where its token ends."""
         condition = lex.conditions.get(kind)
         if condition is not None and not condition.match(self.text, end):
+            if kind == "JMP" and _LABEL_BEHIND.match(self.text, end) and (last := self._instruction_list(start)):
+                return "INSTRUCTION_LIST", last
             kind = "NAME"
         if kind == "MISSPELT" and (joined := _joined(self.text, start, end)):
             self.forms.append(Form("joined_words", start, end, (
