@@ -69,6 +69,7 @@ class Dialect:
     spaced_durations: bool = False
     ampersand_refers: bool = False
     bits_by_name: bool = False
+    generic_functions: bool = False
 
 
 QUESTIONS = {
@@ -154,6 +155,7 @@ QUESTIONS = {
     "spaced_durations": ("T# 30s, TIME# 5ms", "an error", "T#30s, with a warning (S0193)"),
     "ampersand_refers": ("p := &x", "an error", "REF(x)"),
     "bits_by_name": ("w.%Xk, where k is a CONSTANT", "an error", "the bit k"),
+    "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
     "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -188,7 +190,7 @@ _ROWS = (
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
-            short_circuits=True, ampersand_refers=True, bits_by_name=True),
+            short_circuits=True, ampersand_refers=True, bits_by_name=True, generic_functions=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

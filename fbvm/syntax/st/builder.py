@@ -44,6 +44,8 @@ class Builder:
         self.diagnostics: list[Diagnostic] = []
         self.forms: list[Form] = []
         """What only some dialects take."""
+        self.generic_types: dict[str, str] = {}
+        """Generic types of the function that is being read, in capitals -> the kind of each, as ANY_NUM."""
         self.errors = 0
         self.odd: list[int] = []
         """Ends of unknown characters that were passed over, and of strings without end."""
