@@ -65,7 +65,7 @@ class SourceBuilder(SfcElements):
     def generics(self, opener: Token, types: list[tuple[Token, Token]], closer: Token) -> None:
         """`<T : ANY_NUM>`: in the POU T means ANY_NUM, which is one type in each call."""
         self.forms.append(Form("generic_functions", opener.start, closer.end, (
-            "S0901", "generic types behind the name of a function are of RuSTy", "declare the parameters as ANY_NUM or the like")))
+            "S0901", "generic types behind the name of a function are of RuSTy", "declare the parameters as ANY_NUM and so on")))
         self.generic_types = {token.text.upper(): kind.text for token, kind in types}
         if len({kind.text.upper() for _, kind in types}) < len(types):
             self.report("S0901", opener.start, closer.end, "two generic types of one kind are not told apart",
