@@ -70,6 +70,7 @@ class Dialect:
     ampersand_refers: bool = False
     bits_by_name: bool = False
     generic_functions: bool = False
+    own_in_outs: bool = False
 
 
 QUESTIONS = {
@@ -156,6 +157,8 @@ QUESTIONS = {
     "ampersand_refers": ("p := &x", "an error", "REF(x)"),
     "bits_by_name": ("w.%Xk, where k is a CONSTANT", "an error", "the bit k"),
     "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
+    "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
+                    "a variable of the program, with a warning (S0193)"),
     "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -178,7 +181,7 @@ _ROWS = (
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
-            fixed_counters=True, names_of_edition_2=True, spaced_durations=True),
+            fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
