@@ -193,7 +193,8 @@ _ROWS = (
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
-            short_circuits=True, ampersand_refers=True, bits_by_name=True, generic_functions=True),
+            short_circuits=True, ampersand_refers=True, bits_by_name=True, zero_durations=True,
+            generic_functions=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
@@ -208,9 +209,9 @@ def dialect(name: str) -> Dialect:
     return DIALECTS[name.lower()]
 
 
-def takers(switch: str) -> str:
-    """The option for a dialect with a switch set, for hints: `--dialect codesys, twincat or rusty`."""
-    *names, last = (row.name for row in DIALECTS.values() if getattr(row, switch))
+def takers(switch: str, value: bool = True) -> str:
+    """The option for a dialect with a switch set, or not set, for hints: `--dialect codesys, twincat or rusty`."""
+    *names, last = (row.name for row in DIALECTS.values() if bool(getattr(row, switch)) is value)
     return f"--dialect {', '.join(names)} or {last}" if names else f"--dialect {last}"
 
 

@@ -135,7 +135,7 @@ class _Statements:
                 self.error("S0193", node.call, "this statement does nothing", "`=` compares, `:=` assigns" if compares else "")
                 return
             self.error("S0401", node.call, "this is no statement: it does nothing", "`=` compares, `:=` assigns" if compares else
-                       "write () behind an instance to call it, or := to assign")
+                       f"write () behind an instance to call it, := to assign, or take {takers('idle_statements')}")
 
     def _bare_action(self, node: tree.CallStatement) -> None:
         """Check an ACTION that is named without (): a call in some dialects."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
     AnyType,
@@ -304,7 +305,7 @@ class _Interface:
             what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"
             if variable.kind == "VAR_INPUT" and self.pou.is_routine:
                 self._error("S0903", declared.spec, f"{what} as an input is not in the dialect {self.scope.dialect.name}",
-                            "declare it in VAR_IN_OUT, or VAR_IN_OUT CONSTANT")
+                            f"declare it in VAR_IN_OUT, or take {takers('no_open_inputs', False)}")
             else:
                 self._error("S0205", declared.spec, f"{what} cannot be {variable.kind} of a {self.pou.kind}",
                             "declare it in VAR_IN_OUT" + ("; only a FUNCTION takes it as VAR_INPUT" if

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, DATE, Elementary, EnumType, StringType, StructType, Type, common
-from fbvm.check.expressions.assignability import UNSIGNED, conversion_hint, convertible
+from fbvm.check.expressions.assignability import UNSIGNED, conversion_hint, convertible, is_untyped
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT
@@ -18,7 +18,25 @@ def report_undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, w
         hint = _logic_hint(expr.op, left, right, want)
     if hint is None:
         hint = _number_hint(scope, expr, left, right)
+    switch = _switch(expr.op, left, right)
+    if switch and "--dialect" not in hint:
+        hint += f", or take {takers(switch)}" if hint else f"take {takers(switch)}"
     scope.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
+
+
+def _switch(op: str, left: Type, right: Type) -> str:
+    """The switch of the dialects in which an operator is defined for the types; "" if there are none."""
+    whole = [kind is UNTYPED_INT or is_any(kind, "ANY_INT", "ANY_BIT") and kind != BOOL for kind in (left, right)]
+    timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
+    if op in ("AND", "OR", "XOR") and all(whole):
+        return "integers_and_bits"
+    if op == "*" and timed == [False, True] and (whole[0] or is_untyped(left) or is_any(left, "ANY_NUM")):
+        return "number_times_duration"
+    if op in "*/" and timed[0] and is_any(right, "ANY_BIT") and right != BOOL:
+        return "arithmetic_of_bits"
+    if op in "+-" and (timed[0] and whole[1] or op == "+" and whole[0] and timed[1]):
+        return "integers_are_nanoseconds"
+    return ""
 
 
 def _time_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str | None:

@@ -28,7 +28,7 @@ from fbvm.base.types import (
     machine,
 )
 from fbvm.check.expressions import constants
-from fbvm.check.expressions.assignability import as_number, is_untyped
+from fbvm.check.expressions.assignability import UNSIGNED, as_number, is_untyped
 from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.operator_hints import bit_hint, report_undefined
 from fbvm.check.expressions.scope import Scope
@@ -80,8 +80,7 @@ def unary(scope: Scope, expr: tree.Unary, want: Type | None) -> Type | None:
         return scope.infer(meant, want)
     if not good:
         scope.error("S0302", expr, f"{expr.op} is not defined for {kind}",
-                    bit_hint(kind, want) if expr.op == "NOT" else f"convert with {_unsigned(kind)}, or take "
-                    f"{takers('arithmetic_of_bits')}" if is_any(kind, "ANY_BIT") and kind != BOOL else "")
+                    _unary_hint(expr.op, base(kind), want))
         return None
     kind = base(kind)
     value = scope.facts.constants.get(expr.operand)
@@ -90,9 +89,13 @@ def unary(scope: Scope, expr: tree.Unary, want: Type | None) -> Type | None:
     return kind
 
 
-def _unsigned(kind: Type) -> str:
-    """The conversion of a bit string to the number that it is, as `BYTE_TO_USINT(...)`."""
-    return f"{base(kind).name}_TO_{ {1: 'USINT', 2: 'UINT', 4: 'UDINT', 8: 'ULINT'}[kind.size]}(...)"
+def _unary_hint(op: str, kind: Type, want: Type | None) -> str:
+    """What to write where a sign or NOT meets a type for which it is not defined."""
+    if op == "NOT":
+        return bit_hint(kind, want) + (f", or take {takers('integers_and_bits')}" if is_any(kind, "ANY_INT") else "")
+    if kind.name in UNSIGNED:
+        return f"convert with {kind}_TO_{UNSIGNED[kind.name]}(...), or take {takers('arithmetic_of_bits')}"
+    return ""
 
 
 # --- binary -----------------------------------------------------------------------------------------------------
@@ -219,7 +222,12 @@ def _beside_duration(scope: Scope, expr: tree.Binary, left: Type, right: Type) -
     """A comparison of a duration with an integer in a dialect that takes 0, or any integer as nanoseconds: what it means."""
     for side, literal, other in ((expr.left, left, right), (expr.right, right, left)):
         zero = literal is UNTYPED_INT and scope.facts.constants.get(side) == 0
-        if zero and scope.dialect.zero_durations and isinstance(other, Elementary) and is_any(other, "ANY_DURATION"):
+        if not zero or not isinstance(other, Elementary) or not is_any(other, "ANY_DURATION"):
+            continue
+        if not scope.dialect.zero_durations and not scope.dialect.integers_are_nanoseconds:
+            scope.error("S0301", side, f"an integer literal does not fit {other}",
+                        f"a duration is written T#0s, or take {takers('zero_durations')}")
+        elif scope.dialect.zero_durations:
             span = tree.Literal(side.start, side.end, "time", 0, other.name, f"{other.name}#0s")
             left_side, right_side = (span, expr.right) if side is expr.left else (expr.left, span)
             meant = tree.Binary(expr.start, expr.end, expr.op, left_side, right_side, expr.op_start)
