@@ -26,17 +26,27 @@ def report_undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, w
 
 def _switch(op: str, left: Type, right: Type) -> str:
     """The switch of the dialects in which an operator is defined for the types; "" if there are none."""
-    whole = [kind is UNTYPED_INT or is_any(kind, "ANY_INT", "ANY_BIT") and kind != BOOL for kind in (left, right)]
-    timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
-    if op in ("AND", "OR", "XOR") and all(whole):
-        return "integers_and_bits"
-    if op == "*" and timed == [False, True] and (whole[0] or is_untyped(left) or is_any(left, "ANY_NUM")):
-        return "number_times_duration"
-    if op in "*/" and timed[0] and is_any(right, "ANY_BIT") and right != BOOL:
-        return "arithmetic_of_bits"
-    if op in "+-" and (timed[0] and whole[1] or op == "+" and whole[0] and timed[1]):
-        return "integers_are_nanoseconds"
-    return ""
+    kinds = _kind(left), _kind(right)
+    if op in ("AND", "OR", "XOR"):
+        return "integers_and_bits" if set(kinds) <= {"integer", "bits"} else ""
+    return _SWITCHES.get((op, *kinds), "")
+
+
+def _kind(kind: Type) -> str:
+    """What a type is in `_SWITCHES`."""
+    if kind is UNTYPED_INT or is_any(kind, "ANY_INT"):
+        return "integer"
+    if is_any(kind, "ANY_BIT"):
+        return "" if kind == BOOL else "bits"
+    return "duration" if is_any(kind, "ANY_DURATION") else "real" if is_untyped(kind) or is_any(kind, "ANY_REAL") else ""
+
+
+_SWITCHES = {
+    ("*", "integer", "duration"): "number_times_duration", ("*", "real", "duration"): "number_times_duration",
+    ("*", "duration", "bits"): "arithmetic_of_bits", ("/", "duration", "bits"): "arithmetic_of_bits",
+    ("+", "duration", "integer"): "integers_are_nanoseconds", ("-", "duration", "integer"): "integers_are_nanoseconds",
+    ("+", "integer", "duration"): "integers_are_nanoseconds"}
+"""Operator and kinds of its operands -> the switch of the dialects that take it."""
 
 
 def _time_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str | None:

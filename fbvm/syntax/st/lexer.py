@@ -65,6 +65,9 @@ _FORMAL_CALL = re.compile(r"""(?isx) [ \t]* \( [ \t]* \r?\n [^()]* \n [ \t]* \) 
                           | LT) C? N? [ \t\r\n] """)
 """What stands behind the name of a function with which an instruction list begins: arguments on lines of their own, and an
 operator on the line behind them."""
+_PLACES = frozenset(("AT", "END_VAR"))
+"""Terminals behind which a name may begin something that is none."""
+_READ_AGAIN = frozenset(("FOREIGN", "TYPED_LITERAL"))
 _END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")
 
 
@@ -227,19 +230,15 @@ class Lexer:
                 if kind in in_context:
                     kind, at = self._word_in_context(lex, before, kind, start, at)
                     word = text[start:at]
-                elif before == "END_VAR" and _FORMAL_CALL.match(text, at) and (last := self._instruction_list(start)):
-                    kind, at, word = "INSTRUCTION_LIST", last, text[start:last]
-                elif before == "AT" or (before in ends and text.startswith("=", at)):
+                elif before in _PLACES or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
                     word = text[start:at]
             elif kind == "COMMENT":
                 if word[:2] != "//":
                     at = self._comment(start)
                 continue
-            elif kind == "TYPED_LITERAL" and (behind := _BEHIND_DURATION.match(text, start)):
-                word, at = self._duration(start, behind), behind.end()
-            elif kind == "FOREIGN":
-                kind, word = self._foreign(word, start, at)
+            elif kind in _READ_AGAIN:
+                kind, word, at = self._read_again(kind, word, start, at)
                 if not kind:
                     continue
             elif before == "AT":
@@ -274,17 +273,27 @@ class Lexer:
             return self._special(lex, before, kind, start, end)
         return kind, end
 
-    def _duration(self, start: int, found: re.Match[str]) -> str:
-        """The text of a duration of which the pattern of a literal takes only the beginning: `T# 30s`, `T#1.0s500.0ms`."""
-        prefix, value = found[1], self.text[found.end(2):found.end()]
+    def _read_again(self, kind: str, word: str, start: int, end: int) -> tuple[str, str, int]:
+        """Terminal, text and end of an operator of another language, for which the terminal is empty if we have none, or of a
+        literal; of a duration the pattern of literals takes only the beginning in `T# 30s` and `T#1.0s500.0ms`."""
+        if kind == "FOREIGN":
+            return *self._foreign(word, start, end), end
+        found = _BEHIND_DURATION.match(self.text, start)
+        if found is None:
+            return kind, word, end
+        word = found[1] + self.text[found.end(2):found.end()]
         if found[2]:
             self.forms.append(Form("spaced_durations", start, found.end(), (
-                "S0105", "a blank stands behind `#`", f"a duration is written {prefix}{value}"),
-                ("S0193", "a blank stands behind `#`", f"write {prefix}{value}")))
-        return prefix + value
+                "S0105", "a blank stands behind `#`", f"a duration is written {word}"),
+                ("S0193", "a blank stands behind `#`", f"write {word}")))
+        return kind, word, found.end()
 
     def _special(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
-        """The terminal of a token and its end: LOCATION behind AT, `S=` behind an operand; otherwise `kind` and `end`."""
+        """The terminal of a token and its end: LOCATION behind AT, behind END_VAR an instruction list that begins with a formal
+        call, `S=` behind an operand; otherwise `kind` and `end`."""
+        if before == "END_VAR":
+            last = self._instruction_list(start) if _FORMAL_CALL.match(self.text, end) else 0
+            return ("INSTRUCTION_LIST", last) if last else (kind, end)
         pattern, name = (lex.location, "LOCATION") if before == "AT" else (lex.set_assign, "SET_ASSIGN")
         found = pattern.match(self.text, start)
         return (name, found.end()) if found else (kind, end)
