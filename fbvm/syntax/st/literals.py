@@ -233,6 +233,8 @@ def _without_escapes(inner: str, quote: str, digits: int) -> str:
 
 def _without_fractions(text: str) -> str:
     """Advice for a duration with several fractions: the same one without any."""
+    if len(text) > LONGEST:
+        return ""
     parts = re.findall(_DURATION_PART, text)
     rest, written = sum(_scaled(whole, fraction, UNITS_NS[unit.lower()], text) for whole, fraction, unit in parts), ""
     for unit, size_ns in UNITS_NS.items():
