@@ -45,11 +45,12 @@ _JOINED = {"FUNCTIONBLOCK": "FUNCTION_BLOCK", "END_FUNCTIONBLOCK": "END_FUNCTION
 """Those of them that some dialects take, and that are these words at the beginning of a line."""
 
 def _joined(text: str, start: int, end: int) -> str:
-    """The terminal of a word that stands joined at the beginning of a line; "" for other words."""
+    """The terminal of a word that stands joined at the beginning of a line, and is no name; "" for other words."""
     begins = not text[text.rfind("\n", 0, start) + 1:start].strip()
-    return _JOINED.get(text[start:end].upper(), "") if begins else ""
+    return _JOINED.get(text[start:end].upper(), "") if begins and not _USED_AS_NAME.match(text, end) else ""
 
 
+_USED_AS_NAME = re.compile(r"\s*[,:;.(\[^]")
 _END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUNCTION|FUNCTION_BLOCK|PROGRAM|STEP|TRANSITION|"
                      r"ACTION)\b")
 
