@@ -13,6 +13,7 @@ from functools import cached_property
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
+from fbvm.syntax.st.comments import comment_end
 from fbvm.syntax.tree.node import walk
 
 _POUS = ("FUNCTION_BLOCK", "FUNCTION", "PROGRAM")
@@ -25,14 +26,13 @@ _JOINED = ("ACTION", "ACTIONS")
 _ENDS = {"VAR_GLOBAL": "END_VAR", "VAR_CONFIG": "END_VAR", "VAR_ACCESS": "END_VAR"}
 _OPENERS = (*_CUT, *_ENDS, *_JOINED, "CLASS", "INTERFACE", "NAMESPACE")
 _MARK = re.compile(
-    r"//[^\n]*|(?P<comment>\(\*|/\*)|\{[^}]*\}?|'(?:\$.|[^'$\r\n])*'?|\"(?:\$.|[^\"$\r\n])*\"?|"
+    r"//[^\n]*|(?P<comment>\(\*|/\*)|\{\{(?s:.*?)\}\}|\{[^}]*\}?|'(?:\$.|[^'$\r\n])*'?|\"(?:\$.|[^\"$\r\n])*\"?|"
     r"(?<![\w.#%])(?P<word>LADDER|END_VAR|(?:END_)?(?:" + "|".join(_OPENERS) + r"))\b", re.I)
 _END_LADDER = re.compile(r"^[ \t]*END_LADDER\b", re.I | re.M)
 _LADDER = re.compile(r"\bLADDER\b", re.I)
 _TIMER_SYMBOL = re.compile(r"\bAT\s+%?[TC][0-9]", re.I)
 """A symbol of a timer or counter, which rungs in all later declarations of a text may name."""
 _REST_OF_LINE = re.compile(r"[ \t]*;?[ \t]*(?://[^\n]*)?(?:\r?\n)?")
-_SIGNS = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
 
 @dataclass(eq=False)
@@ -226,7 +226,7 @@ def _words(text: str, at: int) -> Iterator[tuple[str, int, int]]:
     while found := _MARK.search(text, at):
         at = found.end()
         if found["comment"]:
-            at = _comment_end(text, found.start())
+            at = end if (end := comment_end(text, found.start())[0]) >= 0 else len(text)
         elif word := found["word"]:
             word = word.upper()
             if word == "LADDER":
@@ -234,19 +234,6 @@ def _words(text: str, at: int) -> Iterator[tuple[str, int, int]]:
                 at = ladder.end() if ladder else len(text)
             else:
                 yield word, found.start(), at
-
-
-def _comment_end(text: str, start: int) -> int:
-    """Where the comment that begins at `start` ends; each kind nests in itself."""
-    opener = text[start:start + 2]
-    depth, at = 1, start + 2
-    while depth:
-        found = _SIGNS[opener].search(text, at)
-        if not found:
-            return len(text)
-        depth += 1 if found[0] == opener else -1
-        at = found.end()
-    return at
 
 
 def _begins_line(text: str, at: int) -> bool:

@@ -114,6 +114,7 @@ CODES: dict[str, Code] = {
         "S0190": "pragma is not known and has no effect",
         "S0191": "name with doubled or trailing underscore",
         "S0192": "characters beyond the type of the literal",
+        "S0193": "only some dialects take it",
         "S0290": "variable is never used",
         "S0291": "instance is never called",
         "S0292": "function never sets its result",

@@ -57,6 +57,23 @@ class Dialect:
     reals_saturate: bool = False
     reals_wrap: bool = False
     ties_away: bool = False
+    comments_end_at_once: bool = False
+    pragmas_of_c: bool = False
+    zero_durations: bool = False
+    first_label_counts: bool = False
+    idle_statements: bool = False
+    idle_constants: bool = False
+    outputs_with_assign: bool = False
+    fixed_counters: bool = False
+    names_of_edition_2: bool = False
+    constants_wrap: bool = False
+    short_circuits: bool = False
+    joined_words: bool = False
+    spaced_durations: bool = False
+    ampersand_refers: bool = False
+    bits_by_name: bool = False
+    generic_functions: bool = False
+    own_in_outs: bool = False
 
 
 QUESTIONS = {
@@ -132,6 +149,28 @@ QUESTIONS = {
     "ties_away": ("REAL_TO_INT(2.5), REAL_TO_INT(50.5); REAL_TO_BYTE(-1.0)",
                   "2, 50: to the nearest, ties to even; bit strings have no negative ones",
                   "3, 51: to the nearest, ties away from 0; bit strings take the low bits, 16#FF"),
+    "comments_end_at_once": ("(* a (* b *): a comment inside a comment", "comments nest: each (* needs its *)",
+                             "the first *) ends the comment"),
+    "pragmas_of_c": ("{{ text of C }}, {disable code generation}, {#include}: pragmas of the generator of matiec",
+                     "{{ }} is an error, the others have no effect (S0190)",
+                     "{{ }} is passed over with a warning (S0190); the others are refused by name (S0901)"),
+    "zero_durations": ("t = 0, where t is a TIME", "an error", "T#0s"),
+    "first_label_counts": ("CASE n OF 1..5: .. 3: ..: a label twice", "an error", "the first one counts, with a warning (S0193)"),
+    "idle_statements": ("a + 1; as a statement", "an error", "worked out, with a warning (S0193)"),
+    "idle_constants": ("VAR CONSTANT k : INT; without a value", "an error", "the first value of its type, as S0193 says"),
+    "outputs_with_assign": ("instance(Q := x), where Q is an output", "an error", "as Q => x"),
+    "fixed_counters": ("FOR i := 1 TO 9 DO i := i + 1; END_FOR", "taken, with a warning (S0590)", "an error (S0504)"),
+    "names_of_edition_2": ("LTIME, LDT, LTOD, LDATE, CHAR, WCHAR as names", "an error", "taken, with a warning (S0193)"),
+    "constants_wrap": ("x : INT := 40000; UDINT_TO_LINT(-1)", "an error", "-25536, cut to the width, with a warning (S0791)"),
+    "short_circuits": ("a AND f(x), a OR f(x) of BOOL", "both sides are worked out",
+                       "as AND_THEN and OR_ELSE: the right side only if the left one leaves the result open"),
+    "joined_words": ("FUNCTIONBLOCK, END_FUNCTIONBLOCK", "an error", "FUNCTION_BLOCK, END_FUNCTION_BLOCK"),
+    "spaced_durations": ("T# 30s, TIME# 5ms", "an error", "T#30s, with a warning (S0193)"),
+    "ampersand_refers": ("p := &x", "an error", "REF(x)"),
+    "bits_by_name": ("w.%Xk, where k is a CONSTANT", "an error", "the bit k"),
+    "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
+    "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
+                    "a variable of the program, with a warning (S0193)"),
     "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -144,7 +183,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
                    bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
-                   instances_are_values=True, action_inputs=True, empty_bodies=True, subranges_unchecked=True,
+                   instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
+                   idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True)
 _ROWS = (
     STANDARD,
@@ -154,19 +194,23 @@ _ROWS = (
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,
-            locals_are_written=True),
+            locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
+            fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
-            integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True),
+            integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
+            constants_wrap=True),
     Dialect("rusty", "programs for RuSTy", reals_of_other_widths=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
-            whole_powers=True),
+            whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
+            short_circuits=True, ampersand_refers=True, bits_by_name=True, zero_durations=True,
+            generic_functions=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
-            refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
+            comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
 DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}
 SWITCHES = tuple(f.name for f in fields(Dialect) if f.name not in ("name", "for_whom"))
@@ -179,9 +223,9 @@ def dialect(name: str) -> Dialect:
     return DIALECTS[name.lower()]
 
 
-def takers(switch: str) -> str:
-    """The option for a dialect with a switch set, for hints: `--dialect codesys, twincat or rusty`."""
-    *names, last = (row.name for row in DIALECTS.values() if getattr(row, switch))
+def takers(switch: str, value: bool = True) -> str:
+    """The option for a dialect with a switch set, or not set, for hints: `--dialect codesys, twincat or rusty`."""
+    *names, last = (row.name for row in DIALECTS.values() if bool(getattr(row, switch)) is value)
     return f"--dialect {', '.join(names)} or {last}" if names else f"--dialect {last}"
 
 
@@ -204,7 +248,6 @@ ALIKE = (
     ("REAL_TO_INT(50.7)", "51 in every dialect: to the nearest; TRUNC cuts."),
     ("Division by zero, a subscript outside, a null or ended pointer", "The program stops with its line and values."),
     ("Integer overflow, ABS(-32768), -(-32768)", "Wraps, in every dialect."),
-    ("AND and OR whose right side has effects", "Both sides are worked out; AND_THEN and OR_ELSE leave out what cannot matter."),
     ("FOR whose limit is the last value of its type", "Ends."),
     ("TIME_TO_DWORD, DWORD_TO_TIME", "Milliseconds modulo 2**32; in seconds under matiec."),
     ("UDINT_TO_DATE(90061)", "D#1970-01-02 with an hour, a minute and a second in it, as in CODESYS and TwinCAT: they count in "

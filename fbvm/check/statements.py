@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 
@@ -129,8 +130,12 @@ class _Statements:
         kind = self.scope.infer(node.call)
         if kind is not None:
             compares = isinstance(node.call, tree.Binary) and node.call.op == "="
+            if self.scope.dialect.idle_statements:
+                self.scope.settle(node.call)
+                self.error("S0193", node.call, "this statement does nothing", "`=` compares, `:=` assigns" if compares else "")
+                return
             self.error("S0401", node.call, "this is no statement: it does nothing", "`=` compares, `:=` assigns" if compares else
-                       "write () behind an instance to call it, or := to assign")
+                       f"write () behind an instance to call it, := to assign, or take {takers('idle_statements')}")
 
     def _bare_action(self, node: tree.CallStatement) -> None:
         """Check an ACTION that is named without (): a call in some dialects."""
@@ -147,9 +152,16 @@ class _Statements:
 
     def _if(self, node: tree.If) -> None:
         for condition, body in node.branches:
-            self.scope.condition(condition, "IF")
+            self.scope.condition(condition, self._conditional(node))
             self.block(body)
         self.block(node.otherwise or ())
+
+    def _conditional(self, node: tree.If) -> str:
+        """The word whose condition is checked: IF, or an instruction of an instruction list."""
+        text, found = self.scope.source.text, None
+        if text[node.start:node.start + 2].upper() != "IF":
+            found = _CONDITIONAL.search(text, text.rfind("\n", 0, node.start) + 1, node.end)
+        return found[1].upper() if found else "IF"
 
     def _case(self, node: tree.Case) -> None:
         kind = self.scope.settle(node.selector)
@@ -168,7 +180,7 @@ class _Statements:
                     self._text_label(label, kind, texts)
             elif kind is not None:
                 self.facts.labels[branch] = tuple(
-                    span for label in branch.labels if (span := self._label(label, kind, taken)) is not None)
+                    span for label in branch.labels for span in self._label(label, kind, taken))
             self.block(branch.body)
         self.block(node.otherwise or ())
 
@@ -193,18 +205,24 @@ class _Statements:
                    "write a literal or the name of a constant")
 
     def _label(self, label: tuple[tree.Expr, tree.Expr | None], kind: Type,
-               taken: list[tuple[int, int]]) -> tuple[int, int] | None:
+               taken: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        """The values that a label stands for and no label above takes, as ranges; none after a diagnostic."""
         low = self._label_value(label[0], kind)
         high = self._label_value(label[1], kind) if label[1] is not None else low
         if low is None or high is None:
-            return None
+            return []
         if low > high:
             self.error("S0503", label[0], f"the range {low}..{high} is empty")
-            return None
+            return []
+        free = _untaken(taken, low, high)
         if _take(taken, low, high):
             shown = f"{low}" if low == high else f"{low}..{high}"
-            self.error("S0503", label[0], f"the label {shown} is taken by a label above")
-        return low, high
+            if self.scope.dialect.first_label_counts:
+                self.error("S0193", label[0], f"the label {shown} is taken by a label above, which counts")
+            else:
+                self.error("S0503", label[0], f"the label {shown} is taken by a label above",
+                           f"take it out, or take {takers('first_label_counts')}, where the first one counts")
+        return free
 
     def _label_value(self, expr: tree.Expr, kind: Type) -> int | None:
         if not self.scope.fit(expr, kind, "S0503", "the label"):
@@ -295,6 +313,22 @@ _CHECK: dict[type, Callable[..., None]] = {
     ladder.Ladder: _Statements._rungs, ladder.Rung: _Statements._rungs, sfc.Sfc: _Statements._sfc,
     tree.Return: _Statements._return, tree.Empty: _Statements._empty, tree.RefusedStatement: _Statements._refused,
 }
+
+
+_CONDITIONAL = re.compile(r"(?im)^(?:[ \t]*\w+[ \t]*:)?[ \t]*((?:JMP|CAL|RET)CN?)\b")
+"""An instruction that is executed if the current result is TRUE or FALSE."""
+
+
+def _untaken(taken: list[tuple[int, int]], low: int, high: int) -> list[tuple[int, int]]:
+    """The parts of low..high that are in none of the ranges `taken`, which are sorted and apart."""
+    free: list[tuple[int, int]] = []
+    for first, last in taken[bisect_left(taken, low, key=lambda span: span[1]):]:
+        if first > high:
+            break
+        if low < first:
+            free.append((low, first - 1))
+        low = last + 1
+    return [*free, (low, high)] if low <= high else free
 
 
 def _take(taken: list[tuple[int, int]], low: int, high: int) -> bool:

@@ -31,7 +31,7 @@ def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple
     except Stop:
         read = automaton.values[0] if automaton.values else []
         tree = SourceText(0, len(source.text), tuple(read))
-    tree.pragmas = tuple(lexer.pragmas)
+    tree.pragmas, tree.forms = tuple(lexer.pragmas), (*lexer.forms, *builder.forms)
     return tree, sorted(builder.diagnostics, key=Diagnostic.order)
 
 

@@ -18,6 +18,7 @@ from fbvm.syntax.tree import (
     Actions,
     Block,
     Declaration,
+    Form,
     Name,
     NamedType,
     Pou,
@@ -58,7 +59,19 @@ class SourceBuilder(SfcElements):
         parts += [(word.text.upper(), name) for name in names]
         return parts
 
-    def pou_head(self, modifiers: list[Token], token: Token, inheritance: list[tuple[str, NamedType]]) -> Head:
+    def generic_type(self, token: Token, colon: Token, kind: Token) -> tuple[Token, Token]:
+        return token, kind
+
+    def generics(self, opener: Token, types: list[tuple[Token, Token]], closer: Token) -> None:
+        """`<T : ANY_NUM>`: in the POU T means ANY_NUM, which is one type in each call."""
+        self.forms.append(Form("generic_functions", opener.start, closer.end, (
+            "S0901", "generic types behind the name of a function are of RuSTy", "declare the parameters as ANY_NUM and so on")))
+        self.generic_types = {token.text.upper(): kind.text for token, kind in types}
+        if len({kind.text.upper() for _, kind in types}) < len(types):
+            self.report("S0901", opener.start, closer.end, "two generic types of one kind are not told apart",
+                        "give them two kinds, such as ANY_NUM and ANY_INT")
+
+    def pou_head(self, modifiers: list[Token], token: Token, generics: None, inheritance: list[tuple[str, NamedType]]) -> Head:
         words = tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers)
         return Head(self.declared(token), words, tuple(each for word, each in inheritance if word == "EXTENDS"),
                     tuple(each for word, each in inheritance if word == "IMPLEMENTS"))
@@ -85,7 +98,9 @@ class SourceBuilder(SfcElements):
         body = self._without_jumps(body, declared)
         if self.charted or any(isinstance(each, Step | Transition) for each in elements):
             body, actions = self._charts(word, body, elements, actions, declared)
-        return Pou(word.start, end.end, word.text.upper(), head.name, result, tuple(declared), body, tuple(refused),
+        self.generic_types = {}
+        kind = "FUNCTION_BLOCK" if word.type == "FUNCTION_BLOCK" else word.text.upper()
+        return Pou(word.start, end.end, kind, head.name, result, tuple(declared), body, tuple(refused),
                    tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods))
 
     def interface(self, word: Token, head: Head, members: list[Members], end: Token) -> Pou:

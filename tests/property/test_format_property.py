@@ -23,7 +23,7 @@ from fbvm.syntax.formatter.formatter import REFUSED, formatted
 from fbvm.syntax.formatter.names import Spelling
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.lexer import Lexer, Token, lexis
-from fbvm.syntax.tree import Literal, Node, SourceText
+from fbvm.syntax.tree import Form, Literal, Node, SourceText
 from fbvm.syntax.tree.node import names_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -96,6 +96,8 @@ def meaning(value: Any) -> Any:
     """A tree as plain data without places, names without case, values to the letter."""
     if isinstance(value, Literal):
         return value.kind, repr(value.value), value.type_name
+    if isinstance(value, Form):
+        return value.switch, value.taken
     if isinstance(value, Node):
         return type(value).__name__, [meaning(getattr(value, name)) for name in names_of(value) if name not in PLACES]
     if isinstance(value, tuple):

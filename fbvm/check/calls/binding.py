@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, EnumType, RefType, StringType, Type, derives, fold, followed
 from fbvm.check.calls.arguments import MIXED, MIXED_HINT, mixed, output
 from fbvm.check.expressions import references
@@ -99,9 +100,11 @@ def _named(scope: Scope, argument: tree.Argument, pou: Pou, bound: PouCall, give
     variable = next((v for v in pou.order if fold(v.name) == name and v.kind in PARAMETER_KINDS), None)
     if variable is None:
         _implicit(scope, argument, name, pou, bound)
-    elif (variable.kind == "VAR_OUTPUT") != (argument.kind == "=>"):
+    elif (variable.kind == "VAR_OUTPUT") != (argument.kind == "=>") and not (
+            variable.kind == "VAR_OUTPUT" and scope.dialect.outputs_with_assign):
         arrow = "=>" if variable.kind == "VAR_OUTPUT" else ":="
-        scope.error("S0402", argument, f"{variable.name} is {_described(variable)}: write {variable.name} {arrow} ...")
+        others = f"or take {takers('outputs_with_assign')}" if variable.kind == "VAR_OUTPUT" else ""
+        scope.error("S0402", argument, f"{variable.name} is {_described(variable)}: write {variable.name} {arrow} ...", others)
     elif argument.value is not None:
         _pass(scope, argument, variable, bound)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, TIME, UINT, StructType, Type, base, fold
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
@@ -63,7 +64,7 @@ class Configurations:
             task = TaskFact("", LOWEST, 0)
             self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name)
             self.context.tasks.append(task)
-            self._unconnected(programs[0], programs[0].source, programs[0].tree.name, "")
+            self._unconnected(programs[0], task, programs[0].source, programs[0].tree.name, "")
 
     def begin_tasks(self) -> None:
         """Let each task call, in front of its programs, what libraries that tell programs about their tasks want called."""
@@ -100,14 +101,28 @@ class Configurations:
         self._run.append(instance)
         task.runs.append(Run(instance, pou))
 
-    def _unconnected(self, pou: Pou, source: Source, node: tree.Node, connection: str) -> None:
-        """Report an in-out of a program that nothing is connected to."""
-        in_outs = pou.parameters("VAR_IN_OUT")
-        if in_outs:
-            name, role = in_outs[0].name, in_outs[0].role_of_parameter
+    def _unconnected(self, pou: Pou, task: TaskFact, source: Source, node: tree.Name, connection: str) -> None:
+        """Report an in-out of a program that nothing is connected to; in some dialects it gets a variable of its own."""
+        in_outs = [variable for variable in pou.parameters("VAR_IN_OUT") if not variable.by_reference]
+        name, role = next(((v.name, v.role_of_parameter) for v in pou.parameters("VAR_IN_OUT")), ("", ""))
+        if in_outs and self.project.dialect.own_in_outs and name == in_outs[0].name:
+            self._connect(node, node.end, tuple(self._own(variable, node, source) for variable in in_outs), task, source)
+        elif name:
             self.report.add("S0404", source, node, f"the {role} {name} of {pou.name} is missing: a task runs the program",
-                            f"connect a variable: {connection.format(name)}" if connection else
-                            "use a VAR_GLOBAL, or connect a variable in a CONFIGURATION")
+                            (f"connect a variable: {connection.format(name)}" if connection else
+                             "use a VAR_GLOBAL, or connect a variable in a CONFIGURATION") +
+                            f", or take {takers('own_in_outs')}")
+
+    def _own(self, in_out: Variable, node: tree.Name, source: Source) -> tree.Argument:
+        """The connection of an in-out of a program with a hidden variable."""
+        made = Variable(f"{node.text} {in_out.name}", in_out.type, "VAR_GLOBAL", source, node, place="abs",
+                        initial=in_out.initial)
+        self.context.global_order.append(made)
+        self.project.globals["", fold(made.name)] = made
+        self.report.add("S0193", in_out.source, in_out.node, f"nothing is connected to the in-out {in_out.name}: it is a "
+                        "variable of the program")
+        return tree.Argument(node.start, node.end, ":=", tree.Name(node.start, node.end, in_out.name),
+                             tree.NameRef(node.start, node.end, made.name))
 
     def _configuration(self, configuration: tree.Configuration, source: Source) -> None:
         for refused in configuration.refused:
@@ -172,18 +187,18 @@ class Configurations:
         elif pou.type is not None:
             self._instance(program.name.text, pou, task, source, program.name)
             if program.connections:
-                self._connect(program, task, source)
+                self._connect(program.name, program.end, program.connections, task, source)
             else:
-                self._unconnected(pou, source, program.name, f"{program.type_name.text}({{}} := ...)")
+                self._unconnected(pou, task, source, program.name, f"{program.type_name.text}({{}} := ...)")
             return True
         return False
 
-    def _connect(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
+    def _connect(self, name: tree.Name, end: int, connections: tuple[tree.Argument, ...], task: TaskFact,
+                 source: Source) -> None:
         """Make a body for a program with connections: the task runs the body, which calls the instance with them."""
-        name = program.name
-        call = tree.Call(name.start, program.end, tree.NameRef(name.start, name.end, name.text), program.connections)
-        runner = tree.Pou(name.start, program.end, "PROGRAM", tree.Name(name.start, name.end, f"{name.text} run"), None, (),
-                          (tree.CallStatement(name.start, program.end, call),))
+        call = tree.Call(name.start, end, tree.NameRef(name.start, name.end, name.text), connections)
+        runner = tree.Pou(name.start, end, "PROGRAM", tree.Name(name.start, name.end, f"{name.text} run"), None, (),
+                          (tree.CallStatement(name.start, end, call),))
         pou = Pou(runner.name.text, "PROGRAM", source, runner)
         self.context.check_body(pou)
         task.runs[-1] = Run(task.runs[-1].instance, pou)

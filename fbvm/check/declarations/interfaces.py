@@ -31,7 +31,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Edge, Pou, Variable, is_block, is_open
 from fbvm.check.symbols.project import Resolved
-from fbvm.check.symbols.statement_lists import writes_eno
+from fbvm.check.symbols.statement_lists import names_of_eno, writes_eno
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import passes_places
 
@@ -79,6 +79,8 @@ class _Interface:
         pou.later = {}
         for name in sorted(self.project.tasked(pou.name)) if pou.kind == "PROGRAM" else ():
             self._tasked(name)
+        for name in sorted(names_of_eno(pou)):
+            self._eno(name)
         if self.at_start:
             pou.tree, pou.as_written = initializers.with_assignments(pou, self.at_start), False
         if pou.tree.result is not None:
@@ -124,6 +126,13 @@ class _Interface:
             flag = Variable(f"{block.name} task", BOOL, "VAR", self.pou.source, block.node, self.pou, initial=b"\0")
             self.pou.order.append(flag)
             self.pou.tasked[block] = flag
+
+    def _eno(self, name: str) -> None:
+        """Declare the hidden variable that says whether the last call of an instance has run it."""
+        block = self.pou.variables.get(name)
+        if block is not None and block.owner is self.pou and block.kind == "VAR" and is_block(block.type):
+            block.eno = Variable(f"{block.name} ENO", BOOL, "VAR", self.pou.source, block.node, self.pou, initial=b"\0")
+            self.pou.order.append(block.eno)
 
     def _action(self, action: tree.Action, source: Source) -> None:
         """Make the POU of an ACTION: a body of its own, with the variables of the POU that it belongs to."""
@@ -303,7 +312,7 @@ class _Interface:
             what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"
             if variable.kind == "VAR_INPUT" and self.pou.is_routine:
                 self._error("S0903", declared.spec, f"{what} as an input is not in the dialect {self.scope.dialect.name}",
-                            "declare it in VAR_IN_OUT, or VAR_IN_OUT CONSTANT")
+                            f"declare it in VAR_IN_OUT, or take {takers('no_open_inputs', False)}")
             else:
                 self._error("S0205", declared.spec, f"{what} cannot be {variable.kind} of a {self.pou.kind}",
                             "declare it in VAR_IN_OUT" + ("; only a FUNCTION takes it as VAR_INPUT" if

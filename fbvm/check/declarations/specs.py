@@ -308,7 +308,7 @@ def _enumeration(scope: Scope, spec: tree.EnumSpec, name: str) -> Resolved | Non
     shown: dict[int, str] = {}
     following = 0
     for member, written in spec.members:
-        refuse_reserved(scope.project.report, scope.source, member)
+        refuse_reserved(scope.project.report, scope.source, member, scope.dialect)
         value = integer(scope, written, members) if written is not None else following
         if value is None:
             return None

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import ArrayType, StructType, fold, on_bits
+from fbvm.base.dialects import takers
+from fbvm.base.types import ArrayType, Elementary, EnumType, StringType, StructType, base, fold, on_bits
 from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.locations import location_of
 from fbvm.check.declarations.specs import resolve, resolve_parameter
+from fbvm.check.expressions.constants import decode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Variable, is_block
@@ -67,7 +69,7 @@ def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, sec
                   resolved: Resolved) -> Variable:
     """One variable as declared, with its location but without a place."""
     report, facts = context.report, context.facts
-    refuse_reserved(report, source, name)
+    refuse_reserved(report, source, name, context.project.dialect)
     kind, initial = resolved
     words = {fold(q.text) for q in section.qualifiers}
     made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
@@ -79,7 +81,12 @@ def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, sec
         report.add("S0206", source, name, "an instance cannot be CONSTANT")
     elif made.constant and section.kind not in ("VAR_INPUT", "VAR_IN_OUT"):  # these the caller gives
         if declared.initial is None and not isinstance(kind, StructType | ArrayType):
-            report.add("S0701", source, name, f"the constant {name.text} has no value", "write := and its value")
+            if context.project.dialect.idle_constants:
+                report.add("S0193", source, name, f"the constant {name.text} has no value, and keeps the first one of its type")
+                made.value = decode(kind, initial) if isinstance(base(kind), Elementary | EnumType | StringType) else None
+            else:
+                report.add("S0701", source, name, f"the constant {name.text} has no value",
+                           f"write := and its value, or take {takers('idle_constants')}")
         elif isinstance(declared.initial, tree.Expr):
             made.wrong = declared.initial in facts.wrong
             made.value = None if made.wrong else facts.constants.get(declared.initial)

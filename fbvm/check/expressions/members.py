@@ -76,12 +76,27 @@ def _field(scope: Scope, expr: tree.Member, whole: StructType) -> Type | None:
                               objects.is_own_instance(scope, expr.of) and field.kind != "VAR_INST"):
         scope.facts.fields[expr] = field
         return field.type
+    eno = _eno(scope, expr) if field is None and whole.block else None
+    if eno is not None:
+        return eno
     if field is not None:
         unknown_names.report_internal(scope, name, field, whole)
     elif not whole.block or not scope.context.block_of(whole).is_failed(name.text):
         readable = [f.name for f in whole.fields.values() if not whole.block or f.kind in READABLE]
         scope.error("S0210", name, f"{whole} has no {name.text}", scope.project.choices(name.text, readable))
     return None
+
+
+def _eno(scope: Scope, expr: tree.Member) -> Type | None:
+    """BOOL for `instance.ENO` of a block that declares none: whether its last call in this POU has run it."""
+    variable = scope.facts.variables.get(expr.of)
+    if fold(expr.name.text) != "ENO" or variable is None or variable.eno is None:
+        return None
+    meant = tree.NameRef(expr.start, expr.end, variable.eno.name)
+    scope.facts.rewritten[expr] = meant
+    scope.facts.variables[meant] = variable.eno
+    scope.facts.types[meant] = BOOL
+    return BOOL
 
 
 def _is_readable_local(scope: Scope, whole: StructType, field: Field) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, DATE, Elementary, EnumType, StringType, StructType, Type, common
-from fbvm.check.expressions.assignability import UNSIGNED, conversion_hint, convertible
+from fbvm.check.expressions.assignability import UNSIGNED, conversion_hint, convertible, is_untyped
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT
@@ -18,7 +18,35 @@ def report_undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, w
         hint = _logic_hint(expr.op, left, right, want)
     if hint is None:
         hint = _number_hint(scope, expr, left, right)
+    switch = _switch(expr.op, left, right)
+    if switch and "--dialect" not in hint:
+        hint += f", or take {takers(switch)}" if hint else f"take {takers(switch)}"
     scope.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
+
+
+def _switch(op: str, left: Type, right: Type) -> str:
+    """The switch of the dialects in which an operator is defined for the types; "" if there are none."""
+    kinds = _kind(left), _kind(right)
+    if op in ("AND", "OR", "XOR"):
+        return "integers_and_bits" if set(kinds) <= {"integer", "bits"} else ""
+    return _SWITCHES.get((op, *kinds), "")
+
+
+def _kind(kind: Type) -> str:
+    """What a type is in `_SWITCHES`."""
+    if kind is UNTYPED_INT or is_any(kind, "ANY_INT"):
+        return "integer"
+    if is_any(kind, "ANY_BIT"):
+        return "" if kind == BOOL else "bits"
+    return "duration" if is_any(kind, "ANY_DURATION") else "real" if is_untyped(kind) or is_any(kind, "ANY_REAL") else ""
+
+
+_SWITCHES = {
+    ("*", "integer", "duration"): "number_times_duration", ("*", "real", "duration"): "number_times_duration",
+    ("*", "duration", "bits"): "arithmetic_of_bits", ("/", "duration", "bits"): "arithmetic_of_bits",
+    ("+", "duration", "integer"): "integers_are_nanoseconds", ("-", "duration", "integer"): "integers_are_nanoseconds",
+    ("+", "integer", "duration"): "integers_are_nanoseconds"}
+"""Operator and kinds of its operands -> the switch of the dialects that take it."""
 
 
 def _time_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str | None:

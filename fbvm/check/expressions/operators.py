@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
     DATE,
@@ -27,7 +28,7 @@ from fbvm.base.types import (
     machine,
 )
 from fbvm.check.expressions import constants
-from fbvm.check.expressions.assignability import as_number, is_untyped
+from fbvm.check.expressions.assignability import UNSIGNED, as_number, is_untyped
 from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.operator_hints import bit_hint, report_undefined
 from fbvm.check.expressions.scope import Scope
@@ -73,15 +74,28 @@ def unary(scope: Scope, expr: tree.Unary, want: Type | None) -> Type | None:
         good = is_any(kind, *_family(scope, "AND"))
     else:
         good = is_untyped(kind) or is_any(kind, "ANY_NUM", "ANY_DURATION")
+    if not good and is_any(kind, "ANY_BIT") and kind != BOOL and scope.dialect.arithmetic_of_bits:
+        zero = tree.Literal(expr.start, expr.start, "int", 0, base(kind).name, f"{base(kind).name}#0")
+        scope.facts.rewritten[expr] = meant = tree.Binary(expr.start, expr.end, expr.op, zero, expr.operand, expr.start)
+        return scope.infer(meant, want)
     if not good:
         scope.error("S0302", expr, f"{expr.op} is not defined for {kind}",
-                    bit_hint(kind, want) if expr.op == "NOT" else "")
+                    _unary_hint(expr.op, base(kind), want))
         return None
     kind = base(kind)
     value = scope.facts.constants.get(expr.operand)
     if value is not None:
         scope.facts.constants[expr] = constants.unary(expr.op, kind, value)
     return kind
+
+
+def _unary_hint(op: str, kind: Type, want: Type | None) -> str:
+    """What to write where a sign or NOT meets a type for which it is not defined."""
+    if op == "NOT":
+        return bit_hint(kind, want) + (f", or take {takers('integers_and_bits')}" if is_any(kind, "ANY_INT") else "")
+    if kind.name in UNSIGNED:
+        return f"convert with {kind}_TO_{UNSIGNED[kind.name]}(...), or take {takers('arithmetic_of_bits')}"
+    return ""
 
 
 # --- binary -----------------------------------------------------------------------------------------------------
@@ -117,6 +131,8 @@ def _meant(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
         return _power(scope, expr, left, right, want)
     if isinstance(left, RefType) or isinstance(right, RefType):
         return _reference(scope, expr)
+    if expr.op in COMPARISONS and (spans := _beside_duration(scope, expr, left, right)) is not None:
+        return scope.infer(spans)
     timed = _time(scope, expr, left, right)
     if timed is not None:
         return _folded(scope, expr, timed, timed)
@@ -202,12 +218,31 @@ def _as_numbers(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: 
     return _folded(scope, expr, kind, BOOL if expr.op in COMPARISONS else result)
 
 
+def _beside_duration(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> tree.Binary | None:
+    """A comparison of a duration with an integer in a dialect that takes 0, or any integer as nanoseconds: what it means."""
+    for side, literal, other in ((expr.left, left, right), (expr.right, right, left)):
+        zero = literal is UNTYPED_INT and scope.facts.constants.get(side) == 0
+        if not zero or not isinstance(other, Elementary) or not is_any(other, "ANY_DURATION"):
+            continue
+        if not scope.dialect.zero_durations and not scope.dialect.integers_are_nanoseconds:
+            scope.error("S0301", side, f"an integer literal does not fit {other}",
+                        f"a duration is written T#0s, or take {takers('zero_durations')}")
+        elif scope.dialect.zero_durations:
+            span = tree.Literal(side.start, side.end, "time", 0, other.name, f"{other.name}#0s")
+            left_side, right_side = (span, expr.right) if side is expr.left else (expr.left, span)
+            meant = tree.Binary(expr.start, expr.end, expr.op, left_side, right_side, expr.op_start)
+            scope.facts.rewritten[expr] = meant
+            return meant
+    return _nanoseconds(scope, expr, left, right)
+
+
 def _nanoseconds(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> tree.Binary | None:
     """A sum of a duration and an integer in a dialect that takes integers as nanoseconds: what it means."""
     integer = [kind is UNTYPED_INT or is_any(kind, "ANY_INT") for kind in (left, right)]
     duration = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
     turned = integer[0] and duration[1] and expr.op == "+"
-    if not scope.dialect.integers_are_nanoseconds or expr.op not in ("+", "-") or \
+    turned = turned or integer[0] and duration[1] and expr.op in COMPARISONS
+    if not scope.dialect.integers_are_nanoseconds or expr.op not in ("+", "-", *COMPARISONS) or \
             not (turned or duration[0] and integer[1]):
         return None
     kind, number = (right, expr.left) if turned else (left, expr.right)
@@ -314,7 +349,7 @@ def _time(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> Type | No
         scope.facts.operands[expr] = result
         return result
     if expr.op in "*/" and is_any(left, "ANY_DURATION") and \
-            (is_untyped(right) or is_any(right, "ANY_NUM")):
+            (is_untyped(right) or is_any(as_number(right, scope.dialect), "ANY_NUM")):
         if is_untyped(right):
             scope.adopt(expr.right, LINT if right is UNTYPED_INT else LREAL)
         scope.facts.operands[expr] = left

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
     DINT,
@@ -193,17 +194,33 @@ class Scope:
                 not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
             self._misfits(expr, untyped, target, code)
             return None
-        span = limits(target)
-        if span is not None and not span[0] <= value <= span[1]:
-            self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}",
-                       literal_hint(value, kind) if kind == BOOL else "")
+        within = self._within(expr, value, target, kind)
+        if within is None:
             return None
+        value = within
         self.facts.constants[expr] = held = convert(value, kind)
         self.unbounded(expr, (value,))
         if untyped is UNTYPED_INT and isinstance(held, float) and held != value:
             self.loses(expr, "S0791", f"{kind} cannot hold {value}: it becomes {held:.0f}")
         self.facts.types[expr] = target
         return target
+
+    def _within(self, expr: tree.Expr, value: int | float, target: Type, kind: Type) -> int | float | None:
+        """The value of an expression of literals if a type holds it, or cut to its width in a dialect that does so; None after
+        a diagnostic."""
+        span = limits(target)
+        if span is None or span[0] <= value <= span[1]:
+            return value
+        cuts = not isinstance(target, SubrangeType) and kind != BOOL
+        if not cuts or not self.dialect.constants_wrap:
+            others = f"take {takers('constants_wrap')}, where it is cut to the width of {target}" if cuts else ""
+            self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}",
+                       literal_hint(value, kind) if kind == BOOL else others)
+            return None
+        held = cut(value, kind)
+        assert isinstance(held, int | float)
+        self.loses(expr, "S0791", f"{target} cannot hold {value}: it becomes {held}")
+        return held
 
     def takes_power(self, expr: tree.Expr, kind: Type) -> bool:
         """True for a power of integers whose value a dialect takes where an integer is needed; a warning where it has to."""

@@ -7,7 +7,7 @@ from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
 from fbvm.check.expressions import objects
 from fbvm.check.expressions.scope import Scope
-from fbvm.check.symbols.facts import Facts, Variable
+from fbvm.check.symbols.facts import Facts, Variable, is_block
 from fbvm.syntax import tree
 
 _WRITTEN_BY_OWN_BODY = {"VAR": "a variable of its own body", "VAR_OUTPUT": "an output"}
@@ -62,7 +62,8 @@ def _is_writable_variable(scope: Scope, expr: tree.Expr, variable: Variable, pur
         return False
     if variable.constant and variable.by_reference:
         scope.error("S0501", expr, f"{variable.name} is an input that is read where it lies, and cannot {purpose}",
-                    "make it a VAR_IN_OUT", (variable.source, variable.node.start, "declared here"))
+                    "make it a VAR_IN_OUT" + (f", or take {takers('instances_are_values')}" if is_block(variable.type) else ""),
+                    (variable.source, variable.node.start, "declared here"))
         return False
     if variable.constant:
         scope.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
@@ -135,5 +136,6 @@ def warn_of_written_counter(scope: Scope, expr: tree.Expr) -> None:
     written = place(scope.facts, expr)
     for counter in scope.counters if written else ():
         if counter and all(a == b for a, b in zip(written or (), counter, strict=False)):
-            scope.error("S0590", expr, f"{scope.text(expr)} counts the FOR loop and is written inside it")
+            scope.error("S0504" if scope.dialect.fixed_counters else "S0590", expr,
+                        f"{scope.text(expr)} counts the FOR loop and is written inside it")
             return

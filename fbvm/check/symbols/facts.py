@@ -64,6 +64,8 @@ class Variable:
     role: str = ""
     """"step" or "action" for the flags of one, which programs only read."""
     written: bool = False
+    eno: Variable | None = None
+    """Of an instance of whose last call `name.ENO` is read: the hidden variable that says whether it ran."""
     space: str = ""
     """The name of the list that declares a global variable; with `qualified` it must stand in front of its name."""
     qualified: bool = False

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
-from fbvm.base.dialects import STANDARD, Dialect
+from fbvm.base.dialects import STANDARD, Dialect, takers
 from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.symbols.dependencies import Dependencies, Key
 from fbvm.check.symbols.facts import Facts, Pou, Variable
@@ -123,6 +123,7 @@ class Project:
 
     def collect(self, text: tree.SourceText, source: Source) -> None:
         """Add the declarations of one text; report names that are declared twice."""
+        self._report_forms(text, source)
         last: Pou | None = None
         for declaration in text.declarations:
             if isinstance(declaration, tree.Refused):
@@ -159,6 +160,16 @@ class Project:
                 self.config_sections += [(section, source) for r in declaration.resources for section in r.settings]
                 self.sections += [(s, source) for s in declaration.sections]
 
+    def _report_forms(self, text: tree.SourceText, source: Source) -> None:
+        """Report the forms of a text that the dialect does not take, and for the user's own texts those to be warned of."""
+        for form in text.forms:
+            taken = getattr(self.dialect, form.switch) is form.taken
+            said = form.accepted if taken else form.refused
+            if said is not None and not (taken and source.library):
+                code, message, hint = said
+                hint += f", or take {takers(form.switch)}" if form.taken and not taken else ""
+                self.report.add(code, source, tree.Node(form.start, form.end), message, hint)
+
     def _add_action(self, action: tree.Action, source: Source, owner: tree.Name | None, last: Pou | None) -> None:
         """Add an ACTION to the POU that it names, else to the POU in front of it."""
         pou = self.pous.get((source.library, fold(owner.text))) if owner is not None else last
@@ -185,7 +196,7 @@ class Project:
         return None
 
     def _twice(self, key: tuple[str, str], name: tree.Name, source: Source, what: str) -> bool:
-        refuse_reserved(self.report, source, name)
+        refuse_reserved(self.report, source, name, self.dialect)
         other = self.pous.get(key) or self.types.get(key)
         if other is None:
             return False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from fbvm.base.types import fold
 from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
@@ -22,6 +24,15 @@ def bodies(statement: tree.Statement) -> list[tree.Block]:
     if isinstance(statement, _WITH_BODY):
         return [statement.body]
     return []
+
+
+_ENO_OF = re.compile(r"(?i)(?<![\w.])(\w+)\s*\.\s*ENO\b")
+
+
+def names_of_eno(pou: Pou) -> set[str]:
+    """The folded names in front of `.ENO` in the text of a POU, among them those of instances whose ENO it reads."""
+    node = pou.tree
+    return {fold(name) for name in _ENO_OF.findall(pou.source.text, node.start, node.end)}
 
 
 def writes_eno(pou: Pou) -> bool:

@@ -9,7 +9,7 @@ from fbvm.base.types import ANY_SIZE, BOOL, NULL, Type, machine
 from fbvm.check.symbols.facts import Guard, PouCall, StandardCall
 from fbvm.code.builder.constants import TRUE, zero
 from fbvm.code.builder.functions import FUNCTIONS
-from fbvm.code.builder.places import Place
+from fbvm.code.builder.places import Place, is_aggregate
 from fbvm.code.lowering import any_parameters, arrays, dispatch, plc_addresses, pointers, pou_calls
 from fbvm.code.lowering.context import BodyContext, PlaceRules, StatementRules, ValueRules
 from fbvm.code.lowering.variables import loaded
@@ -20,7 +20,10 @@ from fbvm.syntax import tree
 def _statement(body: BodyContext, node: tree.CallStatement, site: int) -> None:
     """A call whose result, if it has one, is not used."""
     call = body.facts.bare.get(node, node.call)
-    assert isinstance(call, tree.Call)
+    if not isinstance(call, tree.Call):
+        if not is_aggregate(body.facts.types[call]):
+            body.to_temporary(body.value(call))
+        return
     called = body.facts.calls.get(call)
     if isinstance(called, PouCall):
         pou_calls.run(body, call, called)

@@ -19,6 +19,9 @@ _COMPARE = {"=": "eq", "<>": "ne", "<": "lt", ">": "gt", "<=": "le", ">=": "ge"}
 
 
 def _unary(body: BodyContext, expr: tree.Unary) -> Node:
+    meaning = body.facts.rewritten.get(expr)
+    if meaning is not None:
+        return body.value(meaning)
     node = body.value(expr.operand)
     form = machine(body.facts.types[expr])
     if expr.op == "+":
@@ -33,6 +36,8 @@ def _binary(body: BodyContext, expr: tree.Binary) -> Node:
     if expr.op in ("AND_THEN", "OR_ELSE"):
         return _short_circuit(body, expr)
     operand = base(body.facts.operands[expr])
+    if expr.op in ("AND", "OR", "&") and operand == BOOL and body.dialect.short_circuits:
+        return _short_circuit(body, expr)
     if isinstance(operand, RefType):
         return pointers.binary(body, expr)
     compares = expr.op in _COMPARE
@@ -70,7 +75,7 @@ def _short_circuit(body: BodyContext, expr: tree.Binary) -> Node:
     left = body.value(expr.left, BOOL)
     with body.block() as inner:
         right = body.value(expr.right, BOOL)
-    name = "and_then" if expr.op == "AND_THEN" else "or_else"
+    name = "or_else" if expr.op in ("OR", "OR_ELSE") else "and_then"
     if not inner:
         return (name, "b", left, right)
     result = body.to_temporary(left, always=True)

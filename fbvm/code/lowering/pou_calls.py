@@ -119,6 +119,9 @@ def _report(body: BodyContext, called: PouCall, enable: Node, site: int) -> None
     for target, negated in called.enabled:
         node: Node = ("not", "b", enable) if negated else enable
         body.write(body.place(target), node, site)
+    variable = body.facts.variables.get(called.instance) if called.instance is not None else None
+    if variable is not None and variable.eno is not None and called.pou.home is None:
+        body.emit(body.slot(variable.eno).store(enable, site))
 
 
 def _parameter(called: PouCall, name: str, kind: str) -> Variable | None:

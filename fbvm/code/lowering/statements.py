@@ -95,7 +95,7 @@ def _case(body: BodyContext, node: tree.Case, site: int) -> None:
         return
     form = machine(body.facts.types[node.selector])
     selector = body.value(node.selector)
-    rows = tuple((body.facts.labels[branch], body.lowered(branch.body)) for branch in node.branches)
+    rows = tuple((labels, body.lowered(branch.body)) for branch in node.branches if (labels := body.facts.labels[branch]))
     body.emit(("case", form, selector, rows, body.lowered(node.otherwise or ())))
 
 

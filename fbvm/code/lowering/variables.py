@@ -22,6 +22,9 @@ def loaded(body: BodyContext, expr: tree.Expr) -> Node:
 
 def member_value(body: BodyContext, expr: tree.Member) -> Node:
     """The value of a member; `x.pValue` of an ANY is a reference to what was passed."""
+    meaning = body.facts.rewritten.get(expr)
+    if meaning is not None:
+        return body.value(meaning)
     if expr in body.facts.holders and isinstance(body.facts.types.get(expr.of), AnyType):
         return pointers.to_parameter(body, expr)
     return loaded(body, expr)

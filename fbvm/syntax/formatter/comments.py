@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from fbvm.syntax.st.comments import comment_end
 from fbvm.syntax.st.lexer import Token
 
 TAB = 4
 BESIDE = "  "
 """Between a pragma and the comment behind it."""
 _OPENING = re.compile(r"//[^\n]*|\(\*|/\*|\{")
-_MARKS = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,15 +132,9 @@ def _comments(text: str, start: int, end: int) -> Iterator[tuple[int, int]]:
     """Start and end of each comment and pragma between two tokens."""
     at = start
     while found := _OPENING.search(text, at, end):
+        at = found.end()
         if found[0] == "{":
-            at = text.index("}", found.end()) + 1
-        elif found[0].startswith("//"):
-            at = found.end()
-        else:
-            mark, depth, at = _MARKS[found[0]], 1, found.end()
-            while depth:
-                bound = mark.search(text, at)
-                assert bound, "the lexer has found its end"
-                depth += 1 if bound[0] == found[0] else -1
-                at = bound.end()
+            at = text.index("}}", at) + 2 if text.startswith("{{", found.start()) else text.index("}", at) + 1
+        elif not found[0].startswith("//"):
+            at, _ = comment_end(text, found.start())
         yield found.start(), at

@@ -37,9 +37,16 @@ class DeclarationLayout(TypeLayout, SfcLayout):
     def add_inheritance(self, parts: list[Doc], word: Token, names: list[Phrase]) -> list[Doc]:
         return [*parts, " ", self.leaf(word), " ", self.listed(names, fill=True)]
 
-    def pou_head(self, modifiers: list[Leaf], token: Token, inheritance: list[Doc]) -> Doc:
+    def generic_type(self, token: Token, colon: Token, kind: Token) -> Phrase:
+        return Phrase(token.start, self.leaf(token), " ", self.leaf(colon), " ", self.leaf(kind))
+
+    def generics(self, opener: Token, types: list[Phrase], closer: Token) -> Doc:
+        parts = [part for each in types for part in (" ", each.doc)]
+        return self.leaf(opener), *parts[1:], self.leaf(closer)
+
+    def pou_head(self, modifiers: list[Leaf], token: Token, generics: Doc | None, inheritance: list[Doc]) -> Doc:
         words = tuple(part for word in modifiers for part in (word, " "))
-        return (*words, self.leaf(token), *inheritance)
+        return (*words, self.leaf(token), *([generics] if generics else []), *inheritance)
 
     def pou(self, word: Token, head: Doc, sections: list[Phrase], items: list[Phrase], actions: list[Phrase],
             end: Token) -> Phrase:

@@ -172,6 +172,9 @@ class ExpressionLayout:
         apart = " " if word or operand.level == "sign" else ""
         return Phrase(operator.start, self.leaf(operator), apart, operand.doc, level="" if word else "sign")
 
+    def address_of(self, sign: Token, operand: Phrase) -> Phrase:
+        return Phrase(sign.start, self.leaf(sign), operand.doc)
+
     def binary(self, left: Phrase, operator: Token, right: Phrase) -> Phrase:
         self.comments.lift(operator)
         level = LEVELS["AND" if operator.type == "AMPERSAND" else operator.text.upper()]

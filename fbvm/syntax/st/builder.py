@@ -9,7 +9,7 @@ from typing import Any
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.refused import refused_what
-from fbvm.syntax.tree import Expr, Name, Refused, Statement
+from fbvm.syntax.tree import Expr, Form, Name, Refused, Statement
 from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 
@@ -42,6 +42,10 @@ class Builder:
     def __init__(self, source: Source) -> None:
         self.source = source
         self.diagnostics: list[Diagnostic] = []
+        self.forms: list[Form] = []
+        """What only some dialects take."""
+        self.generic_types: dict[str, str] = {}
+        """Generic types of the function that is being read, in capitals -> the kind of each, as ANY_NUM."""
         self.errors = 0
         self.odd: list[int] = []
         """Ends of unknown characters that were passed over, and of strings without end."""

@@ -16,6 +16,7 @@ from fbvm.syntax.tree import (
     Direct,
     EnumLiteral,
     Expr,
+    Form,
     Index,
     Literal,
     Member,
@@ -76,6 +77,15 @@ class Expressions(Builder):
             self.report(code, token.start, token.end, *error.args)
             kind, value, type_name = literals.WRONG, *instead[1:]
         return Literal(token.start, token.end, kind, value, type_name, token.text)
+
+    def address_of(self, sign: Token, operand: Expr) -> Call:
+        """`&x`, which means REF(x)."""
+        self.forms.append(Form("ampersand_refers", sign.start, operand.end, (
+            "S0101", "an expression expected, but `&` found", "write REF(x), or ADR(x) for a pointer")))
+        node = Call(sign.start, operand.end, NameRef(sign.start, sign.end, "REF"),
+                    (Argument(operand.start, operand.end, "", None, operand),))
+        self.deepen(node, operand)
+        return node
 
     # --- variables ---
 

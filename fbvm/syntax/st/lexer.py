@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import NamedTuple
 
-from fbvm.syntax.st.pragmas import NO_EFFECT, dialectal, harmless
+from fbvm.syntax.st.comments import CLOSERS, comment_end
+from fbvm.syntax.st.pragmas import GENERATOR, NO_EFFECT, dialectal, harmless
 from fbvm.syntax.st.tables import Terminal, tables
-from fbvm.syntax.tree import Pragma
+from fbvm.syntax.tree import Form, Pragma
 
 Report = Callable[..., None]
 """Called with code, start, end, message and hint."""
@@ -35,10 +36,21 @@ MISSPELT = {
     "ENDPROGRAM": "END_PROGRAM", "ENDSTEP": "END_STEP", "ENDTRANSITION": "END_TRANSITION", "ENDACTION": "END_ACTION",
     "END_TRANS": "END_TRANSITION", "END_VAR_INPUT": "END_VAR", "END_VAR_OUTPUT": "END_VAR", "END_VARS": "END_VAR",
     "VARINPUT": "VAR", "VAROUTPUT": "VAR", "VARINOUT": "VAR", "FUNCTIONBLOCK": "FUNCTION_BLOCK",
+    "END_FUNCTIONBLOCK": "END_FUNCTION_BLOCK",
     "SWITCH": "CASE", "BREAK": "EXIT", "END": "END_"}
 """Word of another language, or of ours without its `_` -> the terminal that is meant.  These words have the type MISSPELT and
 are names where names fit; so have END with a space behind it, and words that begin with VAR_."""
 
+_JOINED = {"FUNCTIONBLOCK": "FUNCTION_BLOCK", "END_FUNCTIONBLOCK": "END_FUNCTION_BLOCK"}
+"""Those of them that some dialects take, and that are these words at the beginning of a line."""
+
+def _joined(text: str, start: int, end: int) -> str:
+    """The terminal of a word that stands joined at the beginning of a line, and is no name; "" for other words."""
+    begins = not text[text.rfind("\n", 0, start) + 1:start].strip()
+    return _JOINED.get(text[start:end].upper(), "") if begins and not _USED_AS_NAME.match(text, end) else ""
+
+
+_USED_AS_NAME = re.compile(r"\s*[,:;.(\[^]")
 _END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUNCTION|FUNCTION_BLOCK|PROGRAM|STEP|TRANSITION|"
                      r"ACTION)\b")
 
@@ -48,6 +60,15 @@ _LIST_ENDS = re.compile(r"""(?isx) // [^\n]* | \(\* .*? \*\) | /\* .*? \*/ | \{ 
 """What is passed over in an instruction list, what ends it, and what shows that it is none."""
 _FIRST = re.compile(r"[ \t]*(?:\w+[ \t]*:[ \t]*)?")
 """What may stand on its line in front of the first instruction of an instruction list."""
+_LABEL_BEHIND = re.compile(r"[ \t]+[A-Za-z_]\w*[ \t]*(?:\r?\n|\(\*|//)")
+_FORMAL_CALL = re.compile(r"""(?isx) [ \t]* \( [ \t]* \r?\n [^()]* \n [ \t]* \) [ \t]* \r?\n \s*
+                          (?: ST | S | R | CAL | RET | JMP | ADD | SUB | MUL | DIV | AND | OR | XOR | GT | GE | EQ | NE | LE
+                          | LT) C? N? [ \t\r\n] """)
+"""What stands behind the name of a function with which an instruction list begins: arguments on lines of their own, and an
+operator on the line behind them."""
+_PLACES = frozenset(("AT", "END_VAR"))
+"""Terminals behind which a name may begin something that is none."""
+_READ_AGAIN = frozenset(("FOREIGN", "TYPED_LITERAL"))
 _END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")
 
 
@@ -77,6 +98,7 @@ _SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
     (r"\?", "write SEL(condition, if_false, if_true)"),
     (r"#[ \t]*(?:include|define|if|ifdef|ifndef|pragma)\b", "there is no preprocessor: declare constants in VAR CONSTANT"),
     (r"(?<!\.)%[A-Za-z]", "an address has a number behind its letters: %QX0.0, %MW10"),
+    (r"#[A-Za-z_]", "`#` in front of a name is Siemens SCL: leave it out"),
     (r"#", "a type stands in front of `#`, and no space"),
     (r"\\", "the escape in a string is `$`")))
 """Characters with which no token begins, and a hint."""
@@ -95,6 +117,10 @@ NO_VALUE = ("<<", ">>", "++", "--")
 """Operators of other languages for which there is none of ours."""
 _WORDS = r"(?s:\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?)"
 _ORDER = ("NAME", "PART", "COMMENT", "FOREIGN", "SIGN", "NUMBER", "DATE_LITERAL", "TYPED_LITERAL", "STRING_LITERAL", "DIRECT")
+_BEHIND_DURATION = re.compile(
+    r"(?i)(L?T(?:IME)?#)([ \t]*)(?:(?<=[ \t])-?[0-9][0-9a-z_.]*|(?<=#)[0-9]+(?:\.[0-9]+[a-z_0-9]*){2,})")
+"""A duration of which the pattern of a literal takes only the beginning: with a blank behind `#`, or with two fractions."""
+_NAMED_BIT = re.compile(r"(?i)(?<=\.)%X(?=[A-Z_])")
 OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
 
 
@@ -177,6 +203,8 @@ class Lexer:
     def __init__(self, text: str, report: Report, lists: bool = True) -> None:
         self.text, self.report, self.lists = text, report, lists
         self.pragmas: list[Pragma] = []
+        self.forms: list[Form] = []
+        """What only some dialects take."""
 
     def tokens(self, start: int = 0) -> Iterator[Token]:
         """Every token from an offset on, then one of type "$END"."""
@@ -203,15 +231,15 @@ class Lexer:
                 if kind in in_context:
                     kind, at = self._word_in_context(lex, before, kind, start, at)
                     word = text[start:at]
-                elif before == "AT" or (before in ends and text.startswith("=", at)):
+                elif before in _PLACES or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
                     word = text[start:at]
             elif kind == "COMMENT":
                 if word[:2] != "//":
                     at = self._comment(start)
                 continue
-            elif kind == "FOREIGN":
-                kind, word = self._foreign(word, start, at)
+            elif kind in _READ_AGAIN:
+                kind, word, at = self._read_again(kind, word, start, at)
                 if not kind:
                     continue
             elif before == "AT":
@@ -225,7 +253,13 @@ class Lexer:
         """The terminal of a word that depends on the text behind the word, and where its token ends."""
         condition = lex.conditions.get(kind)
         if condition is not None and not condition.match(self.text, end):
+            if kind == "JMP" and _LABEL_BEHIND.match(self.text, end) and (last := self._instruction_list(start)):
+                return "INSTRUCTION_LIST", last
             kind = "NAME"
+        if kind == "MISSPELT" and (joined := _joined(self.text, start, end)):
+            self.forms.append(Form("joined_words", start, end, (
+                "S0101", f"`{self.text[start:end]}` is no word of Structured Text", f"write {joined}")))
+            return joined, end
         if kind == "MISSPELT" and end - start == len("END"):
             end_of = _END_OF.match(self.text, end)
             return (kind, end_of.end()) if end_of else ("NAME", end)
@@ -240,8 +274,27 @@ class Lexer:
             return self._special(lex, before, kind, start, end)
         return kind, end
 
+    def _read_again(self, kind: str, word: str, start: int, end: int) -> tuple[str, str, int]:
+        """Terminal, text and end of an operator of another language, for which the terminal is empty if we have none, or of a
+        literal; of a duration the pattern of literals takes only the beginning in `T# 30s` and `T#1.0s500.0ms`."""
+        if kind == "FOREIGN":
+            return *self._foreign(word, start, end), end
+        found = _BEHIND_DURATION.match(self.text, start)
+        if found is None:
+            return kind, word, end
+        word = found[1] + self.text[found.end(2):found.end()]
+        if found[2]:
+            self.forms.append(Form("spaced_durations", start, found.end(), (
+                "S0105", "a blank stands behind `#`", f"a duration is written {word}"),
+                ("S0193", "a blank stands behind `#`", f"write {word}")))
+        return kind, word, found.end()
+
     def _special(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
-        """The terminal of a token and its end: LOCATION behind AT, `S=` behind an operand; otherwise `kind` and `end`."""
+        """The terminal of a token and its end: LOCATION behind AT, behind END_VAR an instruction list that begins with a formal
+        call, `S=` behind an operand; otherwise `kind` and `end`."""
+        if before == "END_VAR":
+            last = self._instruction_list(start) if _FORMAL_CALL.match(self.text, end) else 0
+            return ("INSTRUCTION_LIST", last) if last else (kind, end)
         pattern, name = (lex.location, "LOCATION") if before == "AT" else (lex.set_assign, "SET_ASSIGN")
         found = pattern.match(self.text, start)
         return (name, found.end()) if found else (kind, end)
@@ -259,6 +312,10 @@ class Lexer:
             return None, 1
         if character == "{":
             return None, self._pragma(at)
+        if named := _NAMED_BIT.match(text, at):
+            self.forms.append(Form("bits_by_name", at, named.end(), (
+                "S0102", "the number of a bit stands behind %X", "the bit of a constant k is written name.k")))
+            return None, named.end()
         if character in END_OF_FILE and not text[at:].strip(END_OF_FILE + " \t\r\n"):
             return None, len(text)
         if character in "'\"":
@@ -301,6 +358,8 @@ class Lexer:
         return kind, ours
 
     def _pragma(self, start: int) -> int:
+        if self.text.startswith("{{", start):
+            return self._text_of_c(start)
         end = self.text.find("}", start)
         if end < 0:
             self.report("S0103", start, start + 1, "pragma without end", "close it with }")
@@ -311,9 +370,25 @@ class Lexer:
             self.report("S0190", start, end + 1, "what stands in braces is a pragma, and no statement is executed in one",
                         "blocks are written IF .. END_IF, FOR .. END_FOR, without braces")
         elif not harmless(contents) and not dialectal(contents):
-            self.report("S0190", start, end + 1, f"the pragma `{{{_short(contents.strip())}}}` is not known and has no effect",
-                        NO_EFFECT)
+            unknown = "S0190", f"the pragma `{{{_short(contents.strip())}}}` is not known and has no effect", NO_EFFECT
+            acts = next((row for row in GENERATOR if row[0].fullmatch(contents)), None)
+            if acts:
+                self.forms.append(Form("pragmas_of_c", start, end + 1, ("S0901", *acts[1:]), unknown, taken=False))
+            else:
+                self.report(unknown[0], start, end + 1, *unknown[1:])
         return end + 1
+
+    def _text_of_c(self, start: int) -> int:
+        """Where `{{ .. }}` ends, which is text of C that the generator of matiec copies."""
+        end = self.text.find("}}", start)
+        if end < 0:
+            self.report("S0103", start, start + 2, "text of C without end", "close it with }}")
+            return len(self.text)
+        words = "text of C in {{ }} is not executed"
+        self.pragmas.append(Pragma(start, end + 2, self.text[start + 1:end + 1]))
+        self.forms.append(Form("pragmas_of_c", start, end + 2, ("S0102", words, "write it in Structured Text"),
+                               ("S0190", words, "what it does has to be written in Structured Text")))
+        return end + 2
 
     def _ladder(self, start: int, end: int) -> int:
         """Where LADDER .. END_LADDER ends."""
@@ -341,19 +416,19 @@ class Lexer:
         return 0
 
     def _comment(self, start: int) -> int:
-        """Where the bracket comment that begins at `start` ends; each kind nests in itself."""
-        opener = self.text[start:start + 2]
-        closer = opener[::-1].replace("(", ")")
-        mark = re.compile(re.escape(opener) + "|" + re.escape(closer))
-        depth, at = 1, start + 2
-        while depth:
-            found = mark.search(self.text, at)
-            if not found:
-                self.report("S0103", start, start + 2, "comment without end", f"close it with {closer}")
-                return len(self.text)
-            depth += 1 if found[0] == opener else -1
-            at = found.end()
-        return at
+        """Where the bracket comment that begins at `start` ends; notes a comment inside it."""
+        end, inner = comment_end(self.text, start)
+        first = self.text.find(CLOSERS[self.text[start]], start) + 2
+        once_for_each = f"close it with {CLOSERS[self.text[start]]}" + (", once for each sign of a beginning" if inner else "")
+        if end < 0 or inner and end == first and self.text[start] == "/":
+            self.report("S0103", start, start + 2, "comment without end", once_for_each)
+        elif inner and end == first:
+            self.forms.append(Form("comments_end_at_once", start, start + 2, ("S0103", "comment without end", once_for_each)))
+        elif inner and self.text[start] == "(":
+            self.forms.append(Form("comments_end_at_once", first, end, (
+                "S0103", "the comment ended at the first `*)`", "comments do not nest in this dialect: leave the inner (* and "
+                "*) out"), taken=False))
+        return end if end >= 0 else len(self.text)
 
 
 def _short(text: str) -> str:

@@ -233,6 +233,18 @@ def _without_escapes(inner: str, quote: str, digits: int) -> str:
 # --- times and dates ---
 
 
+def _without_fractions(text: str) -> str:
+    """Advice for a duration with several fractions: the same one without any."""
+    if len(text) > LONGEST:
+        return ""
+    parts = re.findall(_DURATION_PART, text)
+    rest, written = sum(_scaled(whole, fraction, UNITS_NS[unit.lower()], text) for whole, fraction, unit in parts), ""
+    for unit, size_ns in UNITS_NS.items():
+        count, rest = divmod(rest, size_ns)
+        written += f"{count}{unit}" if count else ""
+    return f"write T#{'-' if text.startswith('-') else ''}{written or '0s'}"
+
+
 def duration(text: str, most_ns: int = NS_MAX) -> int:
     """`1d2h3.5s` or `-5us300ns` as whole nanoseconds; a rest below one nanosecond is an error, not rounded away."""
     negative = text.startswith("-")
@@ -253,7 +265,7 @@ def duration(text: str, most_ns: int = NS_MAX) -> int:
             raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration",
                             "the order is d h m s ms us ns")
         if part[2] and part[0] != rest:
-            raise Malformed("only the last unit of a duration may have a fraction", "")
+            raise Malformed("only the last unit of a duration may have a fraction", _without_fractions(text))
         total += _scaled(part[1], part[2] or "", UNITS_NS[units[unit]], text)
         last, rest = unit, rest[part.end():]
     total = -total if negative else total

@@ -28,6 +28,14 @@ PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 DIALECTAL = {"ref", "external"}
 """Pragmas that mean something in some dialects only; they are judged when the dialect is known."""
 
+GENERATOR = (
+    (re.compile(r"\s*(?:disable|enable)\s+code\s+generation\s*", re.IGNORECASE),
+     "matiec only checks the text between these pragmas, and fbvm executes it",
+     "take both pragmas and the text between them out"),
+    (re.compile(r"\s*#\s*include\b.*", re.IGNORECASE | re.DOTALL), "matiec reads another file here, and fbvm does not",
+     "name the file on the command line, or under `files` in fbvm.toml"))
+"""Pragmas on which the generator of matiec acts and fbvm does not: message and hint."""
+
 NO_EFFECT = "what it switches for another compiler is not switched here"
 """The hint for pragmas that are not known."""
 

@@ -59,7 +59,8 @@ class Types(Statements):
         return NamedType(name.start, token.end, f"{name.text}.{token.text}")
 
     def named_type(self, name: NamedType) -> NamedType:
-        return name
+        kind = self.generic_types.get(name.text.upper())
+        return NamedType(name.start, name.end, kind) if kind else name
 
     def string_plain(self, word: Token) -> StringSpec:
         return StringSpec(word.start, word.end, word.type == "WSTRING", None)

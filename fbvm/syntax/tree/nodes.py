@@ -7,6 +7,8 @@ Names are kept as written; comparing them without case is the checker's work.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from fbvm.syntax.tree.expressions import Argument, ArrayInit, Expr, Name
 from fbvm.syntax.tree.node import Node
 from fbvm.syntax.tree.node import node as _node
@@ -388,9 +390,24 @@ class Pragma(Node):
     text: str
 
 
+class Form(NamedTuple):
+    """Text that only some dialects take: those that have `switch` set, or that do not if `taken` is False.
+
+    The parser reads it for all of them.  `refused` is the code, message and hint for the others; `accepted` is the warning, if
+    there is one, for who takes it."""
+
+    switch: str
+    start: int
+    end: int
+    refused: tuple[str, str, str]
+    accepted: tuple[str, str, str] | None = None
+    taken: bool = True
+
+
 @_node
 class SourceText(Node):
     """All declarations of one source text in the order of writing."""
 
     declarations: tuple[Declaration, ...]
     pragmas: tuple[Pragma, ...] = ()
+    forms: tuple[Form, ...] = ()

@@ -7,7 +7,7 @@ from typing import Any
 from fbvm.syntax.tree import Binary, Direct, EnumLiteral, Literal, Location, Name, NamedType, NameRef, Node
 from fbvm.syntax.tree.node import names_of
 
-HIDDEN = {"start", "end", "op_start"}
+HIDDEN = {"start", "end", "op_start", "forms"}
 
 
 def dump(tree: Node) -> str:
