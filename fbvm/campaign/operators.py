@@ -3,7 +3,7 @@
 The names are those of the literature (Enoiu et al. on function block diagrams; STMutants, arXiv 2606.05499): ROR relational
 operator replacement, LRO logical, ARO arithmetic, NIO negation insertion or omission, CRO constant replacement, TRO timers and
 other standard blocks, SRO set for reset, SDL statement deletion, SWAP two statements in the other order.  Rungs have CONTACT
-(open for closed), COIL (another output instruction), EDGE (a differentiated instruction without its edge) and RDL (rung deletion).
+(open for closed), COIL (another output instruction), EDGE (a differentiated instruction without its edge), RDL (rung deletion).
 """
 
 from __future__ import annotations
