@@ -146,7 +146,8 @@ def try_mutants(folder: Path, mutants: Sequence[Mutant], sources: Sequence[Sourc
             copy_project(folder, Path(copy))
         bench = Bench(folders, {source.name: source.text for source in sources}, settings.arguments, libraries)
         with Pool[Task, Result](jobs, bench.prepare, bench.work) as pool:
-            limit_ns = settings.limit_ns or _usual_limit(pool)
+            usual_ns = _usual_limit(pool)
+            limit_ns = settings.limit_ns or usual_ns
             for task, result in pool.results(mutants, limit_ns):
                 assert isinstance(task, Mutant)
                 _enter(outcome, task, result)

@@ -39,11 +39,12 @@ LATE, CRASHED = Late(), Crashed()
 
 @dataclass
 class _Worker(Generic[Task]):
-    """A process, the task it does, and whether its time is over."""
+    """A process, the task it does, and whether its time is over.  The time of a task begins when the process is ready."""
 
     process: multiprocessing.process.BaseProcess
     line: connection.Connection
     task: Task | None = None
+    is_ready: bool = False
     expired: Callable[[], bool] = lambda: False
 
 
@@ -69,7 +70,8 @@ class Pool(Generic[Task, Result]):
                 self._end(number)
 
     def results(self, tasks: Iterable[Task], limit_ns: int) -> Iterator[tuple[Task, Result | Late | Crashed]]:
-        """Each task with what came of it, in the order in which they end.  A task has `limit_ns` from its beginning on."""
+        """Each task with what came of it, in the order in which they end.  A task has `limit_ns`
+        from its beginning on, without the start of a process."""
         left, begun = deque(tasks), dict[int, int]()
         while left or any(worker and worker.task is not None for worker in self._workers):
             for number in range(self.count):
@@ -91,16 +93,21 @@ class Pool(Generic[Task, Result]):
                             left.appendleft(task)
                         else:
                             yield task, CRASHED
-                    else:
-                        worker.task = None
-                        yield task, result
+                        continue
+                    if not worker.is_ready:
+                        worker.is_ready, worker.expired = True, time_limit(limit_ns)
+                        continue
+                    worker.task = None
+                    yield task, result
                 elif worker.expired():
                     self._end(number)
                     yield task, LATE
 
     def _begin(self, number: int, task: Task, limit_ns: int) -> None:
         worker = self._workers[number] or self._started(number)
-        worker.task, worker.expired = task, time_limit(limit_ns)
+        worker.task = task
+        if worker.is_ready:
+            worker.expired = time_limit(limit_ns)
         with suppress(OSError):  # it has ended, which its line tells, too
             worker.line.send(task)
 
@@ -135,6 +142,7 @@ def _serve(line: connection.Connection, number: int, prepare: Callable[[int], No
         let_signals_through()
         prepare(number)
         with suppress(EOFError, OSError):
+            line.send(None)
             while True:
                 line.send(work(number, line.recv()))
 
