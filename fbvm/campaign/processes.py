@@ -12,13 +12,15 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing import connection, resource_tracker
 from types import FrameType
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from fbvm.base.host import handling, let_signals_through, signals_held
 from fbvm.run.time_limit import time_limit
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
+Line: TypeAlias = Any
+"""One end of a pipe of `multiprocessing`, whose class differs by system."""
 
 POLL_S = 0.2
 """How often limits are looked at while nobody answers."""
@@ -42,7 +44,7 @@ class _Worker(Generic[Task]):
     """A process, the task it does, and whether its time is over.  The time of a task begins when the process is ready."""
 
     process: multiprocessing.process.BaseProcess
-    line: connection.Connection
+    line: Line
     task: Task | None = None
     is_ready: bool = False
     expired: Callable[[], bool] = lambda: False
@@ -131,7 +133,7 @@ class Pool(Generic[Task, Result]):
             worker.line.close()
 
 
-def _serve(line: connection.Connection, number: int, prepare: Callable[[int], None],
+def _serve(line: Line, number: int, prepare: Callable[[int], None],
            work: Callable[[int, Task], Result]) -> None:  # fmt: skip
     """What a process does: tasks, until nobody asks any more.  What they print is dropped."""
     nowhere = os.open(os.devnull, os.O_RDWR)
