@@ -141,6 +141,27 @@ def handling(numbers: Iterable[signal.Signals], handle: Handle) -> Iterator[None
             signal.signal(number, call)
 
 
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Lets Ctrl-C and the signals that ask for the end wait until the `with` block is over.
+
+    Processes that are started in it hold them back, too, until they call `let_signals_through`.  Windows holds nothing."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, *ending_signals()))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def let_signals_through() -> None:
+    """Ends what `signals_held` has begun in the process that has started this one."""
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, *ending_signals()))
+
+
 def interrupt(thread: int) -> None:
     """Does in the main thread, whose number is `thread`, what Ctrl-C does, also while it waits.  Called by another thread."""
     if sys.platform == "win32":

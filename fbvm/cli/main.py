@@ -37,6 +37,7 @@ VERB_GROUPS = {
     "projects": ("Projects and lessons", {
         "new": "Make a project with a block and its test.",
         "test": "Run the tests of a project.",
+        "mutate": "Tell which small mistakes in a project's programs its tests would miss.",
         "learn": "Learn in sixteen lessons what a scan cycle really does.",
     }),
     "programs": ("Look at programs", {

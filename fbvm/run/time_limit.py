@@ -10,3 +10,9 @@ def time_limit(limit_ns: int) -> Callable[[], bool]:
     """A function that answers True when `limit_ns` have passed from now on."""
     end_ns = time.monotonic_ns() + limit_ns
     return lambda: time.monotonic_ns() > end_ns
+
+
+def stopwatch() -> Callable[[], int]:
+    """A function that answers how many nanoseconds have passed from now on."""
+    began_ns = time.monotonic_ns()
+    return lambda: time.monotonic_ns() - began_ns

@@ -67,6 +67,7 @@ VERBS: dict[str, list[list[str]]] = {
     "serve": [["--port", "0", "--image", "served"]],
     "live": [[DEMO]],
     "peer": [["--port", "0"]], "demo": [[]], "new": [["project", ]], "test": [["tests"]], "learn": [["1"]],
+    "mutate": [["--tests", "tests"]],
     "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["long.fbtrace", "Main.Step"]],
     "lsp": [[]],
     "prove": [["big.st", "--always", "Main.b0.a <> 4711", "--budget", "100s", "--scans", "100000"]],

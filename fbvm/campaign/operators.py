@@ -1,0 +1,221 @@
+"""The mutation operators: which small mistakes can be made at a node of a tree, as changes of the source text.
+
+The names are those of the literature (Enoiu et al. on function block diagrams; STMutants, arXiv 2606.05499): ROR relational
+operator replacement, LRO logical, ARO arithmetic, NIO negation insertion or omission, CRO constant replacement, TRO timers and
+other standard blocks, SRO set for reset, SDL statement deletion, SWAP two statements in the other order.  Rungs have CONTACT
+(open for closed), COIL (another output instruction), EDGE (a differentiated instruction without its edge), RDL (rung deletion).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import TypeAlias
+
+from fbvm.base.types import fold
+from fbvm.campaign.mutants import Change
+from fbvm.syntax import tree
+from fbvm.syntax.tree.ladder import Ladder, Rung, Step
+from fbvm.syntax.tree.node import Node, names_of
+
+Replacement: TypeAlias = tuple[str, int, int, str]
+"""Operator, start, end, new text."""
+Table: TypeAlias = dict[str, tuple[str, ...]]
+
+_RELATIONS: Table = {"<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "=": ("<>",), "<>": ("=",)}
+_LOGICAL: Table = {"AND": ("OR",), "OR": ("AND",), "XOR": ("OR",), "AND_THEN": ("OR_ELSE",), "OR_ELSE": ("AND_THEN",)}
+_ARITHMETIC: Table = {"+": ("-",), "-": ("+",), "*": ("/",), "/": ("*",), "MOD": ("/",)}
+_OPERATORS = {"ROR": _RELATIONS, "LRO": _LOGICAL, "ARO": _ARITHMETIC}
+"""What stands for an operator, by the name of the mutation operator."""
+
+_BLOCKS = {"TON": ("TOF", "TP"), "TOF": ("TON",), "TP": ("TON",), "R_TRIG": ("F_TRIG",), "F_TRIG": ("R_TRIG",),
+           "RS": ("SR",), "SR": ("RS",), "CTU": ("CTD",), "CTD": ("CTU",)}  # fmt: skip
+"""Standard blocks and those that are taken for them by mistake."""
+
+_NEGATED = {"LD": "LDNOT", "AND": "ANDNOT", "OR": "ORNOT"} | {"LDNOT": "LD", "ANDNOT": "AND", "ORNOT": "OR"}
+"""Contacts: normally open for normally closed (W474 3-3)."""
+_OUTPUTS = {"OUT": "OUTNOT", "OUTNOT": "OUT", "SET": "OUT", "RSET": "SET", "DIFU": "DIFD", "DIFD": "DIFU"}
+"""Output instructions: a coil negated, a coil that holds for one that does not, set for reset, the other edge (W474 3-4)."""
+_DRAWN = {"┤ ├": "┤/├", "┤/├": "┤ ├", "( )": "(/)", "(/)": "( )", "(S)": "( )", "(R)": "(S)", "┤P├": "┤N├", "┤N├": "┤P├"}
+"""Contacts and coils as they are drawn, three characters each (IEC 61131-3, tables 75 and 76)."""
+_AS_MNEMONIC = re.compile(r"([!@%]*)([A-Z]+(?: NOT)?)(?=[\s(])", re.I)
+
+_NEXT_RUNG = re.compile(r"^[ \t]*((?:RUNG|END_LADDER)\b)", re.I | re.M)
+_WORD = re.compile(r"[A-Z_]+|\S", re.I)
+
+
+def changes(text: str, node: tree.Pou) -> Iterator[Change]:
+    """The changes of a POU, its methods and its actions, in the order of the text; each text of the POU once."""
+    seen = set[tuple[int, int, str]]()
+    found = sorted(_replacements(text, node), key=lambda each: each[1:])
+    for operator, start, end, new in found:
+        if (start, end, new) not in seen and text[start:end] != new:
+            seen.add((start, end, new))
+            yield Change(operator, start, end, new, node.name.text)
+
+
+def _replacements(text: str, pou: tree.Pou) -> Iterator[Replacement]:
+    for part in _written(pou):
+        for kind, rule in _RULES:
+            if isinstance(part, kind):
+                yield from rule(text, part)
+        for name in names_of(part) if not isinstance(part, Rung) else ():
+            yield from _of_statements(text, getattr(part, name))
+
+
+def _written(pou: tree.Pou) -> Iterator[Node]:
+    """The nodes of a POU that stand in its text: of rungs their steps, not the statements that execute them."""
+    left: list[object] = [pou]
+    while left:
+        item = left.pop()
+        if isinstance(item, tuple):
+            left += item
+        elif isinstance(item, Ladder):
+            yield from (each for rung in item.rungs for each in (rung, *rung.steps))
+        elif isinstance(item, Node) and not (isinstance(item, tree.VarSection) and item.hidden):
+            yield item
+            left += [getattr(item, name) for name in names_of(item)]
+
+
+# --- expressions ------------------------------------------------------------------------------------------------------
+
+
+def _binary(text: str, node: Node) -> Iterator[Replacement]:
+    assert isinstance(node, tree.Binary)
+    written = _WORD.match(text, node.op_start) if node.op not in ("<=", ">=", "<>", "**") else None
+    end = written.end() if written else node.op_start + len(node.op)
+    for operator, table in _OPERATORS.items():
+        for new in table.get(node.op, ()):
+            yield operator, node.op_start, end, new
+
+
+def _condition(text: str, node: Node) -> Iterator[Replacement]:
+    """The condition of an IF, a WHILE or a REPEAT, negated."""
+    conditions = [condition for condition, _ in node.branches] if isinstance(node, tree.If) else (
+        [node.until] if isinstance(node, tree.Repeat) else [node.condition] if isinstance(node, tree.While) else [])  # fmt: skip
+    for each in conditions:
+        yield "NIO", each.start, each.end, f"NOT ({text[each.start : each.end]})"
+
+
+def _negation(text: str, node: Node) -> Iterator[Replacement]:
+    assert isinstance(node, tree.Unary)
+    if node.op == "NOT":
+        yield "NIO", node.start, node.end, f"({text[node.operand.start : node.operand.end]})"
+
+
+def _operand(text: str, node: Node) -> Iterator[Replacement]:
+    """A variable beside AND, OR or XOR, negated."""
+    assert isinstance(node, tree.Binary)
+    if node.op in _LOGICAL:
+        for each in (node.left, node.right):
+            if isinstance(each, tree.NameRef | tree.Member):
+                yield "NIO", each.start, each.end, f"NOT {text[each.start : each.end]}"
+
+
+def _assigned(text: str, node: Node) -> Iterator[Replacement]:
+    """S= for R=, and the other way round: a missing or a wrong reset."""
+    assert isinstance(node, tree.Assign)
+    swapped = {"S=": "R=", "R=": "S="}.get(node.op.upper())
+    at = text.upper().find(node.op.upper(), node.targets[-1].end, node.value.start)
+    if swapped and at >= 0:
+        yield "SRO", at, at + len(node.op), swapped
+
+
+def _literal(text: str, node: Node) -> Iterator[Replacement]:
+    assert isinstance(node, tree.Literal)
+    for new in _values(node):
+        yield "CRO", node.start, node.end, new
+
+
+def _values(node: tree.Literal) -> Iterator[str]:
+    """Other values for a literal: an integer one more or less, TRUE for FALSE, a time a cycle longer or shorter, 0."""
+    prefix = node.text.rpartition("#")[0].partition("#")[0]
+    typed = f"{prefix}#" if node.type_name and prefix else ""
+    if node.kind == "bool":
+        yield f"{typed}{'FALSE' if node.value else 'TRUE'}"
+    elif node.kind == "int":
+        assert isinstance(node.value, int)
+        yield from (f"{typed}{value}" for value in (node.value + 1, node.value - 1) if value >= 0 or node.value < 0)
+    elif node.kind == "real":
+        yield from (f"{typed}0.0" if node.value else f"{typed}1.0",)
+    elif node.kind == "time":
+        assert isinstance(node.value, int)
+        milliseconds, rest = divmod(node.value, 1_000_000)
+        if not rest:
+            changed = (milliseconds + CYCLE_MS, milliseconds - CYCLE_MS)
+            yield from (f"{typed}{value}ms" for value in changed if value >= 0)
+
+
+CYCLE_MS = 10
+"""By how much times are changed: one scan of the usual cycle."""
+
+
+# --- declarations -----------------------------------------------------------------------------------------------------
+
+
+def _block(text: str, node: Node) -> Iterator[Replacement]:
+    """The type of a timer, a trigger, a flip-flop or a counter, exchanged for its relative."""
+    assert isinstance(node, tree.VarDecl)
+    if isinstance(node.spec, tree.NamedType):
+        for new in _BLOCKS.get(node.spec.text.upper(), ()):
+            yield "TRO", node.spec.start, node.spec.end, new
+
+
+# --- statements -------------------------------------------------------------------------------------------------------
+
+
+_SIMPLE = (tree.Assign, tree.CallStatement, tree.Exit, tree.Return, tree.Continue)
+"""Statements without others in them."""
+
+
+def _of_statements(text: str, part: object) -> Iterator[Replacement]:
+    """Of statements that follow one another: one left out, two in the other order."""
+    if not isinstance(part, tuple) or not part:
+        return
+    for inner in part:
+        yield from _of_statements(text, inner)
+    if not all(isinstance(each, tree.Statement) for each in part):
+        return
+    simple = [each for each in part if isinstance(each, _SIMPLE)]
+    for each in simple:
+        yield "SDL", each.start, each.end, ";"
+    for first, second in pairwise(part):
+        if first in simple and second in simple:
+            between = text[first.end : second.start]
+            yield "SWAP", first.start, second.end, text[second.start : second.end] + between + text[first.start : first.end]
+
+
+# --- rungs ------------------------------------------------------------------------------------------------------------
+
+
+def _step(text: str, node: Node) -> Iterator[Replacement]:
+    assert isinstance(node, Step)
+    written = text[node.start : node.end]
+    operator = "CONTACT" if node.mnemonic in _NEGATED else "COIL"
+    if written in _DRAWN:
+        yield operator, node.start, node.end, _DRAWN[written]
+        return
+    found = _AS_MNEMONIC.match(text, node.start)
+    if found is None or "┤" in written or fold(found[2].replace(" ", "")) != fold(node.mnemonic):
+        return
+    new = _NEGATED.get(node.mnemonic) or _OUTPUTS.get(node.mnemonic)
+    if new:
+        yield operator, found.start(2), found.end(2), new
+    if node.prefix in ("@", "%"):
+        yield "EDGE", found.start(1), found.end(1), ""
+
+
+def _rung(text: str, node: Node) -> Iterator[Replacement]:
+    """A rung left out; a rung that other rungs lean on by a jump or a block makes an invalid program, which is not counted."""
+    assert isinstance(node, Rung)
+    behind = _NEXT_RUNG.search(text, node.end)
+    if behind:
+        yield "RDL", node.start, behind.start(1), ""
+
+
+_RULES: tuple[tuple[type[Node], Callable[[str, Node], Iterator[Replacement]]], ...] = (
+    (tree.Binary, _binary), (tree.Binary, _operand), (tree.If, _condition), (tree.While, _condition), (tree.Repeat, _condition),
+    (tree.Unary, _negation), (tree.Assign, _assigned), (tree.Literal, _literal), (tree.VarDecl, _block), (Step, _step),
+    (Rung, _rung))  # fmt: skip
+"""What is tried at each kind of node."""

@@ -1,0 +1,135 @@
+"""What a process does with a mutant: compiles it, runs the project's tests on it in a copy of the project, or proves it equal."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.files import write_file
+from fbvm.campaign.equivalence import proof_of_equality
+from fbvm.campaign.mutants import EQUAL, INVALID, KILLED, SURVIVED, Mutant
+from fbvm.code.image import Image
+from fbvm.testing.subject import SubjectError, subject
+
+PLUGIN = "fbvm.testing.plugin"
+QUIET = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:unraisableexception", "--fbvm-pages", "0")
+"""Options of pytest: it writes no files, and does not look through all objects at its end, which takes as long as quick tests."""
+FAILED, GOOD, NO_TESTS = 1, 0, 5
+"""Exit statuses of pytest."""
+
+
+@dataclass(frozen=True)
+class AsItIs:
+    """A task: the tests without a mutant.  The result is (status of pytest, the first test that failed)."""
+
+
+@dataclass(frozen=True)
+class Equality:
+    """A task: the proof that a mutant gives the same outputs.  The result is what was proved, or ""."""
+
+    mutant: Mutant
+    cycle_ns: int
+    budget_ns: int
+
+
+Task = AsItIs | Mutant | Equality
+Result = tuple[int, str] | tuple[str, str] | str
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Copies of a project in `folders`, a process each; `texts` are the sources by name that mutants are made of.
+
+    `arguments` go to pytest, `libraries` are folders of sources by name, relative to the project's folder."""
+
+    folders: tuple[str, ...]
+    texts: dict[str, str]
+    arguments: tuple[str, ...]
+    libraries: tuple[str, ...]
+
+    def prepare(self, number: int) -> None:
+        """Makes a copy whole again, which a process may have left changed, and goes into it."""
+        sys.dont_write_bytecode = True
+        os.chdir(self.folders[number])
+        for name, text in self.texts.items():
+            write_file(Path(name), text)
+
+    def work(self, number: int, task: Task) -> Result:
+        """Does a task in the copy of a process."""
+        if isinstance(task, AsItIs):
+            return run_tests(self.arguments)
+        if isinstance(task, Equality):
+            return proof_of_equality(task.mutant, self.texts[task.mutant.file], self._shelves(), task.cycle_ns, task.budget_ns)
+        return self._tried(task)
+
+    def _shelves(self) -> list[Path]:
+        return [Path(folder).absolute() for folder in self.libraries]
+
+    def _tried(self, mutant: Mutant) -> tuple[str, str]:
+        """KILLED with the first test that fails, or SURVIVED; EQUAL if the compiled program is the same, INVALID for errors."""
+        path, text = Path(mutant.file), self.texts[mutant.file]
+        original = self._compiled(mutant)
+        with _written(path, mutant.applied(text), text):
+            changed = self._compiled(mutant)
+            if isinstance(original, Image):
+                if not isinstance(changed, Image):
+                    return INVALID, changed
+                if original.fingerprint == changed.fingerprint:
+                    return EQUAL, "the compiled program is the same"
+            status, by = run_tests(self.arguments)
+        return (KILLED, by) if status else (SURVIVED, "")
+
+    def _compiled(self, mutant: Mutant) -> Image | str:
+        """The POU that a mutant changes, compiled as tests do it; the first line of what is wrong if it cannot be."""
+        try:
+            return subject([Path(mutant.file).absolute()], mutant.change.pou, self._shelves(), alone=True).image
+        except SubjectError as error:
+            return str(error).split("\n", 1)[0]
+
+
+@contextmanager
+def _written(path: Path, text: str, before: str) -> Iterator[None]:
+    """The file has another text inside the `with` block."""
+    write_file(path, text)
+    try:
+        yield
+    finally:
+        write_file(path, before)
+
+
+class _First:
+    """A plugin of pytest that keeps the name of the first test, or file, that fails."""
+
+    def __init__(self) -> None:
+        self.failed = ""
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self.failed = self.failed or report.nodeid
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.failed:
+            self.failed = self.failed or report.nodeid
+
+
+def run_tests(arguments: Sequence[str]) -> tuple[int, str]:
+    """Runs pytest in the present folder and process until a test fails: its status, and the name of that test.
+
+    Modules of the folder are forgotten afterwards, since they may hold programs that were compiled from what it held."""
+    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
+    first, path, folder = _First(), list(sys.path), f"{Path.cwd()}{os.sep}"
+    try:
+        status = pytest.main([*QUIET, *([] if installed else ["-p", PLUGIN]), *arguments], [first])
+    finally:
+        sys.path[:] = path
+        for name, module in list(sys.modules.items()):
+            if str(vars(module).get("__file__")).startswith(folder):
+                del sys.modules[name]
+    return int(status), first.failed

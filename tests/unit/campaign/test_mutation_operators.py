@@ -1,0 +1,65 @@
+"""Which changes of a text are mutants, exactly where they stand."""
+
+from __future__ import annotations
+
+from rows import each_of
+
+from fbvm.base.diagnostics import Source
+from fbvm.campaign.mutants import Change, Mutant
+from fbvm.campaign.mutation import mutants_of
+
+HEAD = "PROGRAM Main\nVAR a, b, c : BOOL; n : INT; t : TIME; END_VAR\n"
+
+
+def lines(body: str, head: str = HEAD) -> set[str]:
+    """The mutants of a body of one line, each as `OPERATOR the line afterwards`."""
+    text = f"{head}{body}\nEND_PROGRAM\n"
+    found = mutants_of([Source("main.st", text)])
+    return {f"{each.change.operator} {each.applied(text)[len(head):-len('END_PROGRAM') - 2]}" for each in found}
+
+
+STATEMENTS = {
+    "n := n + 1;": {"ARO n := n - 1;", "CRO n := n + 0;", "CRO n := n + 2;", "SDL ;;"},
+    "a := b AND NOT c;": {"LRO a := b OR NOT c;", "NIO a := NOT b AND NOT c;", "NIO a := b AND (c);", "SDL ;;"},
+    "a := n <= 3;": {"ROR a := n < 3;", "ROR a := n > 3;", "CRO a := n <= 2;", "CRO a := n <= 4;", "SDL ;;"},
+    "a S= b;": {"SRO a R= b;", "SDL ;;"},
+    "t := T#50ms;": {"CRO t := T#40ms;", "CRO t := T#60ms;", "SDL ;;"},
+    "a := TRUE; b := a;": {"CRO a := FALSE; b := a;", "SDL ;; b := a;", "SDL a := TRUE; ;;", "SWAP b := a; a := TRUE;"},
+    "IF a THEN ; END_IF": {"NIO IF NOT (a) THEN ; END_IF"},
+}
+
+
+@each_of("body", STATEMENTS)
+def test_a_statement_has_these_mutants(body: str) -> None:
+    assert lines(body) == STATEMENTS[body]
+
+
+BLOCKS = {"TON": {"TOF", "TP"}, "TOF": {"TON"}, "R_TRIG": {"F_TRIG"}, "RS": {"SR"}, "CTU": {"CTD"}}
+
+
+@each_of("block", BLOCKS)
+def test_a_standard_block_is_taken_for_its_relatives(block: str) -> None:
+    text = f"PROGRAM Main\nVAR x : {block}; END_VAR\nEND_PROGRAM\n"
+    assert {each.change.text for each in mutants_of([Source("main.st", text)])} == BLOCKS[block]
+
+
+def test_rungs_in_mnemonics_have_contacts_coils_edges_and_themselves_changed() -> None:
+    found = lines("LADDER\nRUNG 1\nLD a\nANDNOT b\n@SET c\nEND_LADDER")
+    assert found == {
+        "CONTACT LADDER\nRUNG 1\nLDNOT a\nANDNOT b\n@SET c\nEND_LADDER",
+        "CONTACT LADDER\nRUNG 1\nLD a\nAND b\n@SET c\nEND_LADDER",
+        "COIL LADDER\nRUNG 1\nLD a\nANDNOT b\n@OUT c\nEND_LADDER",
+        "EDGE LADDER\nRUNG 1\nLD a\nANDNOT b\nSET c\nEND_LADDER",
+        "RDL LADDER\nEND_LADDER",
+    }  # fmt: skip
+
+
+def test_drawn_rungs_keep_their_drawing() -> None:
+    found = lines("LADDER\nRUNG 1\n│  a    b       c  │\n├──┤ ├──┤/├────( )─┤\nEND_LADDER")
+    assert {each.split("\n")[3] for each in found if each.startswith("CO")} == {
+        "├──┤/├──┤/├────( )─┤", "├──┤ ├──┤ ├────( )─┤", "├──┤ ├──┤/├────(/)─┤"}  # fmt: skip
+
+
+def test_a_diff_names_the_file_and_the_line() -> None:
+    mutant = Mutant(1, "src/a.st", 2, Change("CRO", 7, 8, "1", "A"))
+    assert mutant.diff("a := 0\nb:= 0;\n") == "--- src/a.st\n+++ src/a.st\n@@ -2 +2 @@\n-b:= 0;\n+1:= 0;"
