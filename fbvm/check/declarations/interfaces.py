@@ -24,6 +24,7 @@ from fbvm.base.types import (
     followed,
 )
 from fbvm.check.declarations import construction, initializers
+from fbvm.check.declarations.hidden import add_hidden
 from fbvm.check.declarations.inheritance import refuse_abstract, resolve_head
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.declarations.variables import check_qualifiers, initialized, is_constant, make_variable, type_of
@@ -31,7 +32,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Edge, Pou, Variable, is_block, is_open
 from fbvm.check.symbols.project import Resolved
-from fbvm.check.symbols.statement_lists import names_of_eno, writes_eno
+from fbvm.check.symbols.statement_lists import writes_eno
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import passes_places
 
@@ -77,10 +78,7 @@ class _Interface:
             if self._is_allowed(section):
                 self._section(section)
         pou.later = {}
-        for name in sorted(self.project.tasked(pou.name)) if pou.kind == "PROGRAM" else ():
-            self._tasked(name)
-        for name in sorted(names_of_eno(pou)):
-            self._eno(name)
+        add_hidden(self.project, pou)
         if self.at_start:
             pou.tree, pou.as_written = initializers.with_assignments(pou, self.at_start), False
         if pou.tree.result is not None:
@@ -88,9 +86,7 @@ class _Interface:
         if (constructed := construction.with_construction(self.context, pou)) is not pou.tree:
             self._construct(constructed)
         if "ENO" not in pou.variables and writes_eno(pou):
-            eno = Variable("ENO", BOOL, "VAR_OUTPUT", pou.source, pou.tree.name, pou, initial=b"\x01")
-            self._register(eno)
-            pou.enables_itself = True
+            self._enables_itself()
         if pou.is_routine:
             self._frame([v for v in pou.order if v.place == "self"])
         else:
@@ -99,6 +95,12 @@ class _Interface:
             self._instance()
         for action, source in pou.written_actions:
             self._action(action, source)
+
+    def _enables_itself(self) -> None:
+        """Declare the ENO that the body writes."""
+        pou = self.pou
+        self._register(Variable("ENO", BOOL, "VAR_OUTPUT", pou.source, pou.tree.name, pou, initial=b"\x01"))
+        pou.enables_itself = True
 
     def _construct(self, constructed: tree.Pou) -> None:
         """Take the tree with the construction of instances at its start, and declare what that needs."""
@@ -118,21 +120,6 @@ class _Interface:
     def _error(self, code: str, node: tree.Node, message: str, hint: str = "",
                related: tuple[Source, int, str] | None = None) -> None:
         self.context.report.add(code, self.pou.source, node, message, hint, related)
-
-    def _tasked(self, name: str) -> None:
-        """Declare the hidden variable that says whether a task of its own runs an instance in this program."""
-        block = self.pou.variables.get(name)
-        if block is not None and block.kind == "VAR" and is_block(block.type):
-            flag = Variable(f"{block.name} task", BOOL, "VAR", self.pou.source, block.node, self.pou, initial=b"\0")
-            self.pou.order.append(flag)
-            self.pou.tasked[block] = flag
-
-    def _eno(self, name: str) -> None:
-        """Declare the hidden variable that says whether the last call of an instance has run it."""
-        block = self.pou.variables.get(name)
-        if block is not None and block.owner is self.pou and block.kind == "VAR" and is_block(block.type):
-            block.eno = Variable(f"{block.name} ENO", BOOL, "VAR", self.pou.source, block.node, self.pou, initial=b"\0")
-            self.pou.order.append(block.eno)
 
     def _action(self, action: tree.Action, source: Source) -> None:
         """Make the POU of an ACTION: a body of its own, with the variables of the POU that it belongs to."""

@@ -68,7 +68,7 @@ def initialized(scope: Scope, declared: tree.VarDecl, resolved: Resolved) -> Res
 def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, section: tree.VarSection, source: Source,
                   resolved: Resolved) -> Variable:
     """One variable as declared, with its location but without a place."""
-    report, facts = context.report, context.facts
+    report = context.report
     refuse_reserved(report, source, name, context.project.dialect)
     kind, initial = resolved
     words = {fold(q.text) for q in section.qualifiers}
@@ -80,22 +80,29 @@ def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, sec
     elif made.constant and is_block(kind):
         report.add("S0206", source, name, "an instance cannot be CONSTANT")
     elif made.constant and section.kind not in ("VAR_INPUT", "VAR_IN_OUT"):  # these the caller gives
-        if declared.initial is None and not isinstance(kind, StructType | ArrayType):
-            if context.project.dialect.idle_constants:
-                report.add("S0193", source, name, f"the constant {name.text} has no value, and keeps the first one of its type")
-                made.value = decode(kind, initial) if isinstance(base(kind), Elementary | EnumType | StringType) else None
-            else:
-                report.add("S0701", source, name, f"the constant {name.text} has no value",
-                           f"write := and its value, or take {takers('idle_constants')}")
-        elif isinstance(declared.initial, tree.Expr):
-            made.wrong = declared.initial in facts.wrong
-            made.value = None if made.wrong else facts.constants.get(declared.initial)
+        _give_value(context, made, declared)
     if declared.location is not None:
         made.location = location_of(context, declared, kind, source)
         place = made.location
         if isinstance(kind, ArrayType) and place is not None and (place.bit is not None or place.area in FLAG_AREAS):
             made.type = on_bits(kind)
     return made
+
+
+def _give_value(context: Context, made: Variable, declared: tree.VarDecl) -> None:
+    """Gives a constant its value."""
+    report, facts = context.report, context.facts
+    if isinstance(declared.initial, tree.Expr):
+        made.wrong = declared.initial in facts.wrong
+        made.value = None if made.wrong else facts.constants.get(declared.initial)
+    elif declared.initial is not None or isinstance(made.type, StructType | ArrayType):
+        return
+    elif context.project.dialect.idle_constants:
+        report.add("S0193", made.source, made.node, f"the constant {made.name} has no value, and keeps the first one of its type")
+        made.value = decode(made.type, made.initial) if isinstance(base(made.type), Elementary | EnumType | StringType) else None
+    else:
+        report.add("S0701", made.source, made.node, f"the constant {made.name} has no value",
+                   f"write := and its value, or take {takers('idle_constants')}")
 
 
 def later_constant(context: Context, pou: Pou, name: tree.NameRef) -> Variable | None:

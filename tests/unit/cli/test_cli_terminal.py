@@ -107,7 +107,7 @@ def test_options_and_arguments(fbvm: Fbvm) -> None:
         ("run", "trapped.st", "--scans", "1"), ("run", "trapped.st", "--scans", "1", "--show", "Main.s", "--json"),
         ("run", "trapped.st", "--scans", "1", "--show", "Main.s"), ("learn", EVIL), ("test", EVIL),
         ("prove", "counter.st", "--never", EVIL), ("prove", "counter.st", "--always", f"Main.{EVIL} = 1"),
-        ("prove", f"no{EVIL}.st"),
+        ("prove", f"no{EVIL}.st"), ("mutate", f"no{EVIL}.st"), ("mutate", "--tests", EVIL, "counter.st"),
     ):  # fmt: skip
         fbvm(*arguments)
 
