@@ -226,7 +226,7 @@ class Program:
         checker.bodies[:] = [pou for pou in checker.bodies if pou not in bodies]
         checker.global_order[:] = [variable for variable in checker.global_order if variable.owner is not former]
         project.report = checker.report = report
-        project.size_limits = SizeLimits(report)
+        project.size_limits = SizeLimits(report, project.dialect.large_memory)
         project.collect(new.syntax, new.source)
         before_check = len(report.diagnostics)
         project.new_pous.clear()

@@ -49,6 +49,7 @@ class Dialect:
     action_inputs: bool = False
     subranges_unchecked: bool = False
     padding_is_written: bool = False
+    large_memory: bool = False
     unsigned_ltime: bool = False
     empty_bodies: bool = False
     in_outs_are_read: bool = False
@@ -135,6 +136,8 @@ QUESTIONS = {
                            "stops the program (R0110)",
                            "written: arrays, structures and texts there are padded to 8 bytes; what lies behind that stops the "
                            "program"),
+    "large_memory": ("a variable, structure or instance of 100 MiB", "an error (S0603): more than 64 MiB, or 256 MiB together",
+                     "taken: up to 128 MiB, and 1 GiB together"),
     "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
                      "runs nothing"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
@@ -190,7 +193,8 @@ _ROWS = (
     STANDARD,
     _CODESYS,
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
-            libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit"), unsigned_ltime=True),
+            libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit"), unsigned_ltime=True,
+            large_memory=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,

@@ -92,6 +92,10 @@ def comments(text: str) -> list[str]:
     return ["\n".join(line.strip() for line in comment.text.split("\n")) for _, comment in ordered]
 
 
+SPELLINGS = ("spaced_durations", "bits_by_name")
+"""Forms that the canonical form does not have: `T# 5s` becomes `T#5s`, `w.%Xk` becomes `w.k`."""
+
+
 def meaning(value: Any) -> Any:
     """A tree as plain data without places, names without case, values to the letter."""
     if isinstance(value, Literal):
@@ -101,7 +105,7 @@ def meaning(value: Any) -> Any:
     if isinstance(value, Node):
         return type(value).__name__, [meaning(getattr(value, name)) for name in names_of(value) if name not in PLACES]
     if isinstance(value, tuple):
-        return [meaning(item) for item in value]
+        return [meaning(item) for item in value if not (isinstance(item, Form) and item.switch in SPELLINGS)]
     return " ".join(value.upper().split()) if isinstance(value, str) else value
 
 

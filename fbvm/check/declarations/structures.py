@@ -10,7 +10,7 @@ import re
 from fbvm.base.digits import whole_number
 from fbvm.base.types import BOOL, Field, StructType, Type, base, fold
 from fbvm.check.symbols.facts import holds_block, is_block
-from fbvm.check.symbols.size_limits import MAX_SIZE
+from fbvm.check.symbols.size_limits import LARGE_SIZE
 from fbvm.syntax import tree
 
 RELATIVE = "a place in a structure is written %B2 (byte 2), %W1 (word 1) or %X2.0 (bit 0 of byte 2)"
@@ -52,7 +52,7 @@ class Members:
             offset, bit = self._next_bit()
         else:
             offset, bit = 0 if self.shared else len(self._content) + -len(self._content) % align, None
-        if offset + kind.size > MAX_SIZE:
+        if offset + kind.size > LARGE_SIZE:
             return f"{name} would lie beyond the end of any structure"
         start = offset * 8 + (bit or 0)
         end = start + 1 if bit is not None else start + kind.size * 8

@@ -71,7 +71,7 @@ class Project:
         self.libraries = libraries
         self.report = report
         self.facts = Facts()
-        self.size_limits = SizeLimits(report)
+        self.size_limits = SizeLimits(report, dialect.large_memory)
         self.pous: dict[tuple[str, str], Pou] = {}
         self.types: dict[tuple[str, str], TypeEntry] = {}
         self.globals: dict[tuple[str, str], Variable] = {}

@@ -6,24 +6,25 @@ from fbvm.base.diagnostics import Source
 from fbvm.check.symbols.report import Report
 from fbvm.syntax import tree
 
-MAX_SIZE = 128 << 20
-"""Largest variable, structure or instance in bytes."""
-MAX_TOGETHER = 1 << 30
+MAX_SIZE, LARGE_SIZE = 64 << 20, 128 << 20
+"""Largest variable, structure or instance in bytes; where the dialect has `large_memory`."""
+MAX_TOGETHER, LARGE_TOGETHER = 256 << 20, 1 << 30
 """Bytes that all declarations of a program may take; those of an array in a block are counted with both."""
 
 
 class SizeLimits:
     """Counts the bytes that the declarations of one program take."""
 
-    def __init__(self, report: Report) -> None:
+    def __init__(self, report: Report, large: bool) -> None:
         self._report = report
+        self._size, self._together = (LARGE_SIZE, LARGE_TOGETHER) if large else (MAX_SIZE, MAX_TOGETHER)
         self._reserved = 0
 
     def allows(self, size: int, what: str, source: Source, node: tree.Node) -> bool:
         """True if one object may have `size` bytes; else a diagnostic that begins with `what`, such as "the array takes"."""
-        if size > MAX_SIZE:
-            self._report.add("S0603", source, node, f"{what} more than {MAX_SIZE >> 20} MiB")
-        return size <= MAX_SIZE
+        if size > self._size:
+            self._report.add("S0603", source, node, f"{what} more than {self._size >> 20} MiB")
+        return size <= self._size
 
     def reserve(self, size: int, what: str, source: Source, node: tree.Node) -> bool:
         """Count `size` bytes more; False if one object or all together become too large.
@@ -31,8 +32,8 @@ class SizeLimits:
         That all together are too large is reported once."""
         if not self.allows(size, what, source, node):
             return False
-        full = self._reserved > MAX_TOGETHER
+        full = self._reserved > self._together
         self._reserved += size
-        if self._reserved > MAX_TOGETHER and not full:
+        if self._reserved > self._together and not full:
             self._report.add("S0603", source, node, "there is no room for all variables together")
-        return self._reserved <= MAX_TOGETHER
+        return self._reserved <= self._together
