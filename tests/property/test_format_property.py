@@ -165,7 +165,7 @@ def image(text: str) -> object:
 @each_folder(())
 def test_every_program_is_compiled_to_the_same_image(path: Path) -> None:
     for text in programs(path):
-        assert image(text) == image(write(text))
+        assert write(text) == text or image(text) == image(write(text))
 
 
 # --- changes that must not matter ---

@@ -42,7 +42,7 @@ def pressed(random: Random, plc: Plc, number: int) -> None:
 def test_classics_with_random_inputs(path: Path) -> None:
     image = compile_files([path], runnable=True).image
     assert image is not None
-    compare_scans(image, CYCLE_NS, 60 * times(5), BUDGET, partial(pressed, Random(1)))
+    compare_scans(image, 3 * CYCLE_NS, times(100, 60), BUDGET, partial(pressed, Random(1)))
 
 
 ENCODED = [p for p in lang_corpus.programs() if p.runs]
@@ -79,7 +79,7 @@ def test_programs_of_the_corpus(folder: list[lang_corpus.Program]) -> None:
 @pytest.mark.slow
 def test_random_programs() -> None:
     refused = 0
-    for seed in range(20 * times(20)):
+    for seed in range(times(100, 80)):
         text, _ = st_programs.text_of(st_programs.made(seed))
         image = compile_text(text).image
         if image is not None:
@@ -87,7 +87,7 @@ def test_random_programs() -> None:
                 compare_scans(image, CYCLE_NS, 3, st_programs.budget(image))
             except Refused:
                 refused += 1
-    assert refused <= 4 * times(20)
+    assert refused <= times(20, 80)
 
 
 def test_every_operation_has_its_row() -> None:
