@@ -53,8 +53,8 @@ class Place:
 
     @property
     def is_generated(self) -> bool:
-        """True for a variable that the compiler has added, such as the memory of an edge in a rung."""
-        return "$" in self.name
+        """True for a variable that the compiler has added, such as the memory of an edge in a rung, or `pump ENO`."""
+        return "$" in self.name or not self.area and " " in self.name
 
     def inner(self, name: str, type_: Type, distance: int, bit: int | None = None) -> Place:
         """The part of this place that begins `distance` bytes behind its start."""
