@@ -11,7 +11,7 @@ from fbvm.campaign.mutants import Mutant
 from fbvm.code.compiler import compile_sources
 from fbvm.prove import equality
 from fbvm.prove.encoding.execution import Refused
-from fbvm.prove.prover import Limits, Prover, SpuriousRun
+from fbvm.prove.prover import Limits, SpuriousRun, prove
 from fbvm.prove.question import PROVED
 from fbvm.prove.solver import SolverMissing
 from fbvm.run.time_limit import time_limit
@@ -41,7 +41,7 @@ def proof_of_equality(mutant: Mutant, text: str, libraries: Sequence[Path], cycl
         if made.image is None:
             return ""
         question = equality.equality(made.image, names)
-        verdict = Prover(made.image, question, Limits(cycle_ns, expired=time_limit(budget_ns)), lambda said: None).answer()
+        verdict = prove(made.image, question, Limits(cycle_ns, expired=time_limit(budget_ns)))
     except (equality.Unlike, Refused, SpuriousRun, SolverMissing, UnknownPlace, ConditionError):
         return ""
     return f"proved {verdict.how}" if verdict.word == PROVED else ""

@@ -14,7 +14,7 @@ from fbvm.prove.encoding.properties import condition_term, place_term
 from fbvm.prove.encoding.rewriting import cone, leaves
 from fbvm.prove.encoding.scan import FixedCycle
 from fbvm.prove.encoding.summary import Summary, summarize
-from fbvm.prove.encoding.terms import Term
+from fbvm.prove.encoding.terms import Term, TimeOver
 from fbvm.prove.induction import Induction
 from fbvm.prove.invariants import Guess, Invariants, facts_of, guesses
 from fbvm.prove.question import (
@@ -68,7 +68,12 @@ def prove(image: Image, question: Question, limits: Limits | None = None, tell: 
 
     `tell` is told what is done.  Raises Refused for a program or property that cannot be followed, ConditionError and
     UnknownPlace for names that it does not have, SolverMissing."""
-    return Prover(image, question, limits or Limits(), tell).answer()
+    try:
+        prover = Prover(image, question, limits or Limits(), tell)
+    except TimeOver:
+        how = "the time is over: one scan has too many ways to follow all of them"
+        return Verdict(question, UNDECIDED, how, places=Judge.of(image, question).places)
+    return prover.answer()
 
 
 class Prover:
@@ -79,7 +84,7 @@ class Prover:
         self.judge = Judge.of(image, question)
         names = Names(image, question.prefix)
         free = [extent for name in question.free for extent in names.extents(name)]
-        self.summary: Summary = summarize(image, STEP_BUDGET, free)
+        self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired)
         self.clock = FixedCycle(self.summary.terms, image.tasks, limits.cycle_ns)
         self.goal = self._goal(names)
         self.notes: list[str] = []

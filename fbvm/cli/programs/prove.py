@@ -25,7 +25,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove import equality
 from fbvm.prove.encoding.execution import Refused
-from fbvm.prove.prover import Limits, Prover, SpuriousRun
+from fbvm.prove.prover import Limits, SpuriousRun, prove
 from fbvm.prove.pytest_text import pytest_text
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
 from fbvm.prove.report import details, headline
@@ -119,7 +119,7 @@ def _answered(image: Image, question: Question, options: dict[str, Any]) -> Verd
     limits = Limits(options["cycle_ns"], options["scans"], options["seed"], time_limit(options["budget_ns"]))
     try:
         with _told(str(question)) as tell:
-            return Prover(image, question, limits, tell).answer()
+            return prove(image, question, limits, tell)
     except (UnknownPlace, ConditionError) as error:
         raise click.UsageError(str(error)) from None
     except SolverMissing as error:

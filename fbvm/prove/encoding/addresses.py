@@ -96,42 +96,61 @@ def cases(terms: Terms, state: State, term: Term, most: int = MOST_CASES) -> Cas
     """The values that a term may have, each with its condition; None if there are too many.
 
     What checks of the path have ruled out is left out: where it is the value all the same, the scan has trapped."""
-    if term.is_constant:
-        return [(terms.true, term.value)]
-    found = _cases(terms, state, term, most)
-    if found is None or term not in state.known:
-        return found
-    low, high = state.known[term]
-    return [(condition, value) for condition, value in found if low <= signed(value, term.width) <= high]
+    return _Values(terms, state, most).of(term)
 
 
-def _cases(terms: Terms, state: State, term: Term, most: int) -> Cases | None:
-    if term.op == "ite":
-        ways = [cases(terms, state, way, most) for way in term.args[1:]]
-        if ways[0] is None or ways[1] is None or len(ways[0]) + len(ways[1]) > most:
+class _Values:
+    """The values of terms at one place of a scan; those of parts that terms share are worked out once."""
+
+    def __init__(self, terms: Terms, state: State, most: int) -> None:
+        self.terms, self.state, self.most = terms, state, most
+        self._found: dict[Term, Cases | None] = {}
+
+    def of(self, term: Term) -> Cases | None:
+        if term.is_constant:
+            return [(self.terms.true, term.value)]
+        if term not in self._found:
+            found = self._worked_out(term)
+            if found is not None and term in self.state.known:
+                low, high = self.state.known[term]
+                found = [(condition, value) for condition, value in found if low <= signed(value, term.width) <= high]
+            self._found[term] = found
+        return self._found[term]
+
+    def _worked_out(self, term: Term) -> Cases | None:
+        if term.op == "ite":
+            return self._of_choice(*term.args)
+        if term.op in _STRUCTURAL:
+            return self._of_operands(term)
+        return self._enumerated(term)
+
+    def _of_choice(self, choice: Term, then: Term, otherwise: Term) -> Cases | None:
+        ways = self.of(then), self.of(otherwise)
+        if ways[0] is None or ways[1] is None or len(ways[0]) + len(ways[1]) > self.most:
             return None
-        choice = (term.args[0], terms.not_(term.args[0]))
-        return _merged(terms, [(terms.and_(c, condition), value) for c, way in zip(choice, ways, strict=True)
-                               for condition, value in way or []])  # fmt: skip
-    if term.op in _STRUCTURAL:
+        chosen = [(choice, found) for found in ways[0]] + [(self.terms.not_(choice), found) for found in ways[1]]
+        return _merged(self.terms, [(self.terms.and_(c, condition), value) for c, (condition, value) in chosen])
+
+    def _of_operands(self, term: Term) -> Cases | None:
+        """What the operation gives for each combination of its operands' values."""
+        terms = self.terms
         made: list[tuple[Term, list[Term]]] = [(terms.true, [])]
         for arg in term.args:
-            each = cases(terms, state, arg, most)
-            if each is None or len(made) * len(each) > most:
-                return _enumerated(terms, state, term, most)
+            each = self.of(arg)
+            if each is None or len(made) * len(each) > self.most:
+                return self._enumerated(term)
             made = [(terms.and_(c, condition), [*values, terms.constant(arg.width, value)])
                     for c, values in made for condition, value in each]  # fmt: skip
         results = ((condition, terms.again(term, tuple(values))) for condition, values in made)
         return _merged(terms, [(condition, int(result.value)) for condition, result in results])
-    return _enumerated(terms, state, term, most)
 
-
-def _enumerated(terms: Terms, state: State, term: Term, most: int) -> Cases | None:
-    low, high = state.known.get(term) or bounds(term, True)
-    if high - low >= most:
-        return None
-    numbers = ((terms.constant(term.width, number)) for number in range(low, high + 1))
-    return [(terms.eq(term, number), number.value) for number in numbers]
+    def _enumerated(self, term: Term) -> Cases | None:
+        """All values within the bounds of a term."""
+        low, high = self.state.known.get(term) or bounds(term, True)
+        if high - low >= self.most:
+            return None
+        numbers = (self.terms.constant(term.width, number) for number in range(low, high + 1))
+        return [(self.terms.eq(term, number), number.value) for number in numbers]
 
 
 def _merged(terms: Terms, found: Cases) -> Cases:

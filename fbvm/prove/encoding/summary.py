@@ -15,7 +15,7 @@ from fbvm.engine.depths import with_recursion_room
 from fbvm.prove.encoding.cells import BIT, Cell, Contents, Partition, Reshape, constant_of, initial_bytes
 from fbvm.prove.encoding.execution import Refused, TrapCondition
 from fbvm.prove.encoding.scan import WIDTHS, Scanned, Signal, scan
-from fbvm.prove.encoding.terms import Term, Terms
+from fbvm.prove.encoding.terms import Term, Terms, never
 
 FRAMES_A_LEVEL = 8
 """Python frames that executing takes at most for each level of nested code."""
@@ -52,23 +52,27 @@ class Summary:
 IsInput = Callable[[Cell], bool]
 
 
-def summarize(image: Image, budget: int, free: Iterable[tuple[int, int, int | None]] = ()) -> Summary:
+def summarize(image: Image, budget: int, free: Iterable[tuple[int, int, int | None]] = (),
+              expired: Callable[[], bool] = never) -> Summary:
     """The summary of a program.
 
     `budget` is the step budget of a scan; `free` are places (offset, bytes, bit or None) that are inputs besides those that
-    `input_places` finds.  Raises Refused for a program that cannot be followed, with the site."""
-    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_summarized, image, budget, [*input_places(image), *free]))
+    `input_places` finds.  Raises Refused for a program that cannot be followed, with the site, and TimeOver if `expired` answers
+    True before it is done."""
+    places = [*input_places(image), *free]
+    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_summarized, image, budget, places, expired))
 
 
-def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None]]) -> Summary:
+def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None]], expired: Callable[[], bool]) -> Summary:
     area = AREAS["CIO"]
     partition = Partition(bitwise=range(area.offset, area.offset + area.size_bytes))
     numbers: frozenset[int] = frozenset()
     for _ in range(MOST_ROUNDS):
         try:
             used = set(partition.used)
-            found = _Fixpoint(image, budget, partition, free).summary()
+            found = _Fixpoint(image, budget, partition, free, expired).summary()
             if partition.used == used:
+                found.terms.expired = never
                 return found
             partition = partition.shaped()
         except Reshape as reshape:
@@ -82,8 +86,9 @@ def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None
 class _Fixpoint:
     """Finds what is state: at first nothing is, then what some scan leaves with another value than it may have had before."""
 
-    def __init__(self, image: Image, budget: int, partition: Partition, free: list[tuple[int, int, int | None]]) -> None:
-        self.image, self.budget, self.partition, self.terms = image, budget, partition, Terms()
+    def __init__(self, image: Image, budget: int, partition: Partition, free: list[tuple[int, int, int | None]],
+                 expired: Callable[[], bool]) -> None:  # fmt: skip
+        self.image, self.budget, self.partition, self.terms = image, budget, partition, Terms(expired)
         self.power_on = initial_bytes(image.initial)
         self.free_bytes = {at for offset, size, bit in free if bit is None for at in range(offset, offset + size)}
         self.free_bits = {(offset, bit) for offset, _, bit in free if bit is not None}

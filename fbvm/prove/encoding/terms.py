@@ -8,23 +8,41 @@ same operands.  A proof that needs nothing of them holds; a counterexample in wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from fbvm.prove.encoding.term import FEW_LEAVES, TEXT, Term, bounds, leaf_count, opposite, signed
 
-__all__ = ["TEXT", "Term", "Terms", "bounds", "signed"]
+__all__ = ["TEXT", "Term", "Terms", "TimeOver", "bounds", "signed"]
+
+TERMS_A_LOOK = 4096
+"""After how many terms a factory asks whether the time is over."""
+
+
+class TimeOver(Exception):
+    """The time that was given has passed while terms were made."""
+
+
+def never() -> bool:
+    """No limit of time."""
+    return False
 
 
 class Terms:
-    """Makes terms.  Terms of two factories are never mixed."""
+    """Makes terms.  Terms of two factories are never mixed.  Raises TimeOver once `expired` answers True."""
 
-    def __init__(self) -> None:
+    def __init__(self, expired: Callable[[], bool] = never) -> None:
+        self.expired = expired
+        self._asked = 0
         self._known: dict[tuple[Any, ...], Term] = {}
         self.false = self._make("const", 0, (), 0, 0, 0)
         self.true = self._make("const", 0, (), 1, 1, 1)
 
     def _make(self, op: str, width: int, args: tuple[Term, ...], value: Any = None, low: int = 0,
               high: int | None = None) -> Term:  # fmt: skip
+        self._asked += 1
+        if not self._asked % TERMS_A_LOOK and self.expired():
+            raise TimeOver
         key = (op, width, value, args) if op != "const" else (op, width, type(value), value)
         term = self._known.get(key)
         if term is None:

@@ -270,3 +270,16 @@ def test_a_loop_that_cannot_be_followed_to_its_end_leaves_it_undecided() -> None
     verdict = asked(image, NEVER, "Main.Q AND NOT Main.In")
     assert verdict.word == "undecided"
     assert verdict.how.startswith("a loop goes on for longer than it can be followed (text.st:6:")
+
+
+CHECKSUM = """FOR i := 0 TO 30 DO
+    sum := table[WORD_TO_UINT((SHR(sum, 8) XOR SHL(sum, 1) XOR INT_TO_WORD(Level)) AND 16#3FF)];
+END_FOR"""
+
+
+def test_a_scan_with_too_many_ways_is_undecided_when_the_time_is_over() -> None:
+    asks = iter(range(3))
+    limits = Limits(expired=lambda: next(asks, None) is None)
+    verdict = asked(program(CHECKSUM, "i : INT; sum : WORD; table : ARRAY[0..1023] OF WORD;"), NO_TRAP, limits=limits)
+    assert (verdict.word, verdict.how, verdict.scans) == (
+        "undecided", "the time is over: one scan has too many ways to follow all of them", 0)
