@@ -304,8 +304,9 @@ def construct_at_start(context: Context) -> None:
     variables = [each for each in context.global_order if constructs(context, each.type)]
     if not variables or not context.tasks:
         return
-    made = [_of_source(context, source, [each for each in variables if each.source is source], phase)
-            for phase in PHASES for source in dict.fromkeys(each.source for each in _in_order(variables))]
+    sources = list(dict.fromkeys(each.source for each in _in_order(variables)))
+    made = [_of_source(context, number, [each for each in variables if each.source is source], phase)
+            for phase in PHASES for number, source in enumerate(sources)]
     source = Source(INIT, "{attribute 'hide'}\nFB_init of all instances")
     at = source.text.index("\n") + 1, len(source.text)
     done = Variable("FB_init is over", BOOL, "VAR_GLOBAL", source, tree.Name(*at, "FB_init"), place="abs", initial=b"\0")
@@ -332,8 +333,10 @@ def _in_order(variables: list[Variable]) -> list[Variable]:
     return sorted(variables, key=lambda each: each.kind == "PROGRAM")
 
 
-def _of_source(context: Context, source: Source, variables: list[Variable], phase: str) -> Pou:
-    """The function that constructs the variables of one source."""
+def _of_source(context: Context, number_of_source: int, variables: list[Variable], phase: str) -> Pou:
+    """The function that constructs the variables of one source.  It is named by a number, since the sources of a program that is
+    being edited are parts of files, several with the name of one file."""
+    source = variables[0].source
     made_of = Statements(context, source)
     at = variables[0].node.start, variables[0].node.end
     body: list[tree.Statement] = []
@@ -342,7 +345,7 @@ def _of_source(context: Context, source: Source, variables: list[Variable], phas
         name = f"{variable.name} {number}"
         aliases[fold(name)] = variable
         body += made_of.of(variable, name, phase)
-    name = f"{phase} of {source.name}"
+    name = f"{phase} of source {number_of_source}"
     written = tree.Pou(*at, "FUNCTION", tree.Name(*at, name), None, made_of.sections(), tuple(body))
     made = Pou(name, "FUNCTION", source, written, as_written=False)
     made.variables.update(aliases)
