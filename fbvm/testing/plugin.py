@@ -74,7 +74,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
     """Projects of TwinCAT are files of tests, too."""
-    early_config.pluginmanager.import_plugin("fbvm.testing.suites.items")
+    early_config.pluginmanager.import_plugin("fbvm.testing.suites.plugin")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -12,8 +12,9 @@ from fbvm.base.files import SOURCE_BYTES, read_file
 from fbvm.interchange.cx.markup import is_project
 from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.twincat import PROJECT_SUFFIX
 from fbvm.interchange.twincat import objects as twincat
-from fbvm.interchange.twincat.project import PROJECT_SUFFIX, TASK_SUFFIX, read_project, task_source
+from fbvm.interchange.twincat.project import TASK_SUFFIX, read_project, task_source
 
 CX_SUFFIXES = (".cxp", ".cxt")
 TWINCAT_SUFFIXES = (*twincat.SUFFIXES, TASK_SUFFIX)

@@ -11,7 +11,6 @@ from fbvm.base.files import SOURCE_BYTES, read_file, reason
 from fbvm.interchange.markup import Element, parse_markup
 from fbvm.interchange.twincat.objects import SUFFIXES, ImportedObject, read_object
 
-PROJECT_SUFFIX = ".plcproj"
 TASK_SUFFIX = ".tctto"
 TASKS = "Tasks.st"
 """What the source is called that says which programs run when."""

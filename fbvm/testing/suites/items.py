@@ -15,39 +15,19 @@ import pytest
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import dialect as named_dialect
 from fbvm.code.compiler.driver import compile_sources
-from fbvm.interchange.twincat.project import PROJECT_SUFFIX, read_project
+from fbvm.interchange.twincat import PROJECT_SUFFIX
+from fbvm.interchange.twincat.project import read_project
 from fbvm.testing.pages import write_page
 from fbvm.testing.session import failure_page
 from fbvm.testing.subject import Subject, SubjectError
 from fbvm.testing.suites.program import FoundTest, find_suites
 from fbvm.testing.suites.results import Failure, SuiteRun, SuiteTestResult, run_suites
-from fbvm.testing.suites.xunit import write_xunit
 from fbvm.watch.values import show_time
 
 DIALECT = "twincat"
 OTHERS = "(others)"
 """The test for all those whose names are no literals."""
 FILES: pytest.StashKey[list[SuitesFile]] = pytest.StashKey()
-
-
-def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> SuitesFile | None:
-    """`*.plcproj` whose program runs suites."""
-    if file_path.suffix.lower() != PROJECT_SUFFIX:
-        return None
-    made: SuitesFile = SuitesFile.from_parent(parent, path=file_path)
-    return made
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """The option for TcUnit's form of the results."""
-    parser.getgroup("fbvm", "PLC programs").addoption(
-        "--fbvm-xunit", metavar="FILE", help="write the results of TwinCAT's suites as TcUnit writes them")
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Writes the file of --fbvm-xunit."""
-    if path := session.config.getoption("fbvm_xunit"):
-        write_xunit(Path(path), [file.run for file in session.stash.get(FILES, []) if file.run is not None])
 
 
 class SuitesFile(pytest.File):
