@@ -19,8 +19,8 @@ FILES = {
     "/live.css": ("live.css", STYLE),
     "/icon.svg": ("icon.svg", "image/svg+xml"),
     **{f"/{name}.js": (f"{name}.js", SCRIPT)
-       for name in ("main", "socket", "dom", "scan", "program", "watch", "trend", "units", "network", "memory", "plant", "change",
-                    "picture", "times", "lesson")},
+       for name in ("main", "socket", "dom", "scan", "program", "watch", "trend", "units", "network", "memory", "plant", "press",
+                    "change", "picture", "times", "lesson")},
 }  # fmt: skip
 """The file and its media type by the path of a request."""
 

@@ -288,7 +288,7 @@ def test_all_plcs_of_a_project_stand_side_by_side(live: Any, tmp_path: Path) -> 
     page.fill("#find", f"{second}/Main.")
     page.locator("#found button").first.click()
     page.locator("#watched tr .value", has_text=re.compile(".")).first.wait_for()
-    cards.nth(1).locator("button").click()
+    cards.nth(1).locator("button").click(delay=500)  # longer than updates are apart, and the panel is drawn anew at each
     page.wait_for_function("name => document.getElementById('plc').value === name", arg=second)
     assert first != second and run.complaints == []
 

@@ -1,5 +1,7 @@
 // The connection to fbvm: questions with their replies, updates, and coming back after a loss.
 
+import { whenReleased } from "/press.js";
+
 const WAIT_MS = [250, 500, 1000, 2000, 4000];
 const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? "";
 
@@ -33,8 +35,10 @@ export class Connection {
 
   take(message) {
     if (message.update) {
-      this.onUpdate(message.update);
-      requestAnimationFrame(() => this.say({ do: "ready" }));
+      whenReleased(() => {
+        this.onUpdate(message.update);
+        requestAnimationFrame(() => this.say({ do: "ready" }));
+      });
       return;
     }
     const asked = this.asked.get(message.re);

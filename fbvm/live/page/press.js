@@ -1,0 +1,24 @@
+// What is drawn while a button is held waits until it is let go: a browser drops the click on a button that was replaced in between.
+
+const PRESSED = "button, a, summary, select";
+let isPressed = false;
+let waiting = [];
+
+function release() {
+  isPressed = false;
+  const calls = waiting;
+  waiting = [];
+  for (const call of calls) call();
+}
+
+export function whenReleased(call) {
+  if (isPressed) waiting.push(call);
+  else call();
+}
+
+const press = (event) => {
+  if (event.target.closest?.(PRESSED)) isPressed = true;
+};
+addEventListener("pointerdown", press, true);
+addEventListener("keydown", (event) => event.key === " " && press(event), true);
+for (const name of ["pointerup", "pointercancel", "keyup", "blur"]) addEventListener(name, () => isPressed && setTimeout(release), true);
