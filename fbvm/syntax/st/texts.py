@@ -12,7 +12,7 @@ from datetime import date, timedelta
 
 from fbvm.base.arithmetic import INF, NAN, Undefined, shortest, single
 from fbvm.base.types import DAY_NS, SHORT_NAMES
-from fbvm.syntax.st.literals import ELEMENTARY, SECOND_NS, UNITS_NS, Malformed, OutOfRange, typed
+from fbvm.syntax.st.literals import ELEMENTARY, NS_MAX, SECOND_NS, UNITS_NS, Malformed, OutOfRange, typed
 
 LEADING = 64
 """How many characters may belong to a literal that a text begins with."""
@@ -44,6 +44,8 @@ def from_text(data_type: str, text: bytes) -> float:
         raise Undefined("R0111", text, data_type) from None
     if kind != wanted or isinstance(value, str):
         raise Undefined("R0111", text, data_type)
+    if kind == "LTIME" and value > NS_MAX:  # a literal may be longer, where a dialect has LTIME without a sign
+        raise Undefined("R0105", text, data_type)
     return single(value) if wanted == "REAL" else value
 
 
