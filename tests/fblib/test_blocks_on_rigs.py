@@ -24,8 +24,9 @@ ANY = [path for path in BLOCKS if re.search(r": ANY;", path.read_text(encoding="
 """A rig has no variable of type ANY to offer: these are called by their own tests' programs."""
 
 
-OF_MATIEC = [data_folder("fblib") / "matiec" / folder for folder in ("additional", "beremiz")]
-"""Blocks that only the dialect matiec has, beside those that it has in another way."""
+DIALECTS = {"matiec": [data_folder("fblib") / "matiec" / folder for folder in ("additional", "beremiz")],
+            "twincat": [data_folder("fblib") / "twincat" / "tcunit"]}
+"""By dialect the folders of blocks that only this one has, or has in another way."""
 NEEDED = {name: {"Socket": 1} for name in ("ETN_Modbus_Line", "ETN_Modbus_Session")}
 """Parts of other blocks that are never without these."""
 
@@ -35,7 +36,7 @@ NEEDED = {name: {"Socket": 1} for name in ("ETN_Modbus_Line", "ETN_Modbus_Sessio
 ])
 def test_it_stands_on_a_rig_without_inputs(fb: Fb, path: Path) -> None:
     """100 ms with every input at its initial value: no trap, and twice the same memory."""
-    dialect = "matiec" if path.parent in OF_MATIEC else ""
+    dialect = next((name for name, folders in DIALECTS.items() if path.parent in folders), "")
     one, two = fb(path.stem, dialect=dialect), fb(path.stem, dialect=dialect)
     for rig in (one, two):
         rig.write(**NEEDED.get(path.stem, {}))
