@@ -156,7 +156,7 @@ def test_the_script_native(load: Load, small: Path, monkeypatch: pytest.MonkeyPa
     script.many()
     monkeypatch.setattr(script, "STARTS", 1)
     monkeypatch.setattr(script, "subprocess", PROCESSES)
-    monkeypatch.setattr("fbvm.code.compiler.driver.parse", sys.modules["fbvm.code.compiler.driver"].parse)
+    monkeypatch.setattr("fbvm.code.compiler.passes.parse", sys.modules["fbvm.code.compiler.passes"].parse)
     script.start()
 
 

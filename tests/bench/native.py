@@ -203,15 +203,15 @@ import sys, time; sys.path[:0] = sys.argv[1:2]
 from pathlib import Path
 began = time.perf_counter()
 from fbvm import Plc, compile_files
-from fbvm.code.compiler import driver
-parse, parsing = driver.parse, 0
+from fbvm.code.compiler import passes
+parse, parsing = passes.parse, 0
 def timed(*operands):
     global parsing
     began = time.process_time()
     parsed = parse(*operands)
     parsing += time.process_time() - began
     return parsed
-driver.parse = timed
+passes.parse = timed
 imported, worked = time.perf_counter(), time.process_time()
 plc = Plc(compile_files([Path(sys.argv[2])]).image, engine="native")
 plc.scan()

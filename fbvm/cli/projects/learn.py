@@ -12,10 +12,8 @@ import click
 from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
-from fbvm.cli.shared.live.origins import FileOrigin, project_origin
-from fbvm.cli.shared.live.page import PageOptions, check_installed, serve_page
 from fbvm.cli.shared.networks import mailbox_names
-from fbvm.cli.shared.options import CYCLE_NS
+from fbvm.cli.shared.options import CYCLE_NS, check_live_installed
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import compile_or_exit
 from fbvm.cli.shared.terminal import named, say
@@ -50,7 +48,7 @@ def command(number: int | None, checked: bool, live: bool, solved: bool, folder:
     from fbvm.testing.course.lessons import check, lessons, prediction_mistake
 
     if live:
-        check_installed()
+        check_live_installed()
     if (checked or live or learners) and find_spec("pytest") is None:
         raise click.UsageError("checks need pytest: pip install pytest")
     if learners is not None:
@@ -88,6 +86,8 @@ def command(number: int | None, checked: bool, live: bool, solved: bool, folder:
 
 def _serve_page(lesson: Lesson, folder: Path, target: Path) -> None:
     """Teaches on a page; the learner's program runs beside the text, and is begun again when its file changes."""
+    from fbvm.cli.shared.live.origins import FileOrigin, project_origin
+    from fbvm.cli.shared.live.page import PageOptions, serve_page
     from fbvm.live.lesson import LiveLesson
     from fbvm.testing.course.lessons import answer, prediction_mistake, program_mistakes, questions
 

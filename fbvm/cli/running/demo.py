@@ -29,8 +29,7 @@ from fbvm.base.files import write_file
 from fbvm.base.host import can_end_others
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import LISTENING
-from fbvm.cli.shared.live.origins import Built, BuiltOrigin, SeenPlc
-from fbvm.cli.shared.live.page import PageOptions, check_installed, live_option, serve_page
+from fbvm.cli.shared.options import check_live_installed, live_option
 from fbvm.cli.shared.run_recording import program_text
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.code.compiler import compile_files
@@ -95,7 +94,7 @@ def command(kind: str, live: bool) -> None:
 
     Needs no hardware, no root, no configuration.  Ends with 0 only if the data is equal on both sides."""
     if live:
-        check_installed()
+        check_live_installed()
     if kind == "pymodbus":
         try:
             import pymodbus.client  # noqa: F401
@@ -120,6 +119,9 @@ def command(kind: str, live: bool) -> None:
 
 def _serve_page(program: Path, server: Server) -> None:
     """Runs the program under a page until Ctrl-C, paused before its first scan."""
+    from fbvm.cli.shared.live.origins import Built, BuiltOrigin, SeenPlc
+    from fbvm.cli.shared.live.page import PageOptions, serve_page
+
     plc, network = _plc(program, server)
     try:
         text = program_text([program], ())

@@ -8,11 +8,19 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from fbvm.cli.shared.debug.door import debug_option
 from fbvm.cli.shared.live.origins import FileOrigin, project_origin
-from fbvm.cli.shared.live.page import PageOptions, check_installed, serve_page
+from fbvm.cli.shared.live.page import PageOptions, serve_page
 from fbvm.cli.shared.networks import build_network, mailbox_names, net_of, try_doors
-from fbvm.cli.shared.options import Door, Mapping, cycle_option, door_option, map_option, net_option
+from fbvm.cli.shared.options import (
+    Door,
+    Mapping,
+    check_live_installed,
+    cycle_option,
+    debug_option,
+    door_option,
+    map_option,
+    net_option,
+)
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_options
@@ -56,7 +64,7 @@ def command(
 
     Ends by Ctrl-C.  The address has a token: who does not have it sees nothing.  Status 3 if the program has errors, 5 if the
     network or the port of the page cannot be used."""
-    check_installed()
+    check_live_installed()
     from fbvm.live.guard import FRAME
 
     if debug_port is not None and trace:

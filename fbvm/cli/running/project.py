@@ -12,11 +12,7 @@ from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
-from fbvm.cli.shared.debug.door import DebugPort, run_with_port
-from fbvm.cli.shared.debug.worlds import plant_sources
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
-from fbvm.cli.shared.live.origins import project_origin
-from fbvm.cli.shared.live.page import PageOptions, serve_page
 from fbvm.cli.shared.project_arguments import check_project_options, read_given_project
 from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run
 from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, scans_in, value_text
@@ -94,6 +90,9 @@ def _execute(plant: Plant, debug_port: int | None, tick: Callable[[], None]) -> 
     if debug_port is None:
         run_all(plant.runs, tick)
     else:
+        from fbvm.cli.shared.debug.door import DebugPort, run_with_port
+        from fbvm.cli.shared.debug.worlds import plant_sources
+
         run_with_port(plant.named_runs, DebugPort(debug_port, plant_sources(plant)), tick)
 
 
@@ -101,6 +100,9 @@ def _run_live(file: Path, net: str | None, options: Mapping[str, Any]) -> None:
     """Runs a project under a page, which stays there until Ctrl-C."""
     if options["as_json"] or options["scan_time"] or options["debug_port"] is not None:
         raise click.UsageError("--live shows it on the page: leave out --json, --scan-time and --debug")
+    from fbvm.cli.shared.live.origins import project_origin
+    from fbvm.cli.shared.live.page import PageOptions, serve_page
+
     origin = project_origin(file, net, lambda run: run, options["for_ns"], options["scans"])
     serve_page(origin, Control(), PageOptions(), {name: options[name] for name in ("journal", "trace", "verify")})
 

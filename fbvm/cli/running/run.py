@@ -12,13 +12,9 @@ import click
 
 from fbvm.cli.running.project import run_project
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
-from fbvm.cli.shared.debug.door import DebugPort, debug_option, run_with_port
-from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.files import growing_file, writing
-from fbvm.cli.shared.live.origins import FileOrigin
-from fbvm.cli.shared.live.page import PageOptions, check_installed, live_option, serve_page
 from fbvm.cli.shared.networks import build_network, mailbox_names, net_of, try_doors
 from fbvm.cli.shared.options import (
     Door,
@@ -27,8 +23,11 @@ from fbvm.cli.shared.options import (
     address,
     bind_option,
     charted_names,
+    check_live_installed,
     cycle_option,
+    debug_option,
     door_option,
+    live_option,
     map_option,
     net_option,
     setting,
@@ -114,7 +113,7 @@ def command(
     inside a scan.  Status 1 if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could
     not be used."""
     if options["live"]:
-        check_installed()
+        check_live_installed()
     if project := project_argument(files):
         sys.exit(run_project(project, click.get_current_context()))
     options["net"] = net_of(options["net"], options["doors"])
@@ -163,6 +162,8 @@ def command(
 def _run_live(image: Image, cycle_ns: int, banks: Sequence[str], *, files: tuple[Path, ...], program: str | None,
               libraries: tuple[Path, ...], **options: Any) -> None:  # fmt: skip
     """Runs under a page, up to the bounds that are given; the page stays there until Ctrl-C."""
+    from fbvm.cli.shared.live.origins import FileOrigin
+    from fbvm.cli.shared.live.page import PageOptions, serve_page
 
     def wire(image: Image) -> tuple[Plc, Callable[[], None]]:
         network = build_network(options["net"], options["mappings"], options["seed"], options["bind"], options["doors"])
@@ -235,6 +236,9 @@ def _execute(running: Running, debug_port: int | None, files: tuple[Path, ...], 
     if debug_port is None:
         loop.run_all([running], progress)
         return
+    from fbvm.cli.shared.debug.door import DebugPort, run_with_port
+    from fbvm.cli.shared.debug.worlds import DebugSources
+
     paths = {str(path): path for path in files}
     sources = DebugSources(paths, source_texts(running.plc.image, paths, libraries))
     run_with_port({"plc": running}, DebugPort(debug_port, sources), progress)

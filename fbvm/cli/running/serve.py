@@ -18,15 +18,21 @@ from fbvm.base.data import data_folder
 from fbvm.base.files import reason
 from fbvm.base.host import ending_signals, handling, saving_signals
 from fbvm.cli.shared import status
-from fbvm.cli.shared.debug.door import DebugPort, debug_option
+from fbvm.cli.shared.debug.door import DebugPort
 from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
 from fbvm.cli.shared.files import OutputError, growing_file, writing
 from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, say_fins, try_fins
-from fbvm.cli.shared.live.origins import Built, BuiltOrigin, SeenPlc
-from fbvm.cli.shared.live.page import PageOptions, check_installed, live_option, serve_page
 from fbvm.cli.shared.networks import mailbox_names
-from fbvm.cli.shared.options import address, bind_option, time_ns, watch_cycle_option
+from fbvm.cli.shared.options import (
+    address,
+    bind_option,
+    check_live_installed,
+    debug_option,
+    live_option,
+    time_ns,
+    watch_cycle_option,
+)
 from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, recording_file_options
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_options
 from fbvm.cli.shared.terminal import named, say
@@ -95,7 +101,7 @@ def command(
 
     Status 5 if the port cannot be used, 4 if a trap stopped the program, 2 if the memory could not be saved, else 0."""
     if live:
-        check_installed()
+        check_live_installed()
         if debug_port is not None:
             raise click.UsageError("--live and --debug both look into scans: give one of them")
     signals = Signals()
@@ -260,6 +266,9 @@ def _start(plc: Plc, network: TcpNetwork, signals: Signals, fins: FinsDoor | Non
 def _serve_page(plc: Plc, files: Sequence[Path], libraries: Sequence[Path], signals: Signals, image: Path | None,
                 recording: dict[str, Any]) -> None:  # fmt: skip
     """Runs under a page until Ctrl-C or SIGTERM."""
+    from fbvm.cli.shared.live.origins import Built, BuiltOrigin, SeenPlc
+    from fbvm.cli.shared.live.page import PageOptions, serve_page
+
     control = Control()
 
     def tick() -> None:

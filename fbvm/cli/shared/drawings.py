@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,7 +14,6 @@ from fbvm.base.types import StructType, fold
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.terminal import say
 from fbvm.code.image import Image, RungPicture
-from fbvm.interchange.contents import Contents
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_text import ladder_text
 from fbvm.record.draw.power import PowerFlow
@@ -24,6 +24,9 @@ from fbvm.record.trace.observing import observing
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
+
+if TYPE_CHECKING:
+    from fbvm.interchange.contents import Contents
 
 SVG_WIDTH = 120
 """Columns of an SVG file."""

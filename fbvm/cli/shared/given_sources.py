@@ -33,16 +33,16 @@ def _options() -> tuple[str | None, bool]:
 
 def given_sources(paths: Sequence[Path]) -> dict[str, Path | str]:
     """By the name that messages use, each source of these files: its path, or its text if it stands within a project."""
-    for path in paths:
-        within(path)
-    return given.given_sources(paths, *_options())
+    return given.sources_by_name(_found(paths))
 
 
 def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]]:
     """What the compiler takes for these files, and what is said about projects among them."""
-    for path in paths:
-        within(path)
-    return given.inputs(paths, *_options())
+    return given.inputs_of(_found(paths))
+
+
+def _found(paths: Sequence[Path]) -> dict[Path, given.Within | None]:
+    return {path: within(path) for path in paths}
 
 
 def families(paths: Sequence[Path]) -> list[tuple[str, str]]:

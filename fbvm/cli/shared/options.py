@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from ipaddress import IPv4Address
 
-from click import BadParameter, Choice, Context, Parameter, option
+from click import BadParameter, Choice, Context, IntRange, Parameter, UsageError, option
 
 from fbvm.base.digits import whole_number
 from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
@@ -166,3 +167,15 @@ def split_names(text: str) -> list[str]:
     ['Main.done', 'a[1,2]', 'D5']
     """
     return [name for name in split_list(text) if name]
+
+
+debug_option = option("--debug", "debug_port", type=IntRange(0, 65535), metavar="PORT",
+                            help="Let an editor's debugger attach at this port; 0 is one that the system picks.")
+live_option = option("--live", is_flag=True, help="Serve a page on which the PLC is seen and touched, until Ctrl-C; "
+                                                        "`fbvm live` has more options.")  # fmt: skip
+
+
+def check_live_installed() -> None:
+    """Raises UsageError if the library of the live page is missing."""
+    if find_spec("websockets") is None:
+        raise UsageError("the live page needs websockets: pip install 'fbvm[live]'")

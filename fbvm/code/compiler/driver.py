@@ -1,73 +1,21 @@
-"""The compiler: sources in; an Image, or diagnostics that say why there is none, out."""
+"""The compiler: sources in; an Image, or diagnostics that say why there is none, out.
+
+What was compiled before is read from the user's cache; the passes over sources are only loaded if there is something to compile,
+since loading them takes longer than all else that a short run does."""
 
 from __future__ import annotations
 
-import gc
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from fbvm.base.diagnostics import Diagnostic, Source, errors
-from fbvm.base.dialects import dialect as named_dialect
-from fbvm.base.repeats import gathered
-from fbvm.base.types import Type, fold
-from fbvm.check.checker import Checker
-from fbvm.check.lint.linter import lint as lint_program
-from fbvm.check.lint.suppression import Suppressions, Wanted
-from fbvm.check.symbols.facts import Pou, TaskFact
-from fbvm.check.symbols.library import Libraries, LibraryError
-from fbvm.check.symbols.project import Project
-from fbvm.check.symbols.report import Report
-from fbvm.code.builder.evaluation import evaluate
-from fbvm.code.compiler.follow_on_errors import FollowOnErrors
-from fbvm.code.compiler.neighbours import with_neighbours
-from fbvm.code.image import Image, ProgramRun, TaskRow
-from fbvm.code.layout.instance_paths import InstancePaths
-from fbvm.code.layout.layout import lay_out
-from fbvm.code.lowering.initial_references import InitialReferences
-from fbvm.code.lowering.program import Program
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.code.compiler.compilation import Compilation, Progress
 from fbvm.code.store import cache as image_cache
-from fbvm.code.store.object_code import ObjectLibrary, library_for
-from fbvm.syntax import tree
-from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
-
-LONG = 50_000
-"""Characters of sources from which on a garbage collection takes tenths of a second."""
-_FRAMES = 20_000
-"""Python frames that checking and lowering may use for the deepest tree that the parser lets through."""
-
-Progress = Callable[[str, int, int], None]
-"""Called with a stage, and how much of how much is done in it: ("read", characters, characters), ("checked", POUs, POUs),
-("compiled", POUs, POUs)."""
 
 
 def _no_progress(stage: str, done: int, known: int) -> None:
     """The progress that nobody is told."""
-
-
-@dataclass(frozen=True)
-class Compilation:
-    """The result of compiling sources.
-
-    >>> from fbvm import compile_text
-    >>> made = compile_text("PROGRAM Main VAR n : INT; END_VAR n := m; END_PROGRAM")
-    >>> made.image, [error.code for error in made.errors]
-    (None, ['S0201'])
-    """
-
-    image: Image | None
-    """The compiled program; None if there are errors."""
-    diagnostics: list[Diagnostic]
-    """All errors and warnings, sorted by the name of their source, then by their place in it."""
-
-    @property
-    def errors(self) -> list[Diagnostic]:
-        """The diagnostics whose `severity` is "error", in the order of `diagnostics`; empty if there is an image."""
-        return errors(self.diagnostics)
 
 
 def compile_files(paths: Sequence[Path | str | Source], program: str | None = None, libraries: Sequence[Path | str] = (),
@@ -105,7 +53,10 @@ def compile_files(paths: Sequence[Path | str | Source], program: str | None = No
         (program, runnable, resource, dialect, lint, unwanted, warnings_as_errors, drawn))
     if entry and (known := image_cache.read(entry, sources)):
         return Compilation(*known)
-    with _deep(sources):
+    from fbvm.code.compiler.neighbours import with_neighbours
+    from fbvm.code.compiler.passes import deep
+
+    with deep(sources):
         made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
                                no_warn=unwanted, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
         if entry and made.image:
@@ -132,105 +83,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
                     lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False,
                     progress: Progress = _no_progress, drawn: bool = False) -> Compilation:
     """Compile texts, each with the name that diagnostics give it.  All other parameters are those of `compile_files`."""
-    wanted, suppressions, report = Wanted.of(no_warn, warnings_as_errors), Suppressions(), Report()
-    answers = named_dialect(dialect)
-    try:
-        searched = Libraries([Path(folder) for folder in libraries], preferred=answers.libraries)
-    except LibraryError as error:
-        return Compilation(None, [error.diagnostic])
-    with _deep(sources):
-        project = Project(searched, report, answers)
-        follow_on = FollowOnErrors()
-        for source in sources:
-            text, diagnostics = parse(source, partial(_parsed, progress, source))
-            report.diagnostics += diagnostics + suppressions.add(source, text, answers)
-            follow_on.add(source, text, errors(diagnostics))
-            project.collect(text, source)
-        before_check = len(report.diagnostics)
-        shared = not libraries and not project.config_sections
-        library = library_for(answers) if shared else ObjectLibrary()
-        checker = Checker(project, evaluate, library.dependencies if shared else None, partial(progress, "checked"))
-        checker.check(program, resource)
-        if runnable and not errors(report.diagnostics):
-            _check_runnable(checker, program, sources, report)
-        if lint and not errors(report.diagnostics):
-            lint_program(checker, program)
-        found = report.diagnostics[:before_check] + [d for d in report.diagnostics[before_check:] if not follow_on.has(d)]
-        diagnostics = gathered(sorted(suppressions.apply(found, wanted), key=Diagnostic.order))
-        image = None if errors(diagnostics) else _image(checker, library, progress, drawn)
-        project.let_go()
-    return Compilation(image, diagnostics)
+    from fbvm.code.compiler.passes import run_passes
 
-
-def _parsed(progress: Progress, source: Source, reached: int) -> None:
-    """Report how many characters of a source are parsed."""
-    progress("read", reached, len(source.text))
-
-
-def _check_runnable(checker: Checker, program: str | None, sources: Sequence[Source], report: Report) -> None:
-    """Report S0209 unless there is exactly one thing to run."""
-    if checker.tasks or not sources:
-        return
-    programs = [p for p in checker.project.pous.values() if p.kind == "PROGRAM" and not p.source.library]
-    node = programs[1].tree.name if len(programs) > 1 else tree.Node(0, 0)
-    source = programs[1].source if len(programs) > 1 else sources[0]
-    names = ", ".join(p.name for p in programs)
-    if program is not None:
-        message, hint = f"there is no PROGRAM {program}", f"there is {names}" if names else ""
-    elif programs:
-        message = f"there are several programs ({names}) and no CONFIGURATION says which to run"
-        hint = "choose one with --program NAME"
-    else:
-        message, hint = "there is no PROGRAM to run", "blocks and functions need a PROGRAM that calls them"
-    report.add("S0209", source, node, message, hint)
-
-
-@contextmanager
-def _deep(sources: Sequence[Source]) -> Iterator[None]:
-    """Allow the recursion that deep trees need (the parser limits how deep they get), and stop the garbage collector.
-
-    Nodes and facts live until the end; to visit them all again and again would take a third of the time.  After a long text
-    the image, which lives on, is made old at once, so that the next collection does not visit it.  After short ones, of which
-    tests compile thousands, that would cost more than it saves."""
-    before, collects = sys.getrecursionlimit(), gc.isenabled()
-    sys.setrecursionlimit(max(before, _FRAMES))
-    gc.disable()
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)
-        if collects:
-            if sum(len(source.text) for source in sources) >= LONG and not gc.get_freeze_count():
-                gc.freeze()
-                gc.unfreeze()
-            gc.enable()
-
-
-def _image(checker: Checker, library: ObjectLibrary, progress: Progress, drawn: bool) -> Image:
-    """The image of a program that was checked without an error."""
-    placement = lay_out(checker)
-    program = Program(checker, placement, drawn)
-    references = InitialReferences(program, checker, placement)
-    references.in_frames()
-    bodies = tuple(library.body(program, checker, pou) for pou in _reported(checker.bodies, partial(progress, "compiled")))
-    tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
-    types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
-    for (_, name), entry in checker.project.types.items():
-        if entry.resolved is not None:
-            types.setdefault(name, entry.resolved[0])
-    initial = (*placement.initial, *references.in_slots(), *InstancePaths(checker).rows())
-    return Image(placement.layout, bodies, tuple(tasks), placement.symbols, initial,
-                 tuple(placement.retained), tuple(program.sites), types, program.objects, tuple(program.rungs),
-                 tuple(program.charts), frames=placement.frames)
-
-
-def _reported(pous: Sequence[Pou], progress: Callable[[int, int], None]) -> Iterator[Pou]:
-    """The POUs; `progress` is called in front of each."""
-    for number, pou in enumerate(pous):
-        progress(number, len(pous))
-        yield pou
-
-
-def _task(task: TaskFact) -> TaskRow:
-    runs = tuple(ProgramRun(run.name, run.pou.number, run.offset) for run in task.runs)
-    return TaskRow(task.name, task.priority, task.interval_ns, task.single, runs)
+    return Compilation(*run_passes(sources, program, [Path(folder) for folder in libraries], runnable, resource, dialect, lint,
+                                   no_warn, warnings_as_errors, progress, drawn))

@@ -1,4 +1,6 @@
-"""Source files as somebody names them, with the sources within a project of another tool in place of its file."""
+"""Source files as somebody names them, with the sources within a project of another tool in place of its file.
+
+The readers of other tools' files are loaded when there is such a file: most runs have none."""
 
 from __future__ import annotations
 
@@ -10,14 +12,10 @@ from pathlib import Path
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.files import SOURCE_BYTES, read_file
 from fbvm.interchange.cx.markup import is_project
-from fbvm.interchange.cx.read.importing import import_project
-from fbvm.interchange.plcopen.read.importing import import_xml
-from fbvm.interchange.twincat import PROJECT_SUFFIX
-from fbvm.interchange.twincat import objects as twincat
-from fbvm.interchange.twincat.project import TASK_SUFFIX, read_project, task_source
+from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX, TASK_SUFFIX
 
 CX_SUFFIXES = (".cxp", ".cxt")
-TWINCAT_SUFFIXES = (*twincat.SUFFIXES, TASK_SUFFIX)
+TWINCAT_SUFFIXES = (*OBJECT_SUFFIXES, TASK_SUFFIX)
 SUFFIXES = (*CX_SUFFIXES, PROJECT_SUFFIX, *TWINCAT_SUFFIXES)
 """Endings, in small letters, of files of other tools; PLCopen XML is known by what it says."""
 DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
@@ -55,6 +53,8 @@ def within(path: Path, resource: str | None = None, memory: bool = False) -> Wit
     initial values.  Raises OSError if a file that is called so cannot be read."""
     suffix = path.suffix.lower()
     if suffix == PROJECT_SUFFIX:
+        from fbvm.interchange.twincat.project import read_project
+
         project = read_project(path)
         return Within({source.name: source.text for source in project.sources}, project.diagnostics,
                       "twincat", f"{path.name} is a project of TwinCAT")  # fmt: skip
@@ -70,15 +70,22 @@ def within(path: Path, resource: str | None = None, memory: bool = False) -> Wit
 @lru_cache(maxsize=4)
 def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: bool) -> Within | None:
     if suffix in TWINCAT_SUFFIXES:
-        made = twincat.read_object(data, name)
+        from fbvm.interchange.twincat.objects import read_object
+        from fbvm.interchange.twincat.project import task_source
+
+        made = read_object(data, name)
         source = task_source(name, [made.task]) if made.task else made.source
         texts = {source.name: source.text} if source else {}
         return Within(texts, made.diagnostics, "twincat", f"{name} is an object of TwinCAT")
     if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and DOCUMENT in data[:HEAD_BYTES]:
+        from fbvm.interchange.plcopen.read.importing import import_xml
+
         document = import_xml(data, name)
         return Within({f"{name}/{file}": text for file, text in document.files.items()}, document.diagnostics,
                       document.family, document.because)  # fmt: skip
     if suffix in CX_SUFFIXES or is_project(data):
+        from fbvm.interchange.cx.read.importing import import_project
+
         project = import_project(data, name, resource, memory=memory)
         return Within({f"{name}/{file}": text for file, text in project.files.items()}, project.diagnostics)
     return None
@@ -87,20 +94,25 @@ def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: b
 def given_sources(paths: Sequence[Path], resource: str | None = None, memory: bool = False) -> dict[str, Path | str]:
     """By the name that messages use, each source of these files: its path, or its text if it stands within another file; see
     `within`.  Raises OSError if a project cannot be read."""
-    found: dict[str, Path | str] = {}
-    for path in paths:
-        made = within(path, resource, memory)
-        if made is None:
-            found[str(path)] = path
-        else:
-            found.update(made.texts)
-    return found
+    return sources_by_name({path: within(path, resource, memory) for path in paths})
+
+
+def sources_by_name(found: Mapping[Path, Within | None]) -> dict[str, Path | str]:
+    """By the name that messages use, each source of files in which `within` has looked: its path, or its text."""
+    sources: dict[str, Path | str] = {}
+    for path, made in found.items():
+        sources.update({str(path): path} if made is None else made.texts)
+    return sources
 
 
 def inputs(paths: Sequence[Path], resource: str | None = None,
            memory: bool = False) -> tuple[list[Path | Source], list[Diagnostic]]:
     """What the compiler takes for these files, and what is said about projects among them; see `within`.  Raises OSError if a
     project cannot be read."""
-    diagnostics = [one for path in paths if (made := within(path, resource, memory)) is not None for one in made.diagnostics]
-    given = given_sources(paths, resource, memory)
-    return [Source(name, one) if isinstance(one, str) else one for name, one in given.items()], diagnostics
+    return inputs_of({path: within(path, resource, memory) for path in paths})
+
+
+def inputs_of(found: Mapping[Path, Within | None]) -> tuple[list[Path | Source], list[Diagnostic]]:
+    """What the compiler takes for files in which `within` has looked, and what is said about projects among them."""
+    diagnostics = [one for made in found.values() if made is not None for one in made.diagnostics]
+    return [Source(name, one) if isinstance(one, str) else one for name, one in sources_by_name(found).items()], diagnostics

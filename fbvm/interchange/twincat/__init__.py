@@ -1,3 +1,6 @@
 """TwinCAT's files: objects (`.TcPOU`, `.TcDUT`, `.TcGVL`, `.TcIO`, `.TcTTO`) and projects (`.plcproj`), read as sources."""
 
 PROJECT_SUFFIX = ".plcproj"
+OBJECT_SUFFIXES = (".tcpou", ".tcdut", ".tcgvl", ".tcio")
+"""Endings of files that hold declarations or bodies, in small letters."""
+TASK_SUFFIX = ".tctto"

@@ -15,8 +15,6 @@ from html import unescape
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.markup import Element, parse_markup
 
-SUFFIXES = (".tcpou", ".tcdut", ".tcgvl", ".tcio")
-"""Endings of files that hold declarations or bodies, in small letters."""
 ROOT = "TcPlcObject"
 _CHILDREN = {"POU": "", "Itf": "INTERFACE", "DUT": "", "GVL": "", "Task": ""}
 """Children of the root, and what each of them declares where its text need not be asked."""

@@ -9,9 +9,9 @@ from pathlib import Path, PureWindowsPath
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.files import SOURCE_BYTES, read_file, reason
 from fbvm.interchange.markup import Element, parse_markup
-from fbvm.interchange.twincat.objects import SUFFIXES, ImportedObject, read_object
+from fbvm.interchange.twincat import OBJECT_SUFFIXES, TASK_SUFFIX
+from fbvm.interchange.twincat.objects import ImportedObject, read_object
 
-TASK_SUFFIX = ".tctto"
 TASKS = "Tasks.st"
 """What the source is called that says which programs run when."""
 SPACE = "// a name that stands in front of other names\nVAR_GLOBAL\nEND_VAR\n"
@@ -100,7 +100,7 @@ def _object(project: Path, xml: Source, item: Element) -> ImportedObject:
 
     if inside.anchor or ".." in inside.parts:
         return refused("X0501", f"{written} lies outside of the project", "copy it into the project's folder")
-    if suffix not in (*SUFFIXES, TASK_SUFFIX):
+    if suffix not in (*OBJECT_SUFFIXES, TASK_SUFFIX):
         return refused("X0190", f"{written} holds no program, and is left out")
     file = project.parent.joinpath(*inside.parts)
     try:

@@ -14,7 +14,7 @@ import pytest
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import dialect as named_dialect
-from fbvm.code.compiler.driver import compile_sources
+from fbvm.code.compiler import compile_sources
 from fbvm.interchange.twincat import PROJECT_SUFFIX
 from fbvm.interchange.twincat.project import read_project
 from fbvm.testing.pages import write_page

@@ -15,7 +15,8 @@ from fbvm.cli.main import main
 try:
     main(sys.argv[1:], standalone_mode=False)
 finally:
-    print(*({"rich", "lark", "llvmlite", "fbvm.engine", "fbvm.machine.plc", "fbvm.run", "fbvm.net"} & set(sys.modules)))
+    print(*({"rich", "lark", "llvmlite", "fbvm.check.checker", "fbvm.interchange.markup", "fbvm.dap", "fbvm.live", "fbvm.engine",
+             "fbvm.machine.plc", "fbvm.run", "fbvm.net"} & set(sys.modules)))
 """
 
 

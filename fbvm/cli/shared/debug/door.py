@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-import click
-
 from fbvm.cli.shared import status
 from fbvm.cli.shared.debug.attach import open_attached
 from fbvm.cli.shared.debug.worlds import DebugSources
@@ -21,10 +19,6 @@ from fbvm.run.running import Running
 from fbvm.step.world import Debugged
 
 HOST = "127.0.0.1"
-
-debug_option = click.option("--debug", "debug_port", type=click.IntRange(0, 65535), metavar="PORT",
-                            help="Let an editor's debugger attach at this port; 0 is one that the system picks.")
-
 
 class DebugPort:
     """Listens at a port for debuggers.  Ends with status 5 if that cannot be used."""

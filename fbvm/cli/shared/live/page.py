@@ -7,7 +7,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +28,6 @@ from fbvm.run.running import Running
 from fbvm.step.world import Debugged
 from fbvm.watch.paths import UnknownPlace
 
-MISSING = "the live page needs websockets: pip install 'fbvm[live]'"
-
-
-def live_option(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--live of verbs that run PLCs."""
-    return click.option("--live", is_flag=True, help="Serve a page on which the PLC is seen and touched, until Ctrl-C; "
-                                                     "`fbvm live` has more options.")(function)  # fmt: skip
-
 
 @dataclass
 class PageOptions:
@@ -50,12 +41,6 @@ class PageOptions:
     """Whose pages may hold the page in a frame."""
     debug_port: int | None = None
     """Where debuggers may attach meanwhile."""
-
-
-def check_installed() -> None:
-    """Raises UsageError if the library of the page is missing."""
-    if find_spec("websockets") is None:
-        raise click.UsageError(MISSING)
 
 
 def serve_page(origin: Origin, control: Control, options: PageOptions, recording: dict[str, Any] | None = None,
