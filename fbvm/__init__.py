@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fbvm.code.compiler import compile_text as compile_text
     from fbvm.code.image import Image as Image
     from fbvm.engine.trap import Trap as Trap
-    from fbvm.interchange.plcopen.read.importing import Imported as Imported
+    from fbvm.interchange.imported import Imported as Imported
     from fbvm.interchange.plcopen.read.importing import import_xml as import_xml
     from fbvm.interchange.plcopen.write.exporting import Exported as Exported
     from fbvm.interchange.plcopen.write.exporting import export_xml as export_xml
@@ -67,7 +67,8 @@ _HOMES = {
     "net.tcp": ("TcpNetwork",),
     "machine.plc": ("Mode", "Plc", "Stopped"),
     "interchange.plcopen.write.exporting": ("Exported", "export_xml"),
-    "interchange.plcopen.read.importing": ("Imported", "import_xml"),
+    "interchange.imported": ("Imported",),
+    "interchange.plcopen.read.importing": ("import_xml",),
     "record.draw.chart": ("chart", "draw"),
     "record.export.pcapng": ("Capture",),
     "record.recording.file_reader": ("RecordingFile",),

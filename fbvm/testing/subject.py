@@ -209,7 +209,7 @@ def _read(path: Path) -> list[Source]:
     if project is not None:
         if wrong := project.errors:
             raise SubjectError("\n".join(message.render() for message in wrong))
-        return [Source(file, text) for file, text in project.texts.items()]
+        return project.sources
     source = read(path, name)
     if not isinstance(source, Source):
         raise SubjectError(source.render())

@@ -13,20 +13,21 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.cx.compression import compress
 from fbvm.interchange.cx.markup import CxText, read_markup
-from fbvm.interchange.cx.read.importing import ImportedProject, import_project
+from fbvm.interchange.cx.read.importing import import_project
+from fbvm.interchange.imported import Imported
 
 
-def imported(cxt: Cxt) -> ImportedProject:
+def imported(cxt: Cxt) -> Imported:
     return import_project(cxt.bytes(), "line.cxt")
 
 
-def started(made: ImportedProject) -> Plc:
+def started(made: Imported) -> Plc:
     compilation = compile_sources([Source(name, text) for name, text in made.files.items()], runnable=True)
     assert compilation.image is not None, [error.render() for error in compilation.errors]
     return Plc(compilation.image)
 
 
-def with_rung(rung: str, *symbols: str) -> ImportedProject:
+def with_rung(rung: str, *symbols: str) -> Imported:
     return imported(Cxt(symbols, sections=(("Main", (rung,)),)))
 
 

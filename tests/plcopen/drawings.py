@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
-from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.imported import Imported
+from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.machine.plc import Plc
 
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"

@@ -8,8 +8,9 @@ import pytest
 from drawings import RAIL, block, codes, contact, document, imported, plc, pou, states, value, variable, wires
 from rows import each_of
 
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.plcopen.read.charts import STEP_ACTIONS
-from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.plcopen.read.importing import import_xml
 
 CODESYS = "http://www.3s-software.com/plcopenxml/"
 

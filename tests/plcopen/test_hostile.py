@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, parse_markup
-from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.plcopen.read.importing import import_xml
 
 BOMB = b'<?xml version="1.0"?>\n<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>\n<project>&b;</project>'
 FETCHED = b'<!DOCTYPE project [<!ENTITY x SYSTEM "file:///etc/hostname">]>\n<project>&x;</project>'

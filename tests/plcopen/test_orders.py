@@ -7,7 +7,8 @@ import re
 from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, result, value, variable
 from rows import each_of
 
-from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.imported import Imported
+from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
 
 UNKNOWN = '<fileHeader companyName="Unknown" productName="Unnamed" productVersion="1"/>'

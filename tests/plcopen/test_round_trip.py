@@ -18,8 +18,9 @@ from schema_rules import breaches, wires_lead_somewhere
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.compiler import compile_sources
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import Element, parse_markup
-from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.write.exporting import Exported, export_xml
 from fbvm.machine.plc import Plc
 from fbvm.syntax.text import read

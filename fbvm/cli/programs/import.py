@@ -15,9 +15,9 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
-from fbvm.interchange.cx.read.importing import ImportedProject, import_project
+from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.formats.given import is_cx_project
-from fbvm.interchange.plcopen.read.importing import Imported, import_xml
+from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
 
 
@@ -41,7 +41,7 @@ def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: st
     Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
     blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
     if not is_cx_project(file):
-        made: Imported | ImportedProject = import_xml(file, order=order or "")
+        made = import_xml(file, order=order or "")
     else:
         made = import_project(read_file(file, SOURCE_BYTES), str(file), plc, _encoding(encoding), memory)
     there = [name for name in made.files if os.path.lexists(folder / name)]

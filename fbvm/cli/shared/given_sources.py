@@ -10,10 +10,11 @@ import click
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import reason
 from fbvm.interchange.formats import given
+from fbvm.interchange.imported import Imported
 from fbvm.syntax.text import read
 
 
-def within(path: Path) -> given.Within | None:
+def within(path: Path) -> Imported | None:
     """The sources within a file of another tool; None for all others.
 
     The options --resource and --memory of the present command choose a PLC where the project has several, and the contents of
@@ -41,7 +42,7 @@ def inputs(paths: Sequence[Path]) -> tuple[list[Path | Source], list[Diagnostic]
     return given.inputs_of(_found(paths))
 
 
-def _found(paths: Sequence[Path]) -> dict[Path, given.Within | None]:
+def _found(paths: Sequence[Path]) -> dict[Path, Imported | None]:
     return {path: within(path) for path in paths}
 
 

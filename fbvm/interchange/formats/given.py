@@ -5,13 +5,14 @@ The readers of other tools' files are loaded when there is such a file: most run
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file
 from fbvm.interchange.cx.markup import is_project
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX, TASK_SUFFIX
 
 CX_SUFFIXES = (".cxp", ".cxt")
@@ -22,30 +23,13 @@ DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
 """What a document in PLCopen XML has among its first bytes."""
 
 
-@dataclass(frozen=True)
-class Within:
-    """The sources within a file of another tool: texts by the names that messages use, and what could not be taken over."""
-
-    texts: Mapping[str, str]
-    diagnostics: Sequence[Diagnostic]
-    family: str = ""
-    """The family of tools that wrote it: "beremiz", "codesys", "twincat"; "" if that is not known, or of no use."""
-    because: str = ""
-    """From what the family was concluded."""
-
-    @property
-    def errors(self) -> list[Diagnostic]:
-        """Diagnostics about parts that were not taken over."""
-        return errors(self.diagnostics)
-
-
 def is_cx_project(path: Path) -> bool:
     """Whether a file is a project of CX-Programmer, or is called so; devices and pipes are none.  Raises OSError if the
     file cannot be read."""
     return path.suffix.lower() in CX_SUFFIXES or path.is_file() and is_project(read_file(path, SOURCE_BYTES))
 
 
-def within(path: Path, resource: str | None = None, memory: bool = False) -> Within | None:
+def within(path: Path, resource: str | None = None, memory: bool = False) -> Imported | None:
     """The sources within a file: a project of CX-Programmer or TwinCAT, an object of TwinCAT, a document in PLCopen XML; None for
     all others.
 
@@ -55,9 +39,7 @@ def within(path: Path, resource: str | None = None, memory: bool = False) -> Wit
     if suffix == PROJECT_SUFFIX:
         from fbvm.interchange.twincat.project import read_project
 
-        project = read_project(path)
-        return Within({source.name: source.text for source in project.sources}, project.diagnostics,
-                      "twincat", f"{path.name} is a project of TwinCAT")  # fmt: skip
+        return read_project(path)
     try:
         data = read_file(path, SOURCE_BYTES) if path.is_file() or suffix in SUFFIXES else b""
     except OSError:
@@ -68,7 +50,7 @@ def within(path: Path, resource: str | None = None, memory: bool = False) -> Wit
 
 
 @lru_cache(maxsize=4)
-def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: bool) -> Within | None:
+def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: bool) -> Imported | None:
     if suffix in TWINCAT_SUFFIXES:
         from fbvm.interchange.twincat.objects import read_object
         from fbvm.interchange.twincat.project import task_source
@@ -76,19 +58,21 @@ def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: b
         made = read_object(data, name)
         source = task_source(name, [made.task]) if made.task else made.source
         texts = {source.name: source.text} if source else {}
-        return Within(texts, made.diagnostics, "twincat", f"{name} is an object of TwinCAT")
+        return Imported(texts, made.diagnostics, "twincat", f"{name} is an object of TwinCAT")
     if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and DOCUMENT in data[:HEAD_BYTES]:
         from fbvm.interchange.plcopen.read.importing import import_xml
 
-        document = import_xml(data, name)
-        return Within({f"{name}/{file}": text for file, text in document.files.items()}, document.diagnostics,
-                      document.family, document.because)  # fmt: skip
+        return _below(name, import_xml(data, name))
     if suffix in CX_SUFFIXES or is_project(data):
         from fbvm.interchange.cx.read.importing import import_project
 
-        project = import_project(data, name, resource, memory=memory)
-        return Within({f"{name}/{file}": text for file, text in project.files.items()}, project.diagnostics)
+        return _below(name, import_project(data, name, resource, memory=memory))
     return None
+
+
+def _below(name: str, made: Imported) -> Imported:
+    """The same with names of files that lie below the document."""
+    return replace(made, files={f"{name}/{file}": text for file, text in made.files.items()})
 
 
 def given_sources(paths: Sequence[Path], resource: str | None = None, memory: bool = False) -> dict[str, Path | str]:
@@ -97,11 +81,11 @@ def given_sources(paths: Sequence[Path], resource: str | None = None, memory: bo
     return sources_by_name({path: within(path, resource, memory) for path in paths})
 
 
-def sources_by_name(found: Mapping[Path, Within | None]) -> dict[str, Path | str]:
+def sources_by_name(found: Mapping[Path, Imported | None]) -> dict[str, Path | str]:
     """By the name that messages use, each source of files in which `within` has looked: its path, or its text."""
     sources: dict[str, Path | str] = {}
     for path, made in found.items():
-        sources.update({str(path): path} if made is None else made.texts)
+        sources.update({str(path): path} if made is None else made.files)
     return sources
 
 
@@ -112,7 +96,7 @@ def inputs(paths: Sequence[Path], resource: str | None = None,
     return inputs_of({path: within(path, resource, memory) for path in paths})
 
 
-def inputs_of(found: Mapping[Path, Within | None]) -> tuple[list[Path | Source], list[Diagnostic]]:
+def inputs_of(found: Mapping[Path, Imported | None]) -> tuple[list[Path | Source], list[Diagnostic]]:
     """What the compiler takes for files in which `within` has looked, and what is said about projects among them."""
     diagnostics = [one for made in found.values() if made is not None for one in made.diagnostics]
     return [Source(name, one) if isinstance(one, str) else one for name, one in sources_by_name(found).items()], diagnostics

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 
-from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file, reason
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import Element, parse_markup
 from fbvm.interchange.twincat import OBJECT_SUFFIXES, TASK_SUFFIX
 from fbvm.interchange.twincat.objects import ImportedObject, read_object
@@ -19,48 +19,33 @@ SPACE = "// a name that stands in front of other names\nVAR_GLOBAL\nEND_VAR\n"
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 
-@dataclass
-class ImportedProject:
-    """The sources of a project, in the order in which it lists them, and what could not be taken over."""
-
-    sources: list[Source] = field(default_factory=list)
-    references: list[str] = field(default_factory=list)
-    """Names of the libraries that it refers to."""
-    diagnostics: list[Diagnostic] = field(default_factory=list)
-
-    @property
-    def errors(self) -> list[Diagnostic]:
-        """Diagnostics about parts that were not taken over."""
-        return errors(self.diagnostics)
-
-
-def read_project(path: Path) -> ImportedProject:
+def read_project(path: Path) -> Imported:
     """Reads a project and the objects that it lists, which lie in its folder or below.
 
     Raises OSError if the file of the project cannot be read; what is wrong with an object is a diagnostic."""
-    made = ImportedProject()
     parsed = parse_markup(read_file(path, SOURCE_BYTES), str(path))
     if isinstance(parsed, Diagnostic):
-        made.diagnostics.append(parsed)
-        return made
+        return Imported({}, [parsed])
     xml, root = parsed
     if root.name != "Project":
-        made.diagnostics.append(Diagnostic("X0501", xml, root.at, root.at + 1, "the file is no project of TwinCAT",
-                                           "a .plcproj has a <Project> with <Compile Include=...> for each object"))
-        return made
+        return Imported({}, [Diagnostic("X0501", xml, root.at, root.at + 1, "the file is no project of TwinCAT",
+                                        "a .plcproj has a <Project> with <Compile Include=...> for each object")])
     tasks: list[Element] = []
+    sources: list[Source] = []
+    diagnostics: list[Diagnostic] = []
     for item in (item for group in root.all("ItemGroup") for item in group.all("Compile")):
         if _is_excluded(item):
             continue
         found = _object(path, xml, item)
-        made.diagnostics += found.diagnostics
-        made.sources += [found.source] if found.source else []
+        diagnostics += found.diagnostics
+        sources += [found.source] if found.source else []
         tasks += [found.task] if found.task else []
-    made.references = [item.get("Include").partition(",")[0] for item in _references(root)]
-    made.sources += [Source(f"{path}/{space}.st", SPACE) for space in _spaces(root)]
+    sources += [Source(f"{path}/{space}.st", SPACE) for space in _spaces(root)]
     if tasks:
-        made.sources.append(task_source(str(path), tasks, _property(root, "Name")))
-    return made
+        sources.append(task_source(str(path), tasks, _property(root, "Name")))
+    references = tuple(item.get("Include").partition(",")[0] for item in _references(root))
+    return Imported({source.name: source.text for source in sources}, diagnostics, "twincat",
+                    f"{path.name} is a project of TwinCAT", references)  # fmt: skip
 
 
 def task_source(name: str, tasks: list[Element], application: str = "") -> Source:

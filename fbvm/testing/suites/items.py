@@ -6,7 +6,7 @@ names a folder with its project; without them fbvm's library stands in its place
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +58,7 @@ class SuitesFile(pytest.File):
                 others = FoundTest(OTHERS, str(self.path), 1)
                 yield SuiteItem.from_parent(self, name=f"{suite.path}::{OTHERS}", suite=suite.path, test=others)
 
-    def _libraries(self, names: list[str]) -> Iterator[Source]:
+    def _libraries(self, names: Sequence[str]) -> Iterator[Source]:
         """The sources of the libraries that the project refers to, as far as there are projects of them."""
         for folder in self.config.getini("fbvm_libraries"):
             for path in sorted(path for path in Path(folder).rglob(f"*{PROJECT_SUFFIX}") if path.stem in names):

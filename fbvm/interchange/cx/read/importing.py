@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.base.diagnostics import Diagnostic
 from fbvm.interchange.cx.markup import read_markup
 from fbvm.interchange.cx.read.project import Plc, Reading, read_plcs
 from fbvm.interchange.cx.read.sources import sources
-
-
-@dataclass(frozen=True)
-class ImportedProject:
-    """The result of an import."""
-
-    files: dict[str, str]
-    """Source texts by file name: global symbols, each function block, each program, and which programs run."""
-    diagnostics: list[Diagnostic]
-    """What could not be taken over, in the order of the file."""
-
-    @property
-    def errors(self) -> list[Diagnostic]:
-        """Diagnostics about parts of the program that were not taken over."""
-        return errors(self.diagnostics)
+from fbvm.interchange.imported import Imported
 
 
 def import_project(data: bytes, name: str, plc: str | None = None, encoding: str = "",
-                   memory: bool = False) -> ImportedProject:
+                   memory: bool = False) -> Imported:
     """Import a `.cxp` or `.cxt` file.
 
     data: the bytes of the file.  name: what diagnostics call it.
@@ -37,11 +21,11 @@ def import_project(data: bytes, name: str, plc: str | None = None, encoding: str
     Never raises for what the file contains."""
     text = read_markup(data, name, encoding)
     if isinstance(text, Diagnostic):
-        return ImportedProject({}, [text])
+        return Imported({}, [text])
     reading = Reading(text)
     found = _chosen(reading, read_plcs(text), plc)
     files = sources(reading, found, memory) if found else {}
-    return ImportedProject(files, sorted(reading.diagnostics, key=Diagnostic.order))
+    return Imported(files, sorted(reading.diagnostics, key=Diagnostic.order))
 
 
 def _chosen(reading: Reading, plcs: list[Plc], name: str | None) -> Plc | None:

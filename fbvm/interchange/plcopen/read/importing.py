@@ -2,34 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
-from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.base.diagnostics import Diagnostic
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import parse_markup, read_markup
 from fbvm.interchange.plcopen.read.document import Reading
 from fbvm.interchange.plcopen.read.producer import producer
 from fbvm.interchange.plcopen.read.project import read_project
 from fbvm.interchange.plcopen.read.sources import sources
-
-
-@dataclass(frozen=True)
-class Imported:
-    """The result of an import."""
-
-    files: dict[str, str]
-    """Source texts by file name, one for each POU, data type and list of globals; what was not understood is a comment."""
-    diagnostics: list[Diagnostic]
-    """Errors and warnings about the document, in the order of their places in it."""
-    family: str = ""
-    """The family of tools that wrote the document: "beremiz", "codesys", "twincat"; "" if that is not known."""
-    because: str = ""
-    """From what the family and the order of evaluation were concluded."""
-
-    @property
-    def errors(self) -> list[Diagnostic]:
-        """Diagnostics about parts of the program that were not taken over."""
-        return errors(self.diagnostics)
 
 _DECLARED_TWICE, _HEAD = "xmlns:ns1=", 4_000
 """A second prefix for the namespace of a document, and in how many characters at its beginning it stands."""
