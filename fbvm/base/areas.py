@@ -62,6 +62,12 @@ PORTABLE_AREAS = frozenset("IQM")
 SLOTS_OFFSET = 180224
 """Where the slots of globals and instances begin."""
 
+STACK_BYTES, LEAST_FRAMES, MOST_FRAMES = 1 << 16, 64, 512
+"""Bytes of the stack of frames, which is larger if it would hold fewer than LEAST_FRAMES of the largest; how many it holds at
+most, so that it ends before the host's own stack does."""
+FRAME_HEAD, FRAME_LINK = 16, -8
+"""Bytes in front of a frame on the stack; where, from the start of the frame, the reference to the one before of its POU lies."""
+
 E_BANKS = 13
 E_WORDS = 32768
 

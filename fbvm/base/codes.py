@@ -163,5 +163,6 @@ CODES: dict[str, Code] = {
         "R0111": "text cannot be converted",
         "R0112": "watch cycle time exceeded",
         "R0120": "the program has stopped itself",
+        "R0121": "calls nested too deep",
     }),
 }

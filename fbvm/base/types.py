@@ -111,6 +111,9 @@ class Field:
     hexadecimal: bool = False
     space: str = ""
     """Of a global variable the list that declares it, under which it can be named as well."""
+    frame_at: tuple[int, ...] = ()
+    """Of a variable in frames on the stack: where in the buffer the reference to the newest frame lies, from whose start `offset`
+    counts then; for an older one, how far from the start of each newer frame the reference to the one before lies."""
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from fbvm.check.declarations.configurations import Configurations
 from fbvm.check.declarations.var_config import VarConfig
 from fbvm.check.expressions import references, rules
 from fbvm.check.expressions.scope import Scope
+from fbvm.check.recursion import check_recursion
 from fbvm.check.statements import check_body
 from fbvm.check.symbols.context import Context, Evaluate, Rules
 from fbvm.check.symbols.dependencies import Dependencies
-from fbvm.check.symbols.facts import Pou
 from fbvm.check.symbols.project import Project
 from fbvm.syntax import tree
 
@@ -70,7 +70,7 @@ class Checker(Context):
         if program is None:
             self.var_config.resolve()
         self.check_starts()
-        self._report_recursion()
+        check_recursion(self)
 
     def _bodies(self) -> Iterator[None]:
         """Check the bodies of the user's POUs that were not checked yet, and stop in front of each."""
@@ -85,35 +85,3 @@ class Checker(Context):
         """Check the references in initial values, from the one with the number `first` in `Facts.starts` on."""
         for start in self.facts.starts[first:]:
             references.check_initial(Scope(self, start.source, start.pou), start)
-
-    def _callees(self, pou: Pou) -> dict[Pou, None]:
-        """The POUs whose bodies a POU may execute by its calls."""
-        meant = [found for named in pou.dynamic_calls for found in self.candidates(named)]
-        return dict.fromkeys((*pou.calls, *meant))
-
-    def _report_recursion(self) -> None:
-        """Report POUs that call themselves, directly or through others (7.2)."""
-        def node_of(caller: Pou, callee: Pou) -> tree.Node:
-            """The call by which one POU executes another."""
-            return next((node for named, node in caller.dynamic_calls.items() if callee in self.candidates(named)),
-                        None) or caller.calls[callee]
-
-        done: set[Pou] = set()
-        path: list[Pou] = []
-
-        def visit(pou: Pou) -> None:
-            if pou in path:
-                ring = [p.name for p in path[path.index(pou):]] + [pou.name]
-                self.report.add("S0408", path[-1].source, node_of(path[-1], pou),
-                                f"{' calls '.join(ring)}: calls must not come back", "use a loop")
-                return
-            if pou in done:
-                return
-            done.add(pou)
-            path.append(pou)
-            for callee in self._callees(pou):
-                visit(callee)
-            path.pop()
-
-        for pou in list(self.bodies):
-            visit(pou)

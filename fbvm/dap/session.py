@@ -8,7 +8,7 @@ from typing import Any
 
 from fbvm.dap.sources import Sources
 from fbvm.dap.target import Target
-from fbvm.record.trace.events import Frame
+from fbvm.record.trace.events import OUTSIDE, Frame
 from fbvm.step.commands import Commands
 from fbvm.step.debugger import Debugger
 from fbvm.step.past_session import PastSession
@@ -112,13 +112,10 @@ class DebugSession:
     def scope(self, frame: StackFrame | None) -> Scope:
         """The names as they are written inside a frame."""
         session = self.plc(frame.plc if frame else None)
-        if frame is None:
-            statement = session.statement
-            inner = statement.frame if statement else None
-        else:
-            inner = frame.frame
+        newest = session.statement.frame if session.statement else None
+        inner = newest if frame is None else frame.frame
         path = session.names.instance(inner.base) if inner is not None and inner.base else ""
-        local = session.facts.local(inner.body) if inner is not None and inner.body >= 0 else None
+        local = session.facts.local(inner.body, _newer(newest, inner)) if inner is not None and inner.body >= 0 else None
         return Scope(session.player.find, place_of(session.player.find, path), local)
 
     def frame_of(self, arguments: Arguments) -> StackFrame | None:
@@ -130,3 +127,12 @@ class DebugSession:
     def supports(self, capability: str) -> bool:
         """True if the client declared something in `initialize`."""
         return bool(self.client.get(capability))
+
+
+def _newer(newest: Frame | None, wanted: Frame) -> int:
+    """How many executions of the same body are newer than a frame that is on the stack of the newest one."""
+    count = 0
+    while newest is not None and newest is not wanted and newest is not OUTSIDE:
+        count += newest.body == wanted.body
+        newest = newest.caller
+    return count

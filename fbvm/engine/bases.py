@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fbvm.base.graphs import cycles
 from fbvm.code.image import Image
 from fbvm.code.operations import Node
 from fbvm.code.shapes import statements
@@ -18,9 +19,9 @@ def fixed_bases(image: Image) -> dict[int, int]:
     for task in image.tasks:
         for run in task.programs:
             starts[run.body].add(run.offset)
-    known: dict[int, int | None] = {}
+    known: dict[int, int | None] = dict.fromkeys(recursive_bodies(image))
     waiting = list(callers)
-    while waiting:  # a body is looked at again once all that call it are known; there is no recursion
+    while waiting:  # a body is looked at again once all that call it are known
         number = waiting.pop()
         unknown = [caller for caller, _ in callers[number] if caller not in known]
         if unknown:
@@ -29,6 +30,12 @@ def fixed_bases(image: Image) -> dict[int, int]:
             bases = starts[number] | {_base(known[caller], call) for caller, call in callers[number]}
             known[number] = bases.pop() if len(bases) == 1 else None
     return {number: base for number, base in known.items() if base is not None}
+
+
+def recursive_bodies(image: Image) -> set[int]:
+    """The numbers of the bodies that may be called again while they run."""
+    called = [tuple({node[1]: None for node in statements(body.code) if node[0] == "call"}) for body in image.bodies]
+    return {number for group in cycles(range(len(called)), called.__getitem__) for number in group}
 
 
 def _base(caller: int | None, call: Node) -> int | None:

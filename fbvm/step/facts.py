@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from fbvm.base.areas import Area
+from fbvm.base.areas import FRAME_LINK, Area
 from fbvm.base.types import Field, StructType, fold
 from fbvm.code.image import Image, RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Plc
@@ -52,9 +52,14 @@ class ProgramFacts:
         """The name of the POU that is body number `body`."""
         return self.image.bodies[body].name
 
-    def local(self, body: int) -> Mapping[str, Field]:
-        """The variables of a body that live while it is executed, by folded name: those of a function, and VAR_TEMP."""
-        return self.image.frames.get(fold(self.body_name(body)), {})
+    def local(self, body: int, older: int = 0) -> Mapping[str, Field]:
+        """The variables of a body that live while it is executed, by folded name: those of a function, and VAR_TEMP.
+
+        older: of a body that has been called again, how many newer executions of it there are."""
+        found = self.image.frames.get(fold(self.body_name(body)), {})
+        if not older:
+            return found
+        return {name: replace(field, frame_at=(*field.frame_at, *[FRAME_LINK] * older)) for name, field in found.items()}
 
     def block(self, body: int) -> StructType | None:
         """The type of the instances of a body, None for a function."""

@@ -258,7 +258,9 @@ def _step(place: Place, match: re.Match[str]) -> Place:
 
 def _of(parent: Place, field: Field, name: str, distance: int) -> Place:
     """The place of a member: absolute if it is located, behind a reference if it is an in-out."""
-    if field.absolute:
+    if field.frame_at:
+        place = Place(name, field.type, field.frame_at[0], field.bit, (*field.frame_at[1:], field.offset))
+    elif field.absolute:
         place = Place(name, field.type, field.offset, field.bit)
     else:
         place = parent.inner(name, field.type, distance, field.bit)

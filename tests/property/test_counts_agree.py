@@ -110,3 +110,18 @@ def test_small_programs(statements: str) -> None:
     assert image is not None
     for engine in ENGINES:
         assert difference(image, engine, 1000) == "", engine
+
+
+@pytest.mark.slow
+def test_a_trap_inside_hundreds_of_calls_of_one_method() -> None:
+    image = compile_text("""FUNCTION_BLOCK Node
+METHOD Sum : INT VAR_INPUT n : INT; END_VAR
+IF n > 0 THEN Sum := Sum(n - 1); END_IF;
+Sum := Sum + 100 / n;
+END_METHOD
+END_FUNCTION_BLOCK
+PROGRAM Main VAR node : Node; END_VAR
+node.Sum(300);
+END_PROGRAM""", lint=False).image
+    assert image is not None
+    assert [difference(image, engine, 10_000) for engine in ENGINES] == [""] * len(ENGINES)

@@ -6,8 +6,9 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, TIME, UINT, StructType, Type, base, fold
 from fbvm.check.expressions.scope import Scope
+from fbvm.check.symbols.config_facts import Run, TaskFact
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Pou, Run, TaskFact, Variable
+from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 

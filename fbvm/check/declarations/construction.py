@@ -13,8 +13,9 @@ from collections.abc import Iterator, Sequence
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, StructType, Type, fold
+from fbvm.check.symbols.config_facts import Run
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Pou, Run, Variable, holds_block
+from fbvm.check.symbols.facts import Pou, Variable, holds_block
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import attributes_before
 from fbvm.syntax.tree.node import changed

@@ -381,18 +381,23 @@ class _Interface:
 
     def _frame(self, variables: list[Variable]) -> None:
         passed = [v for v in variables if v.kind in ("VAR_INPUT", "VAR_IN_OUT")]
-        rest = [v for v in variables if v not in passed]
+        read = [v for v in variables if v.kind in ("VAR_OUTPUT", "RESULT")] if self.pou.block is not None else []
+        rest = [*read, *(v for v in variables if v not in passed and v not in read)]
         if not self._fit(variables):
             return
         content = bytearray()
         for variable in passed:
             _append(content, variable)
         self.pou.frame_inputs = len(content)
-        for variable in rest:
+        for number, variable in enumerate(rest):
+            if number == len(read):
+                self.pou.frame_given = len(content)
             pads = self.scope.dialect.padding_is_written and isinstance(variable.type, ArrayType | StructType | StringType)
             content += bytes(-len(content) % PADDED_BYTES if pads else 0)
             _append(content, variable)
             content += bytes(-len(content) % PADDED_BYTES if pads else 0)
+        if len(rest) == len(read):
+            self.pou.frame_given = len(content)
         for variable in variables:
             variable.place = "frame"
         self.pou.frame_size = len(content)

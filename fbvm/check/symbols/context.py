@@ -12,9 +12,10 @@ from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import EnumType, RefType, StructType, Type, derives, fold
+from fbvm.check.symbols.config_facts import TaskFact
 from fbvm.check.symbols.dependencies import Dependencies, Key, has_lasting_body, key_of
 from fbvm.check.symbols.elementary_types import elementary_type
-from fbvm.check.symbols.facts import Facts, Pou, StandardCall, TaskFact, Value, Variable
+from fbvm.check.symbols.facts import Facts, Pou, StandardCall, Value, Variable
 from fbvm.check.symbols.project import Project, Resolved, TypeEntry, list_name
 from fbvm.check.symbols.statement_lists import writes_eno
 from fbvm.syntax import tree
@@ -156,6 +157,13 @@ class Context:
             if meant is not None:
                 found.setdefault(meant, []).append(block.identifier)
         return found
+
+    def executed(self, pou: Pou) -> Pou:
+        """The POU whose body is executed for another one: of a block without a statement, in some dialects, that of its base."""
+        if pou.base is None or pou.kind not in ("FUNCTION_BLOCK", "CLASS") or self.project.dialect.empty_bodies:
+            return pou
+        empty = all(isinstance(each, tree.Empty) for each in pou.tree.body)
+        return self.executed(pou.base) if empty else pou
 
     def numbers_of(self, kind: StructType) -> list[int]:
         """The numbers with which instances of a type begin, and of those derived from it."""

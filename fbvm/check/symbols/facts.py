@@ -108,7 +108,12 @@ class Pou:
     """VAR_TEMP of blocks and all variables of functions live in the frame; `frame_initial` its bytes at entry."""
     frame_inputs: int = 0
     """Bytes at the start of a function's frame that the caller writes."""
+    frame_given: int = 0
+    """Bytes at the start of a method's frame that lie alike in its overrides: inputs, and what the caller reads."""
     frame_offset: int = 0
+    stack_bytes: int = 0
+    """Bytes of each of its frames on the stack if calls of it may come back; at `frame_offset` lies a reference to the newest
+    then."""
     number: int = -1
     as_written: bool = True
     """False if its tree is not that of its source, but was made for one call or one program."""
@@ -245,7 +250,7 @@ class Edge:
 
 @dataclass(eq=False)
 class PouCall:
-    """A call of a function or of an instance, with everything that lowering needs.
+    """A call of a function or of an instance.
 
     `instance` is the expression of the instance (None for a function); `inputs`, `in_outs` and `outputs` pair the
     parameter with its argument; `enable` is the argument for EN; `enabled` the target of ENO if the POU declares none."""
@@ -395,35 +400,6 @@ class Facts:
         while self.is_part(expr):
             expr = expr.of
         return expr
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """What a task runs: an instance of a program, or a block in it."""
-
-    instance: Variable
-    pou: Pou
-    block: Variable | None = None
-
-    @property
-    def name(self) -> str:
-        return self.instance.name if self.block is None else f"{self.instance.name}.{self.block.name}"
-
-    @property
-    def offset(self) -> int:
-        """Where in the buffer it lies, after layout."""
-        return self.instance.offset + (self.block.offset if self.block is not None else 0)
-
-
-@dataclass
-class TaskFact:
-    """A task of the configuration, or the one task that runs everything."""
-
-    name: str
-    priority: int
-    interval_ns: int
-    single: str = ""
-    runs: list[Run] = field(default_factory=list)
 
 
 def is_block(kind: Type) -> bool:

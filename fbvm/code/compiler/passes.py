@@ -16,7 +16,8 @@ from fbvm.base.types import Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.lint.linter import lint as lint_program
 from fbvm.check.lint.suppression import Suppressions, Wanted
-from fbvm.check.symbols.facts import Pou, TaskFact
+from fbvm.check.symbols.config_facts import TaskFact
+from fbvm.check.symbols.facts import Pou
 from fbvm.check.symbols.library import Libraries, LibraryError
 from fbvm.check.symbols.project import Project
 from fbvm.check.symbols.report import Report

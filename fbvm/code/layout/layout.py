@@ -10,6 +10,7 @@ from fbvm.base.areas import FLAG_AREAS, SLOTS_OFFSET, Address
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
+from fbvm.check.recursion import stack_bytes
 from fbvm.check.symbols.config_facts import Completed, Spot
 from fbvm.check.symbols.containment import Containment
 from fbvm.check.symbols.facts import Pou, Variable, holds_block
@@ -34,6 +35,24 @@ class Placement:
     """Variables of frames, by the folded names of POU and variable; their offsets count from the start of the buffer."""
     config_initials: list[tuple[int, Type, bytes]] = field(default_factory=list)
     """Initial values that VAR_CONFIG gives: the offset of each in the buffer, its type and its bytes."""
+    stack: FrameStack | None = None
+    """The stack of frames, if any POU has its frames there."""
+
+
+@dataclass(frozen=True)
+class FrameStack:
+    """Where the frames of POUs lie whose calls may come back: `start` and `end` in the buffer; the number of the lease whose
+    extent is the part in use, and where its row lies."""
+
+    start: int
+    end: int
+    lease: int
+    row_at: int
+
+    @property
+    def top_at(self) -> int:
+        """Where in the buffer it stands how far the stack is in use."""
+        return self.row_at + 4
 
 
 def lay_out(checker: Checker) -> Placement:
@@ -47,15 +66,7 @@ def lay_out(checker: Checker) -> Placement:
             slots += bytes(-len(slots) % 8)
             variable.offset = SLOTS_OFFSET + len(slots)
             slots += bytes(8) if variable.reference else variable.initial
-    frames = len(slots)
-    for pou in checker.bodies:
-        frames += -frames % 8
-        pou.frame_offset = SLOTS_OFFSET + frames
-        frames += pou.frame_size
-    frames += -frames % 8
-    leases, leases_at = len(checker.project.facts.leases), SLOTS_OFFSET + frames
-    frames += leases * LEASE_BYTES
-    placement = Placement(Layout(frames, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())))
+    placement = _frames_and_leases(checker, len(slots))
     located = [v for v in checker.global_order if v.place == "area"]
     for pou in checker.bodies:
         located += [v for v in pou.order if v.place == "area"]
@@ -64,7 +75,7 @@ def lay_out(checker: Checker) -> Placement:
         _complete_type(pou)
     for row in checker.var_config.completed:
         _apply_config(row, slots, placement)
-    placement.objects = Objects(_numbered(checker, slots), leases, leases_at)
+    placement.objects = replace(placement.objects, extents=_numbered(checker, slots, placement.stack))
     placement.initial += _runs(slots)
     retaining = Containment(checker, lambda pou: any(variable.retain for variable in pou.order))
     for variable in checker.global_order:
@@ -76,6 +87,27 @@ def lay_out(checker: Checker) -> Placement:
         offset, bit = _offset_of(access.spot, placement)
         placement.symbols.setdefault(fold(access.name), Field(
             access.name, access.spot.type, offset, "VAR_ACCESS", bit, absolute=True, constant=not access.writable))
+    return placement
+
+
+def _frames_and_leases(checker: Checker, end: int) -> Placement:
+    """The placement with the fixed frames, leases and the stack of frames behind so many bytes of variables."""
+    for pou in checker.bodies:
+        end += -end % 8
+        pou.frame_offset = SLOTS_OFFSET + end
+        end += 8 if pou.stack_bytes else pou.frame_size
+    end += -end % 8
+    leases, leases_at = len(checker.project.facts.leases), SLOTS_OFFSET + end
+    end += leases * LEASE_BYTES
+    largest, stack = max((pou.stack_bytes for pou in checker.bodies), default=0), None
+    if largest:
+        start = SLOTS_OFFSET + end + LEASE_BYTES
+        stack = FrameStack(start, start + stack_bytes(largest), leases, SLOTS_OFFSET + end)
+        leases, end = leases + 1, stack.end - SLOTS_OFFSET
+    placement = Placement(Layout(end, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())),
+                          objects=Objects((), leases, leases_at), stack=stack)
+    if stack is not None:
+        placement.initial.append((stack.row_at, b"".join(n.to_bytes(4, "little") for n in (stack.start, stack.start, 1, 1))))
     return placement
 
 
@@ -122,8 +154,10 @@ def _apply_config(row: Completed, slots: bytearray, placement: Placement) -> Non
         placement.initial.append((offset, row.initial))
 
 
-def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]:
-    """The extents of all objects by number; the headers of instances get the numbers of theirs (see `objects`)."""
+def _numbered(checker: Checker, slots: bytearray, stack: FrameStack | None) -> tuple[tuple[int, int], ...]:
+    """The extents of all objects by number; the headers of instances get the numbers of theirs (see `objects`).
+
+    What is in instances on the stack has no extent but that of the stack."""
     numbering = Numbering(checker)
     numbering.add_single()
     for variable in checker.global_order:
@@ -133,7 +167,8 @@ def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]
         frame = bytearray(pou.frame_initial)
         for variable in pou.order:
             if variable.place == "frame" and not variable.reference:
-                numbering.add_instances(frame, variable.type, pou.frame_offset + variable.offset, pou.frame_offset)
+                extent = (stack.start, stack.end) if stack is not None and pou.stack_bytes else None
+                numbering.add_instances(frame, variable.type, pou.frame_offset + variable.offset, pou.frame_offset, extent)
         pou.frame_initial = bytes(frame)
     return tuple(numbering.extents)
 
@@ -197,9 +232,10 @@ def _symbol(variable: Variable) -> Field:
 
 def _in_frame(pou: Pou) -> dict[str, Field]:
     """The variables of the frame of a POU: those of a function, and VAR_TEMP."""
-    return {fold(variable.name): Field(variable.name, variable.type, pou.frame_offset + variable.offset, variable.kind,
+    start, newest = (0, (pou.frame_offset,)) if pou.stack_bytes else (pou.frame_offset, ())
+    return {fold(variable.name): Field(variable.name, variable.type, start + variable.offset, variable.kind,
                                        absolute=True, reference=variable.reference, constant=variable.constant,
-                                       hexadecimal=variable.hexadecimal)
+                                       hexadecimal=variable.hexadecimal, frame_at=newest)
             for variable in pou.order if variable.place == "frame" and "$" not in variable.name}  # fmt: skip
 
 

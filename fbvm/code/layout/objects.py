@@ -60,34 +60,37 @@ class Numbering:
     def add_single(self) -> None:
         """Number the variables that have one place."""
         for variable in self.checker.project.facts.referred:
-            variable.object = self._add(variable.offset, variable.type.size)
+            variable.object = self._add(variable.offset, variable.offset + variable.type.size)
 
-    def _add(self, start: int, size: int) -> int:
+    def _add(self, start: int, end: int) -> int:
         """The number of one more object."""
-        self.extents.append((start, start + size))
+        self.extents.append((start, end))
         return FIRST_OBJECT + len(self.extents) - 1
 
-    def add_instances(self, content: bytearray, kind: Type, at: int, start: int = SLOTS_OFFSET) -> None:
+    def add_instances(self, content: bytearray, kind: Type, at: int, start: int = SLOTS_OFFSET,
+                      extent: tuple[int, int] | None = None) -> None:
         """Number the variables of all instances inside a value, and write the headers of those.
 
         content: initial bytes of the part of the buffer that begins at the offset `start`.
         kind: the type of the value.
-        at: the offset of the value in the buffer."""
+        at: the offset of the value in the buffer.
+        extent: what the variables lie in, if the value has no fixed place."""
         if not self._has_objects(kind):
             return
         if isinstance(kind, ArrayType):
             for index in range(kind.count):
-                self.add_instances(content, kind.element, at + index * kind.element.size, start)
+                self.add_instances(content, kind.element, at + index * kind.element.size, start, extent)
         elif isinstance(kind, StructType) and kind.block:
             pou = self.checker.block_of(kind)
             if referred := pou.all_referred():
                 header = at - start + OBJECTS_AT
                 content[header:header + 4] = (FIRST_OBJECT + len(self.extents)).to_bytes(4, "little")
                 for variable in referred:
-                    self._add(at + variable.offset, kind.size if variable.name == "THIS" else variable.type.size)
+                    size = kind.size if variable.name == "THIS" else variable.type.size
+                    self._add(*(extent or (at + variable.offset, at + variable.offset + size)))
             for variable in pou.order:
                 if variable.place == "self" and not variable.reference:
-                    self.add_instances(content, variable.type, at + variable.offset, start)
+                    self.add_instances(content, variable.type, at + variable.offset, start, extent)
         elif isinstance(kind, StructType):
             for member in kind.fields.values():
-                self.add_instances(content, member.type, at + member.offset, start)
+                self.add_instances(content, member.type, at + member.offset, start, extent)

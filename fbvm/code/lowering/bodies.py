@@ -4,11 +4,12 @@ This is the one module that knows all rules; a rule knows the context only (`con
 
 from __future__ import annotations
 
+from fbvm.base.types import BOOL
 from fbvm.check.checker import Checker
 from fbvm.check.symbols.facts import Edge, Pou, Start
 from fbvm.code.builder.places import Place
 from fbvm.code.image import Body, RungPicture
-from fbvm.code.lowering import aggregates, calls, loops, operators, pointers, statements, variables
+from fbvm.code.lowering import aggregates, calls, frame_stack, loops, operators, pointers, statements, variables
 from fbvm.code.lowering.context import BodyContext, Rules
 from fbvm.code.lowering.program import Program
 from fbvm.code.lowering.step_costs import step_cost, with_costs
@@ -32,11 +33,13 @@ def lower_body(program: Program, checker: Checker, pou: Pou) -> Body:
     pou: the POU, to which layout has given its place."""
     body = BodyContext(program, checker, pou, RULES)
     body.emit(("charge", step_cost(pou.tree.body) + 1, body.entry_site))
+    frame_stack.enter(body)
+    pointers.begin_leases(body)
     _enter(body)
     if program.drawn and not pou.source.library and not body.is_hidden:
         _draw(body, pou.tree.body)
     body.lower(pou.tree.body)
-    body.emit(*pointers.end_leases(body))
+    body.emit(*body.at_return)
     size = pou.type.size if pou.type is not None else 0
     return Body(pou.name, pou.kind, with_costs(tuple(body.out)), size)
 
@@ -52,10 +55,10 @@ def _enter(body: BodyContext) -> None:
     start = pou.frame_inputs if pou.is_routine else 0
     initial = pou.frame_initial[start:]
     if initial:
-        origin, offset = body.program.frame(pou)
-        body.emit(("fill", (origin, offset + start, ()), initial))
+        frame = body.frame or Place((*body.program.frame(pou), ()), BOOL)
+        body.emit(("fill", frame.moved(start, BOOL).address, initial))
     for offset, reference in body.program.entry_references.get(pou, ()):
-        slot = Place(("abs", offset, ()), reference.kind)
+        slot = body.frame.moved(offset, reference.kind) if body.frame else Place(("abs", offset, ()), reference.kind)
         body.emit(slot.store(pointers.initial(body, reference), body.entry_site))
     for edge in pou.edges:
         _detect(body, edge)

@@ -52,6 +52,10 @@ class BodyContext(Emitter):
         self._values, self._places, self._statements = rules.values, rules.places, rules.statements
         self._sites: dict[int, int] = {}
         self._slots: dict[Variable, Place] = {}
+        self.frame: Place | None = None
+        """The frame of the body, if that lies on the stack of frames."""
+        self.at_return: Block = ()
+        """Statements that end the body, for wherever it returns."""
         self._reads: list[Place] = []
         """Variables that the present statement reads, for observations."""
         self.entry_site = self.site(pou.tree.name)
@@ -147,10 +151,16 @@ class BodyContext(Emitter):
         """The place of a variable itself; for an in-out, of its reference, with the type of what that points at."""
         slot = self._slots.get(variable)
         if slot is None:
-            origin = ("self", variable.offset) if variable.place == "self" else self.program.origin(variable)
-            bit = None if variable.place == "self" else variable_bit(variable)
-            slot = self._slots[variable] = Place((*origin, ()), variable.type, bit)
+            slot = self._slots[variable] = self._slot(variable)
         return slot
+
+    def _slot(self, variable: Variable) -> Place:
+        if variable.place == "self":
+            return Place(("self", variable.offset, ()), variable.type)
+        if variable.place == "frame" and variable.owner is not None and variable.owner.stack_bytes:
+            assert self.frame is not None and variable.owner is self.pou.owner
+            return self.frame.moved(variable.offset, variable.type)
+        return Place((*self.program.origin(variable), ()), variable.type, variable_bit(variable))
 
     def aggregate(self, expr: tree.Expr) -> Place:
         """The place of an array or structure that is read as a whole, also of one that a function yields."""

@@ -2,13 +2,13 @@
 
 Every instance begins with the number of its type.  A call that several bodies may be meant by is a CASE over that number; where
 only one can be meant, the call is the same as that of a function.  The parameters of a method lie in the frame of the method
-that the call names; an override gets them copied into its own frame, where they lie in the same order (S1004), and gives
-outputs and result back."""
+that the call names; an override gets them copied into its own frame, where they lie alike (S1004), and gives outputs and result
+back.  Frames on the stack need no copy (`frame_stack`)."""
 
 from __future__ import annotations
 
 from fbvm.base.types import UDINT, RefType, StructType
-from fbvm.check.symbols.facts import Pou, PouCall, StandardCall, Variable
+from fbvm.check.symbols.facts import Pou, PouCall, StandardCall
 from fbvm.code.builder.places import Place
 from fbvm.code.lowering.context import BodyContext
 from fbvm.code.operations import Address, Block, Node
@@ -61,19 +61,14 @@ def query(body: BodyContext, called: StandardCall, site: int) -> Node:
 
 
 def _row(body: BodyContext, named: Pou, meant: Pou, address: Address | None) -> Block:
-    """The call of the body that is meant: parameters of the method that is named in, outputs and result of it back."""
+    """The call of the body that is meant: parameters of the method that is named in, outputs and result of it back.
+
+    On the stack both have the same frame."""
     statement: Node = ("call", body.program.number(body.program.executed(meant)), address)
-    if meant is named or not named.is_routine:
+    if meant is named or not named.is_routine or named.stack_bytes:
         return (statement,)
-    passed: list[Node] = []
-    if named.frame_inputs:
-        to, source = body.program.frame(meant), body.program.frame(named)
-        passed.append(("copy", (*to, ()), (*source, ()), named.frame_inputs))
-    given = [(own, other) for own, other in zip(_given(named), _given(meant), strict=True)]
-    back = tuple(("copy", body.slot(own).address, body.slot(other).address, own.type.size) for own, other in given)
-    return (*passed, statement, *back)
-
-
-def _given(method: Pou) -> list[Variable]:
-    """The variables of a method that its caller reads."""
-    return [*method.parameters("VAR_OUTPUT"), *([method.result] if method.result is not None else [])]
+    (to, start), (source, begin) = body.program.frame(meant), body.program.frame(named)
+    passed: Node = ("copy", (to, start, ()), (source, begin, ()), named.frame_inputs)
+    size = named.frame_given - named.frame_inputs
+    given: Node = ("copy", (source, begin + named.frame_inputs, ()), (to, start + named.frame_inputs, ()), size)
+    return (*([passed] if named.frame_inputs else []), statement, *([given] if size else []))

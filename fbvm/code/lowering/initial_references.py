@@ -49,7 +49,7 @@ class InitialReferences:
                 if variable.place != "frame" or variable.reference:
                     continue
                 value = bytearray(variable.initial)
-                begin = pou.frame_offset + variable.offset
+                begin = variable.offset + (0 if pou.stack_bytes else pou.frame_offset)
                 for at, start, around in references_in(self.checker, variable.type, variable.initial, begin):
                     made = bytes(REFERENCE_BYTES)
                     if start.late and start.pou is pou:

@@ -23,7 +23,7 @@ from fbvm.check.declarations.interfaces import OBJECTS_AT, PADDED_BYTES
 from fbvm.check.expressions.values import is_null
 from fbvm.check.symbols.facts import Holder, Start, Variable
 from fbvm.code.builder.places import Place
-from fbvm.code.lowering import any_parameters
+from fbvm.code.lowering import any_parameters, frame_stack
 from fbvm.code.lowering.arrays import size_of
 from fbvm.code.lowering.context import BodyContext
 from fbvm.code.operations import (
@@ -127,6 +127,8 @@ def _leased(body: BodyContext, holder: Holder, reference: Node) -> Node:
     variable = holder.variable
     assert variable is not None and holder.lease is not None and holder.expr is not None
     bits = body.to_temporary(_bits(reference))
+    if body.pou.stack_bytes and not variable.reference:
+        return frame_stack.leased(body, bits)
     passed = variable.reference and not isinstance(variable.type, AnyType)
     whole = body.place(holder.expr)
     number = body.to_temporary(("shr", "u64", bits, ("const", "i64", OBJECT_SHIFT), body.entry_site)) if passed else None
@@ -175,9 +177,19 @@ def _row(body: BodyContext, lease: int, offset: int) -> Address:
     return ("abs", body.program.leases_at + lease * LEASE_BYTES + offset, ())
 
 
-def end_leases(body: BodyContext) -> Block:
-    """Statements that end all leases of the body, for wherever it returns."""
-    return tuple(("store", "u32", _row(body, lease, _LEASE_HELD), ("const", "u32", 0)) for lease in body.pou.leases)
+def begin_leases(body: BodyContext) -> None:
+    """Have all leases of the body end wherever it returns.
+
+    A body that may be active already keeps those of in-outs, and gives them back; variables in its frame need none."""
+    if not body.pou.stack_bytes:
+        body.at_return = tuple(("store", "u32", _row(body, lease, _LEASE_HELD), ("const", "u32", 0)) for lease in body.pou.leases)
+        return
+    for variable, lease in body.facts.leases.items() if body.pou.leases else ():
+        if lease in body.pou.leases and variable.reference:
+            fields = [_row(body, lease, offset) for offset in (_LEASE_START, _LEASE_END, _LEASE_HELD)]
+            kept = [body.to_temporary(("load", "u32", field)) for field in fields]
+            body.emit(("store", "u32", fields[-1], ("const", "u32", 0)))
+            body.at_return += tuple(("store", "u32", field, value) for field, value in zip(fields, kept, strict=True))
 
 
 # --- working with them ------------------------------------------------------------------------------------------------

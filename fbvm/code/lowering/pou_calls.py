@@ -5,13 +5,17 @@ is not run, outputs keep their values, a function's result is the default of its
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
 from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, base, followed, machine
 from fbvm.check.expressions.constants import default
 from fbvm.check.symbols.facts import PouCall, Variable
 from fbvm.code.builder.constants import FALSE, TRUE, zero
 from fbvm.code.builder.conversions import implicit
 from fbvm.code.builder.places import Place, is_aggregate
-from fbvm.code.lowering import dispatch, pointers
+from fbvm.code.lowering import dispatch, frame_stack, pointers
 from fbvm.code.lowering.any_arguments import described
 from fbvm.code.lowering.arrays import bounds
 from fbvm.code.lowering.context import BodyContext
@@ -26,12 +30,14 @@ def run(body: BodyContext, call: tree.Expr, called: PouCall) -> None:
     call: the call in the tree, or the property that is assigned.
     called: what the checker found out about it."""
     if called.pou.home is None:
-        _enabled(body, call, called, ())
+        with _callee(body, call, called) as callee:
+            _enabled(callee, call, ())
         return
-    instance = _instance(body, called) or Place(("self", 0, ()), BOOL)
+    callee = Callee(body, called, _instance(body, called) or Place(("self", 0, ()), BOOL), None)
     if called.inputs:
-        _inputs(body, called, instance, body.site(call))
-    body.emit(dispatch.call(body, called, instance, body.site(call)))
+        _inputs(callee, body.site(call))
+    with frame_stack.frame(body, called, body.site(call)):
+        body.emit(dispatch.call(body, called, callee.instance, body.site(call)))
 
 
 def value(body: BodyContext, call: tree.Call, called: PouCall) -> Node:
@@ -40,13 +46,14 @@ def value(body: BodyContext, call: tree.Call, called: PouCall) -> Node:
     assert result is not None
     number = body.new_temporary()
     form = machine(result.type)
-    place = body.slot(result)
-    if called.enable is not None:
-        initial = zero(form)
-        if form in INTEGERS:  # an enumeration begins with its first member
-            initial = ("const", form, int.from_bytes(default(result.type), "little"))
-        body.emit(("let", number, form, initial))
-    _enabled(body, call, called, (("let", number, form, place.load()),))
+    with _callee(body, call, called) as callee:
+        place = callee.slot(result)
+        if called.enable is not None:
+            initial = zero(form)
+            if form in INTEGERS:  # an enumeration begins with its first member
+                initial = ("const", form, int.from_bytes(default(result.type), "little"))
+            body.emit(("let", number, form, initial))
+        _enabled(callee, call, (("let", number, form, place.load()),))
     return ("tmp", form, number)
 
 
@@ -54,36 +61,71 @@ def aggregate(body: BodyContext, call: tree.Call, called: PouCall) -> Place:
     """A call of a function whose result is an array or a structure; the place of the result."""
     result = called.pou.result
     assert result is not None
-    place = body.slot(result)
-    if called.enable is not None:
-        body.emit(("fill", place.address, result.initial))
-    _enabled(body, call, called, ())
+    with _callee(body, call, called) as callee:
+        place = callee.slot(result)
+        if called.enable is not None:
+            body.emit(("fill", place.address, result.initial))
+        _enabled(callee, call, ())
     return place
+
+
+# --- the POU that is called -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Callee:
+    """A call of a POU from a body, and where the variables of the POU lie: in its instance, in its frame on the stack, or at
+    fixed places."""
+
+    body: BodyContext
+    called: PouCall
+    instance: Place | None
+    frame: Place | None
+
+    def slot(self, variable: Variable) -> Place:
+        """The slot of a variable; of one to which VAR_CONFIG gives a place, that place."""
+        if self.frame is not None and variable.place == "frame":
+            return self.frame.moved(variable.offset, variable.type)
+        if self.instance is None or variable.place != "self":
+            return self.body.slot(variable)
+        slot = self.instance.moved(variable.offset, variable.type)
+        return slot.target(self.body.entry_site) if variable.open else slot
+
+    def parameter(self, name: str, kind: str) -> Variable | None:
+        """The parameter of that name and kind, if the POU declares it."""
+        return next((v for v in self.called.pou.parameters(kind) if v.name.upper() == name), None)
+
+
+@contextmanager
+def _callee(body: BodyContext, call: tree.Expr, called: PouCall) -> Iterator[Callee]:
+    """The POU of a call, with its frame on the stack of frames as long as the `with` statement emits, if it has one there."""
+    with frame_stack.frame(body, called, body.site(call)) as frame:
+        yield Callee(body, called, _instance(body, called), frame)
 
 
 # --- EN and ENO -------------------------------------------------------------------------------------------------------
 
 
-def _enabled(body: BodyContext, call: tree.Expr, called: PouCall, after: Block) -> None:
+def _enabled(callee: Callee, call: tree.Expr, after: Block) -> None:
     """The whole call and the statements `after` it, inside an IF where EN is given or declared."""
+    body, called = callee.body, callee.called
     site = body.site(call)
-    instance = _instance(body, called)
-    eno = _parameter(called, "ENO", "VAR_OUTPUT")
-    enable = _enable(body, called, instance, site)
+    eno = callee.parameter("ENO", "VAR_OUTPUT")
+    enable = _enable(callee, site)
     if enable is None:
-        _execute(body, called, instance, site, eno)
+        _execute(callee, site, eno)
         body.emit(*after)
         _report(body, called, TRUE, site)
         return
     enable = body.to_temporary(enable)
     with body.block() as inner:
-        _execute(body, called, instance, site, eno)
+        _execute(callee, site, eno)
         body.emit(*after)
     otherwise: Block = ()
-    if eno is not None and (instance is not None or called.outputs):
+    if eno is not None and (callee.instance is not None or called.outputs):
         with body.block() as disabled:
-            body.emit(_slot(body, eno, instance).store(FALSE, site))
-            _outputs(body, [output for output in called.outputs if output[0] is eno], instance, site)
+            body.emit(callee.slot(eno).store(FALSE, site))
+            _outputs(callee, [output for output in called.outputs if output[0] is eno], site)
         otherwise = tuple(disabled)
     body.emit(("if", ((enable, tuple(inner)),), otherwise))
     _report(body, called, enable, site)
@@ -100,13 +142,14 @@ def _instance(body: BodyContext, called: PouCall) -> Place | None:
     return body.reusable(body.place(expr))
 
 
-def _enable(body: BodyContext, called: PouCall, instance: Place | None, site: int) -> Node | None:
+def _enable(callee: Callee, site: int) -> Node | None:
     """The value of EN, which is stored if the POU declares it; None if it is neither given nor declared."""
-    declared = _parameter(called, "EN", "VAR_INPUT")
+    body, called = callee.body, callee.called
+    declared = callee.parameter("EN", "VAR_INPUT")
     enable = body.value(called.enable, BOOL) if called.enable is not None else None
     if declared is None:
         return enable
-    place = _slot(body, declared, instance)
+    place = callee.slot(declared)
     if enable is not None:
         body.write(place, enable, site)
     elif called.pou.is_routine:
@@ -124,34 +167,23 @@ def _report(body: BodyContext, called: PouCall, enable: Node, site: int) -> None
         body.emit(body.slot(variable.eno).store(enable, site))
 
 
-def _parameter(called: PouCall, name: str, kind: str) -> Variable | None:
-    return next((v for v in called.pou.parameters(kind) if v.name.upper() == name), None)
-
-
-def _slot(body: BodyContext, variable: Variable, instance: Place | None) -> Place:
-    """The slot of a callee's variable; of one to which VAR_CONFIG gives a place, that place."""
-    if instance is None or variable.place != "self":
-        return body.slot(variable)
-    slot = instance.moved(variable.offset, variable.type)
-    return slot.target(body.entry_site) if variable.open else slot
-
-
 # --- what is passed and executed --------------------------------------------------------------------------------------
 
 
-def _execute(body: BodyContext, called: PouCall, instance: Place | None, site: int, eno: Variable | None) -> None:
+def _execute(callee: Callee, site: int, eno: Variable | None) -> None:
     """Inputs, the body unless a task of its own runs it, outputs."""
-    _inputs(body, called, instance, site)
+    body, called = callee.body, callee.called
+    _inputs(callee, site)
     if eno is not None and (called.pou.enables_itself or not called.pou.writes_eno):
-        body.emit(_slot(body, eno, instance).store(TRUE, site))
-    statement = dispatch.call(body, called, instance, site)
+        body.emit(callee.slot(eno).store(TRUE, site))
+    statement = dispatch.call(body, called, callee.instance, site)
     if called.tasked is not None:
         statement = ("if", ((("not", "b", body.slot(called.tasked).load()), (statement,)),), ())
     body.emit(statement)
-    _outputs(body, called.outputs, instance, site)
+    _outputs(callee, called.outputs, site)
     for variable, expr in called.in_outs if called.pou.actions else ():
         if _may_end(body, expr):  # an ACTION that is called later finds NULL instead of what has ended
-            body.emit(("store", "ref", _slot(body, variable, instance).address, ("const", "ref", 0)))
+            body.emit(("store", "ref", callee.slot(variable).address, ("const", "ref", 0)))
 
 
 def _may_end(body: BodyContext, expr: tree.Expr) -> bool:
@@ -160,16 +192,17 @@ def _may_end(body: BodyContext, expr: tree.Expr) -> bool:
     return variable is not None and (variable.kind == "VAR_IN_OUT" or variable.place == "frame")
 
 
-def _inputs(body: BodyContext, called: PouCall, instance: Place | None, site: int) -> None:
+def _inputs(callee: Callee, site: int) -> None:
     """Evaluate all arguments in the order of writing, then store them; aggregates are copied in between."""
+    body, called = callee.body, callee.called
     passed = sorted([*called.inputs, *called.in_outs], key=lambda pair: pair[1].start)
     aggregates = [(v, e) for v, e in passed if v.kind == "VAR_INPUT" and is_aggregate(v.type)]
     passed = [pair for pair in passed if pair not in aggregates]
     nodes = body.sequence(_argument(body, variable, expr) for variable, expr in passed)
     for variable, expr in aggregates:
-        body.copy(_slot(body, variable, instance), body.aggregate(expr), site)
+        body.copy(callee.slot(variable), body.aggregate(expr), site)
     for (variable, expr), node in zip(passed, nodes, strict=True):
-        place = _slot(body, variable, instance)
+        place = callee.slot(variable)
         if variable.kind == "VAR_IN_OUT":
             _bind(body, variable, place, expr, node)
         else:
@@ -178,7 +211,7 @@ def _inputs(body: BodyContext, called: PouCall, instance: Place | None, site: in
         given = {id(v) for v, _ in called.inputs}
         for variable in called.pou.parameters("VAR_INPUT"):
             if id(variable) not in given and variable.name.upper() != "EN":
-                body.emit(("fill", _slot(body, variable, instance).address, variable.initial))
+                body.emit(("fill", callee.slot(variable).address, variable.initial))
 
 
 def _argument(body: BodyContext, variable: Variable, expr: tree.Expr) -> Node:
@@ -200,9 +233,10 @@ def _bind(body: BodyContext, variable: Variable, slot: Place, expr: tree.Expr, r
             body.emit(("store", "i32", slot.moved(offset, DINT).address, node))
 
 
-def _outputs(body: BodyContext, outputs: list[tuple[Variable, tree.Expr, bool]], instance: Place | None, site: int) -> None:
+def _outputs(callee: Callee, outputs: list[tuple[Variable, tree.Expr, bool]], site: int) -> None:
+    body = callee.body
     for variable, target, negated in outputs:
-        source = _slot(body, variable, instance)
+        source = callee.slot(variable)
         if source.type is not (kind := followed(source.type)):
             source = Place((("ref", source.load(), site), 0, ()), kind)
         place = body.place(target)

@@ -34,6 +34,7 @@ class Program:
         self.entry_references: dict[Pou, list[tuple[int, Start]]] = {}
         """By POU the references that its body makes when it starts, and where in the buffer each lies."""
         self.leases_at, self.held_bits = placement.objects.leases_at, placement.objects.held_bits
+        self.stack = placement.stack
         self._objects = placement.objects
         self._area_objects: dict[str, tuple[int, int]] = {}
         self._numbers: dict[tuple[str, str, int], int] = {}
@@ -75,18 +76,15 @@ class Program:
         return pou.number
 
     def executed(self, pou: Pou) -> Pou:
-        """The POU whose body is executed for another one: of a block without a statement, in some dialects, that of its base."""
-        if pou.base is None or pou.kind not in ("FUNCTION_BLOCK", "CLASS") or self.checker.project.dialect.empty_bodies:
-            return pou
-        empty = all(isinstance(each, tree.Empty) for each in pou.tree.body)
-        return self.executed(pou.base) if empty else pou
+        """The POU whose body is executed for another one."""
+        return self.checker.executed(pou)
 
     def candidates(self, pou: Pou) -> dict[Pou, list[int]]:
         """The bodies that a call of a method or block may mean, by the numbers of the types for which each is meant."""
         return self.checker.candidates(pou)
 
     def frame(self, pou: Pou) -> Origin:
-        """Where the frame of a POU begins."""
+        """Where the fixed frame of a POU begins."""
         return "abs", pou.frame_offset
 
     def area(self, name: str) -> Origin:
@@ -94,7 +92,7 @@ class Program:
         return "abs", self.areas[name].offset
 
     def origin(self, variable: Variable) -> Origin:
-        """Where a variable lies that is in no instance."""
+        """Where a variable lies that is in no instance and in no frame on the stack."""
         assert variable.place != "self"
         offset = variable.offset
         if variable.place == "frame":

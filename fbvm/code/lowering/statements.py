@@ -132,7 +132,7 @@ def _return(body: BodyContext, node: tree.Return, site: int) -> None:
             body.copy(place, body.aggregate(node.value), site)
         else:
             body.write(place, body.value(node.value, place.type), site)
-    body.emit(*pointers.end_leases(body), ("return",))
+    body.emit(*body.at_return, ("return",))
 
 
 # --- ladder and charts ------------------------------------------------------------------------------------------------

@@ -137,6 +137,7 @@ def _tuples(item: Any) -> Any:
 
 COMMON = ("name", "size", "align")
 FIELD = tuple(each.name for each in fields(Field) if each.name != "type")
+assert FIELD[-1] == "frame_at"
 _PARTS = attrgetter(*FIELD)
 
 
@@ -191,7 +192,8 @@ class _Reader:
         return kind
 
     def field(self, row: list[Any]) -> Field:
-        return Field(type=self.type(row[0]), **dict(zip(FIELD, row[1:], strict=True)))
+        *values, frame_at = row[1:]
+        return Field(type=self.type(row[0]), **dict(zip(FIELD[:-1], values, strict=True)), frame_at=tuple(frame_at))
 
 
 def _target(kind: RefType, writer: _Writer) -> list[Any]:

@@ -17,11 +17,12 @@ from types import CodeType
 from typing import Any
 from weakref import finalize
 
+from fbvm.base.areas import MOST_FRAMES
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image, ProgramRun
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.apart import run_apart
-from fbvm.engine.bases import fixed_bases
+from fbvm.engine.bases import fixed_bases, recursive_bodies
 from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.observation import NO_SITE, Observation
 from fbvm.engine.powered import UNMARKED
@@ -60,7 +61,8 @@ class Program:
     bases: dict[int, int]
     """Where the instance begins of each body that was written for its only one, by the body's number."""
     frames: int
-    """Python frames that a run takes at most: every body once (there is no recursion), and every part outlined."""
+    """Python frames that a run takes at most: every body once, and every part outlined; all that the stack of frames holds of
+    bodies that may be called again while they run."""
     table: tuple[Row, ...]
     """What the numbers in the log mean; empty for other builds."""
 
@@ -95,7 +97,8 @@ def _written(image: Image, build: Build, anywhere: bool, name: str) -> Program:
     table: list[Row] = []
     texts: list[str] = []
     lines: list[str] = []
-    frames = size = 0
+    recursive = recursive_bodies(image)
+    frames = most = size = 0
     for number in range(len(image.bodies)):
         base = bases.get(number)
         writer = LoggedWriter(image, constants, base, table) if build is Build.LOGGED else \
@@ -103,13 +106,14 @@ def _written(image: Image, build: Build, anywhere: bool, name: str) -> Program:
         body = [*writer.write(number), ""]
         lines += body
         frames += 1 + len(writer.routines)
+        most = max(most, 1 + len(writer.routines)) if number in recursive else most
         size += sum(map(len, body))
         if size > PART_CHARACTERS:
             texts.append("\n".join(lines))
             lines, size = [], 0
     texts.append("\n".join(lines))
     parts = tuple(_compiled(text, f"<{name} {number}>" if number else f"<{name}>") for number, text in enumerate(texts))
-    return Program(build, "\n".join(texts), parts, constants, bases, frames, tuple(table))
+    return Program(build, "\n".join(texts), parts, constants, bases, frames + MOST_FRAMES * most, tuple(table))
 
 
 def _compiled(text: str, name: str) -> CodeType:

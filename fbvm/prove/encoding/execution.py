@@ -102,6 +102,8 @@ class Execution:
         self.base = 0
         """Where the instance begins that is executed."""
         self.site = -1
+        self.calls = 0
+        """How many calls are nested now."""
         self.steps = 0
         self.rounds_most = 1
 

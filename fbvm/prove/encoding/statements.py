@@ -45,13 +45,21 @@ def run_block(x: Execution, block: Block, state: State) -> tuple[State | None, O
     return state, left
 
 
+MOST_CALLS = 32
+"""How many nested calls of bodies that are active already are followed."""
+
+
 def call(x: Execution, state: State, body: Body, base: int) -> State:
     """The state behind a call of a body for the instance at `base`; `state` itself, written."""
+    x.calls += 1
+    if x.calls > MOST_CALLS + len(x.image.bodies):
+        raise Refused(f"calls come back more than {MOST_CALLS} times, which is too deep to be followed", x.site)
     outer_base, outer_temporaries, x.base, state.temporaries = x.base, state.temporaries, base, {}
     begun = state.path
     following, left = run_block(x, body.code, state)
     ends = left.get("return", []) + ([following] if following else [])
     x.base = outer_base
+    x.calls -= 1
     if not ends:
         raise Refused("a call never ends", x.site)
     last = ends[0] if len(ends) == 1 else _joined(state, ends, x)

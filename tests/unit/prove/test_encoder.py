@@ -73,7 +73,8 @@ def test_programs_of_the_corpus(folder: list[lang_corpus.Program]) -> None:
     refused: Counter[str] = Counter()
     go_through((f"{p.name}:{p.line} {p.title}", partial(compare_program, p, refused)) for p in folder)
     assert refused.total() <= REFUSED_AT_MOST, refused
-    assert set(refused) <= {"a pointer to a variable that ends with its call cannot be followed"}
+    assert set(refused) <= {"a pointer to a variable that ends with its call cannot be followed",
+                            "calls come back more than 32 times, which is too deep to be followed"}
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from fbvm.code.image import Image
 from fbvm.code.operations import Address
 from fbvm.code.shapes import statements
@@ -12,7 +14,7 @@ Range = tuple[int, int]
 ANYWHERE: Range = (-(1 << 62), 1 << 62)
 Calls = dict[int, list[tuple[int, Address | None]]]
 """For each body that is executed: the bodies that it calls, with the addresses of their instances.  A body comes behind those
-that it calls."""
+that it calls, unless they call it again."""
 
 
 def call_graph(image: Image) -> Calls:
@@ -24,7 +26,7 @@ def call_graph(image: Image) -> Calls:
         number = waiting[-1]
         if number not in known:
             known[number] = [(node[1], node[2]) for node in statements(image.bodies[number].code) if node[0] == "call"]
-        missing = [called for called, _ in known[number] if called not in graph]
+        missing = [called for called, _ in known[number] if called not in known]
         if missing:
             waiting += missing
             continue
@@ -34,16 +36,17 @@ def call_graph(image: Image) -> Calls:
 
 
 def heights(graph: Calls) -> dict[int, int]:
-    """For each body how many calls are nested below it at most; 0 if it calls none."""
+    """For each body how many calls are nested below it at most, without those that come back to it; 0 if it calls none."""
     found: dict[int, int] = {}
     for number, called in graph.items():
-        found[number] = max((found[other] + 1 for other, _ in called), default=0)
+        found[number] = max((found[other] + 1 for other, _ in called if other in found), default=int(bool(called)))
     return found
 
 
-def instance_places(image: Image, graph: Calls) -> dict[int, Range]:
-    """For each body the range of bytes of the memory in which its instances begin."""
-    places: dict[int, Range] = {}
+def instance_places(image: Image, graph: Calls, recursive: Collection[int]) -> dict[int, Range]:
+    """For each body the range of bytes of the memory in which its instances begin; for one of `recursive`, which may be called
+    again while they run, anywhere."""
+    places: dict[int, Range] = dict.fromkeys(recursive, ANYWHERE)
     for task in image.tasks:
         for run in task.programs:
             _add(places, run.body, (run.offset, run.offset + 1))

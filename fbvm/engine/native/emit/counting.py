@@ -43,11 +43,12 @@ class Choice:
 class Counting:
     """The counters of a module.  A position is a step of a segment.
 
-    `offset` is where the bytes for them begin in the context: how many positions a trap has noted, these, the segments."""
+    `nested` is how many calls may be nested of bodies that are active already; `offset` is where the bytes for the counters begin
+    in the context: how many positions a trap has noted, these, the segments."""
 
-    def __init__(self, image: Image) -> None:
+    def __init__(self, image: Image, nested: int) -> None:
         self.most_segments = sum(node[0] == "count" for body in image.bodies for node in statements(body.code))
-        self.noted = 1 << len(image.bodies).bit_length()
+        self.noted = 1 << (len(image.bodies) + nested).bit_length()
         self.bytes = ENTRY_BYTES * (1 + self.noted + self.most_segments)
         self.offset = 0
         self.segments: list[Segment] = []

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from types import MappingProxyType
 
-from fbvm.base.areas import BUDGET
+from fbvm.base.areas import BUDGET, MOST_FRAMES
 from fbvm.code.image import Image
-from fbvm.engine.bases import fixed_bases
+from fbvm.engine.bases import fixed_bases, recursive_bodies
 from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.native.emit import texts as native_texts
 from fbvm.engine.native.emit.alias_scopes import METADATA, AliasScopes, resolved
@@ -103,11 +103,11 @@ def translate(image: Image, stops: bool = False) -> Translation:
 
 
 def _translated(image: Image, stops: bool) -> Translation:
-    graph = call_graph(image)
-    module = Module(image, fixed_bases(image), instance_places(image, graph), heights(graph), [], {}, set(),
-                    stops)
+    graph, recursive = call_graph(image), recursive_bodies(image)
+    module = Module(image, fixed_bases(image), instance_places(image, graph, recursive), heights(graph), [], {}, set(),
+                    stops, recursive)
     if image.counters:
-        counting = module.counting = Counting(image)
+        counting = module.counting = Counting(image, MOST_FRAMES if recursive else 0)
         counting.offset = module.room(counting.bytes)
     if image.marks:
         module.marks_at = module.room(-(-image.marks // 16) * 16)
@@ -142,7 +142,7 @@ def _body(module: Module, number: int) -> str:
     w.write(w.body.code)
     if not w.dead:
         w.give_back()
-    lines = [f"{name} = alloca {kind}, align 8" for name, kind in w.temporaries.items()]
+    lines = [f"{name} = alloca {kind}, align 8" for name, kind in (w.temporaries | w.kept_texts).items()]
     lines += ["%budget = alloca i64", "store i64 %left, ptr %budget"]
     if w.uses_instance:
         lines.append("%s = getelementptr inbounds i8, ptr %m, i64 %self")

@@ -45,7 +45,8 @@ def capacity(w: Writer, node: Node) -> int:
 
 
 def kept(w: Writer) -> dict[int, tuple[int, int]]:
-    """For each text temporary of the body its offset in the context, and how many characters it has at most."""
+    """For each text temporary of the body its offset in the context, unless it is on the host's stack, and how many characters
+    it has at most."""
     if w.capacities is not None:
         return w.capacities
     lets = list(_text_lets(w.body.code))
@@ -59,7 +60,11 @@ def kept(w: Writer) -> dict[int, tuple[int, int]]:
     else:
         raise Unsupported(f"a text of {w.body.name} grows without bound")
     units = {number: TEXT_UNITS[node[1]] for number, node in lets}
-    w.capacities = {number: (w.module.room(size * units[number]), size) for number, (_, size) in w.capacities.items()}
+    if w.is_recursive:  # each execution has temporaries of its own
+        w.kept_texts = {_kept_name(number): f"[{max(size, 1) * units[number]} x i8]"
+                        for number, (_, size) in w.capacities.items()}
+    else:
+        w.capacities = {number: (w.module.room(size * units[number]), size) for number, (_, size) in w.capacities.items()}
     return w.capacities
 
 
@@ -77,8 +82,15 @@ def keep(w: Writer, number: int, a: Node) -> None:
     w.emit(f"store i64 {text.length}, ptr {w.temporary(number, 'i64')}, align 8")
 
 
+def _kept_name(number: int) -> str:
+    return f"%text{number}"
+
+
 def _kept_place(w: Writer, number: int) -> str:
-    return w.new(f"getelementptr inbounds i8, ptr %c, i64 {kept(w)[number][0]}")
+    place = kept(w)[number][0]
+    if w.is_recursive:
+        return _kept_name(number)
+    return w.new(f"getelementptr inbounds i8, ptr %c, i64 {place}")
 
 
 def _tmp(w: Writer, form: str, number: int) -> Text:

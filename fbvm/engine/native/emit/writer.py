@@ -8,7 +8,7 @@ stored in memory whenever it changes but not read from there, which would make e
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -102,6 +102,8 @@ class Module:
     routines: set[str]
     stops: bool = False
     """Whether its runs can be stopped at observations."""
+    recursive: Collection[int] = ()
+    """The bodies that may be called again while they run."""
     counting: Counting | None = None
     """The counters, if its code counts."""
     marks_at: int = 0
@@ -148,6 +150,9 @@ class Writer:
         self.loops: list[tuple[str, str]] = []
         """Labels of tail and end of the loops around, the innermost last."""
         self.temporaries: dict[str, str] = {}
+        self.kept_texts: dict[str, str] = {}
+        """Text temporaries that are kept on the host's stack, with LLVM's type of each."""
+        self.is_recursive = number in module.recursive
         self.capacities: dict[int, tuple[int, int]] | None = None
         self.next_scratch = SCRATCH
         self.uses_instance = False
