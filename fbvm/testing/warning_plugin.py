@@ -7,13 +7,13 @@ The ini options `fbvm_no_warn` and `fbvm_warnings_as_errors` say the same for ev
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from fbvm.check.lint.suppression import Wanted
-
 if TYPE_CHECKING:
+    from fbvm.check.lint.suppression import Wanted
     from fbvm.testing.subject import Subject
 
 NAME = "fbvm_warned"
@@ -33,13 +33,22 @@ class WarningPlugin:
     """The options about warnings of a session, and the warnings of all programs."""
 
     def __init__(self, config: pytest.Config) -> None:
-        codes = [*config.getini("fbvm_no_warn"), *config.getoption("fbvm_no_warn")]
-        as_errors = config.getoption("fbvm_warnings_as_errors") or config.getini("fbvm_warnings_as_errors")
+        listed = [*config.getini("fbvm_no_warn"), *config.getoption("fbvm_no_warn")]
+        self._unwanted = [code for codes in listed for code in codes.split(",")]
+        self._as_errors = bool(config.getoption("fbvm_warnings_as_errors") or config.getini("fbvm_warnings_as_errors"))
+        self._shown: dict[str, None] = {}
+        if self._unwanted:
+            self.wanted  # noqa: B018  a wrong code ends the session at its start
+
+    @cached_property
+    def wanted(self) -> Wanted:
+        """Which warnings are wanted.  Raises UsageError for a code that no warning has."""
+        from fbvm.check.lint.suppression import Wanted
+
         try:
-            self.wanted = Wanted.of((code for listed in codes for code in listed.split(",")), bool(as_errors))
+            return Wanted.of(self._unwanted, self._as_errors)
         except ValueError as error:
             raise pytest.UsageError(f"--fbvm-no-warn: {error}") from None
-        self._shown: dict[str, None] = {}
 
     def add(self, subject: Subject) -> None:
         """Adds the warnings of a compiled program."""
