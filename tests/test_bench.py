@@ -193,7 +193,7 @@ def test_the_script_live(load: Load) -> None:
     assert len(slices) >= 6 and len(scans) == 30 and min(slices) > 0
 
 
-def test_the_script_run(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_script_run(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     script = load("run")
     monkeypatch.setattr(script, "SCANS", 200)
     monkeypatch.setattr(script, "BENCH", small)
@@ -202,6 +202,11 @@ def test_the_script_run(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch
     script.compiling()
     script.scanning()
     script.starting()
+    started: list[list[str]] = []
+    monkeypatch.setattr(script, "subprocess", SimpleNamespace(run=lambda words, **options: started.append(words[1:])))
+    script.loading()
+    assert started[-1] == ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "fbvm.testing.plugin"]
+    assert "what the plugin adds" in capsys.readouterr().out
 
 
 def test_the_script_soak(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:

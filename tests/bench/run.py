@@ -9,6 +9,7 @@ quicker than the imports and the reading of two files; a cold one also makes the
 from __future__ import annotations
 
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -118,8 +119,41 @@ def starting() -> None:
                 show("  of these, work of the processor", work_ms, "ms")
 
 
+STARTS = 5
+"""New processes of each kind, of which the one that worked least counts."""
+
+
+def loading() -> None:
+    """What a verb works on a program that has not changed, and what the plugin adds to a session of pytest without PLC code.
+
+    Both are imports, nearly all: what is not loaded costs nothing."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "test_nothing.py").write_text("def test_nothing() -> None:\n    pass\n", encoding="utf-8")
+        (Path(folder) / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+        environment = os.environ | {"FBVM_CACHE": folder, "PYTHONPATH": str(HOUSE), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+
+        def work_ms(*words: str) -> float:
+            """The least work of a process, after one that fills the cache."""
+            taken = []
+            for _ in range(1 + STARTS):
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                subprocess.run([sys.executable, *words], env=environment, cwd=folder, capture_output=True, check=True)
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+            return min(taken[1:]) * 1e3
+
+        show("Python alone, work of the processor", work_ms("-c", "pass"), "ms")
+        show("  fbvm check demo.st, unchanged (wanted: 150)", work_ms("-m", "fbvm", "check", str(DEMO)), "ms")
+        show("  fbvm run demo.st --scans 3, unchanged", work_ms("-m", "fbvm", "run", str(DEMO), "--scans", "3"), "ms")
+        plain = work_ms("-m", "pytest", "-q", "-p", "no:cacheprovider")
+        show("  pytest, a test that does nothing", plain, "ms")
+        with_plugin = work_ms("-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "fbvm.testing.plugin")
+        show("  what the plugin adds (wanted: 50)", with_plugin - plain, "ms")
+
+
 if __name__ == "__main__":
     print(f"Python {sys.version.split()[0]} on {sys.platform}")
     compiling()
     scanning()
     starting()
+    loading()
