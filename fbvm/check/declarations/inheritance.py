@@ -4,7 +4,7 @@ Source: IEC 61131-3 ed. 3, 6.6.5 to 6.6.8; what CODESYS and TwinCAT add is a row
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, StructType, Type, fold
@@ -23,7 +23,7 @@ def resolve_head(context: Context, pou: Pou) -> None:
     """Find what a POU EXTENDS and IMPLEMENTS, and resolve it; what is wrong there is reported."""
     head, report = pou.tree, context.report
     allowed = _BASES.get(pou.kind)
-    for spec in head.bases if allowed else ():
+    for spec in _without_query(head.bases) if allowed else ():
         found = _named(context, pou, spec, allowed or ())
         if found is None:
             pou.inherits = True
@@ -37,13 +37,18 @@ def resolve_head(context: Context, pou: Pou) -> None:
             pou.inherits = True
         else:
             pou.base = found
-    for spec in head.interfaces if pou.kind in ("FUNCTION_BLOCK", "CLASS") else ():
+    for spec in _without_query(head.interfaces) if pou.kind in ("FUNCTION_BLOCK", "CLASS") else ():
         found = _named(context, pou, spec, ("INTERFACE",))
         if found is not None:
             pou.interfaces.append(found)
     for spec in (*(() if allowed else head.bases), *(head.interfaces if pou.kind not in ("FUNCTION_BLOCK", "CLASS") else ())):
         report.add("S1001", pou.source, spec, f"a {pou.kind} extends and implements nothing",
                    "make it a FUNCTION_BLOCK" if pou.kind == "PROGRAM" else "")
+
+
+def _without_query(specs: Iterable[tree.NamedType]) -> Iterator[tree.NamedType]:
+    """The names without __SYSTEM.IQueryInterface, which has no members: CODESYS wants it for __QUERYINTERFACE."""
+    return (spec for spec in specs if fold(spec.text) != "__SYSTEM.IQUERYINTERFACE")
 
 
 def _named(context: Context, pou: Pou, spec: tree.NamedType, kinds: tuple[str, ...]) -> Pou | None:
@@ -120,7 +125,9 @@ def _check_override(context: Context, pou: Pou, method: Pou, parent: Pou) -> Non
         return
     if "FINAL" in parent.modifiers:
         _report(context, "S1002", method, f"{shown(method)} is FINAL in {_home(parent)} and cannot be overridden", "", parent)
-    if not context.interface(parent, pou.source, method.tree.name) or method.has_failed_names or parent.has_failed_names:
+    if not all(context.interface(each, pou.source, method.tree.name) for each in (method, parent)):
+        return
+    if method.has_failed_names or parent.has_failed_names:
         return
     if (difference := _difference(method, parent)):
         _report(context, "S1004", method, f"{shown(method)} of {_home(method)} differs from the one of {_home(parent)}: "

@@ -153,7 +153,7 @@ class _Interface:
                             "variables, actions, methods and properties of a block share their names")
                 continue
             made = Pou(shown if written.kind == "METHOD" else f"{shown}.{written.kind.capitalize()}", written.kind, pou.source,
-                       written, block=pou, modifiers=frozenset(word.text for word in written.modifiers))
+                       written, block=pou, modifiers=_modifiers(pou, written))
             pou.methods[key] = made
             for refused in written.refused:
                 self.context.report.refuse(pou.source, refused)
@@ -439,3 +439,8 @@ def _field(variable: Variable) -> Field:
     """The variable as a member of its block's type; a location is filled in when the layout is known."""
     return Field(variable.name, variable.type, variable.offset, variable.kind, absolute=variable.place in ("area", "abs"),
                  reference=variable.reference, constant=variable.constant, hexadecimal=variable.hexadecimal)
+
+
+def _modifiers(pou: Pou, written: tree.Pou) -> frozenset[str]:
+    """The words of the head of a method; FINAL in an interface, which TwinCAT takes, forbids nothing to who implements it."""
+    return frozenset(word.text for word in written.modifiers if pou.kind != "INTERFACE" or word.text != "FINAL")

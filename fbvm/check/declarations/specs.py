@@ -224,7 +224,8 @@ def _constructed(scope: Scope, spec: tree.TypeSpec, base: tree.NamedType, values
     if resolved is not None and values is not None and _has_inputs(resolved[0], values):
         return resolved[0], initial_bytes(scope, resolved[0], values, resolved[1])
     if resolved is not None and is_block(resolved[0]):
-        _refuse_arguments(scope, spec, base)
+        if not isinstance(spec, tree.ConstructedSpec) or spec.arguments or spec.values is not None:
+            _refuse_arguments(scope, spec, base)
     elif resolved is not None:
         scope.error("S0704", spec, f"{resolved[0]} takes no arguments",
                     f"a subrange is written {base.text} (0..9), an initial value {base.text} := 5")

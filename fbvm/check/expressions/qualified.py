@@ -4,6 +4,7 @@
     Standard.TON        a name of a library, which says by itself what is meant
     SysFile.SysTypes.RTS_IEC_RESULT     the same behind the name of another library
     PLC_PRG.step        a variable of a program, of which there is one instance then
+    Motor.LIMIT         a CONSTANT of a block, in some dialects
     word.READY          the bit of that number, where READY is a constant
 
 The qualifier only has to be known: it never decides between two declarations of a library.
@@ -52,7 +53,21 @@ def member(scope: Scope, expr: tree.Member) -> Type | Variable | None:
     if is_space(scope, expr.of):
         space, name = fold(last_name(expr.of)), fold(expr.name.text)
         return scope.context.listed(space, name, scope.source) or _enumeration(scope, space, name)
-    return None
+    return _constant_of_block(scope, outer, expr)
+
+
+def _constant_of_block(scope: Scope, name: str, expr: tree.Member) -> Variable | None:
+    """The CONSTANT of a block or program that is named behind its type, where a dialect takes that: it is the same in all
+    instances."""
+    if not scope.dialect.locals_are_read:
+        return None
+    found = scope.project.pou(name, scope.source)
+    if found is None or found.kind not in ("FUNCTION_BLOCK", "PROGRAM"):
+        return None
+    if not found.busy and found is not scope.pou:
+        scope.context.interface(found, scope.source, expr)
+    variable = found.variables.get(fold(expr.name.text))
+    return variable if variable is not None and variable.constant and variable.value is not None else None
 
 
 def _enumeration(scope: Scope, space: str, name: str) -> EnumType | None:

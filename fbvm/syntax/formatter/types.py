@@ -162,6 +162,9 @@ class TypeLayout(StatementLayout):
     def constructed_elements(self, base: Phrase, opener: Token, items: list[Phrase], closer: Token) -> Phrase:
         return Phrase(base.start, base.doc, self.array_init(opener, items, closer).doc)
 
+    def constructed_plain(self, base: Phrase, opener: Token, closer: Token) -> Phrase:
+        return Phrase(base.start, base.doc, self.leaf(opener), self.closer(closer))
+
     def based(self, base: Phrase, opener: Token, members: list[Phrase], closer: Token) -> Phrase:
         return Phrase(base.start, base.doc, " ", self.enum_plain(opener, members, closer).doc)
 

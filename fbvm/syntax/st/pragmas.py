@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.tree import Declaration, Pragma, SourceText, VarSection
 
-WORDS = {"region", "endregion", "warning", "info", "text", "elsif", "else", "end_if"}
-"""First words of pragmas for the reader or for messages of a compiler that we are not, and of those that go on with an
-IF, which was warned of."""
+WORDS = {"region", "endregion", "warning", "info", "text", "elsif", "else", "end_if", "flow", "noflow", "attribute"}
+"""First words of pragmas for the reader or for messages of a compiler that we are not, of those that go on with an IF, which was
+warned of, and of attributes without quotes, which tools beside the compiler read (`attribute clr [...]` of Inxton)."""
 
 ATTRIBUTES = {
     "qualified_only", "strict", "hide", "hide_all_locals", "conditionalshow", "conditionalshow_all_locals", "displaymode",

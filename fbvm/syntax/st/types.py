@@ -89,6 +89,9 @@ class Types(Statements):
                 return ConstructedSpec(base.start, closer.end, base, None, tuple(given))
         return EnumSpec(base.start, closer.end, base, tuple(members))
 
+    def constructed_plain(self, base: NamedType, opener: Token, closer: Token) -> ConstructedSpec:
+        return ConstructedSpec(base.start, closer.end, base, None)
+
     def constructed_elements(self, base: NamedType, opener: Token, items: list[list[Item]], closer: Token) -> ConstructedSpec:
         return ConstructedSpec(base.start, closer.end, base, self.array_init(opener, items, closer))
 
