@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from twincat_files import PROJECT, write_project
 
+from fbvm.interchange.formats.given import given_sources
 from fbvm.interchange.twincat.project import read_project
 
 
@@ -41,3 +42,9 @@ def test_what_is_no_project(tmp_path: Path) -> None:
     path = tmp_path / "Plant.plcproj"
     path.write_text("<TcSmProject/>", encoding="utf-8")
     assert [found.message for found in read_project(path).diagnostics] == ["the file is no project of TwinCAT"]
+
+
+def test_the_first_of_several_projects_runs_its_tasks_and_the_others_are_libraries(tmp_path: Path) -> None:
+    plant, core = write_project(tmp_path / "plant"), write_project(tmp_path / "core")
+    tasks = [name for name in given_sources([plant, core]) if name.endswith("Tasks.st")]
+    assert tasks == [f"{plant}/Tasks.st"]

@@ -60,11 +60,13 @@ def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | None:
 
 
 def _is_bound(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
-    """__ISVALIDREF(r): TRUE if a REFERENCE TO is bound."""
+    """__ISVALIDREF(r): TRUE if a REFERENCE TO is bound, an in-out, or an interface that refers to an object."""
     kind = scope.infer(value)
     if kind is None:
         return None
-    if value not in scope.facts.followed:
+    variable = scope.facts.variables.get(value)
+    refers = isinstance(kind, RefType) and kind.interface or variable is not None and variable.kind == "VAR_IN_OUT"
+    if value not in scope.facts.followed and not refers:
         scope.error("S0405", value, "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
         return None
     scope.facts.calls[call] = StandardCall("__ISVALIDREF", [(value, kind)])

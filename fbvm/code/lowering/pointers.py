@@ -96,8 +96,15 @@ def held(body: BodyContext, expr: tree.Expr) -> Node:
 
 
 def is_valid(body: BodyContext, expr: tree.Expr) -> Node:
-    """__ISVALIDREF(r): whether a REFERENCE TO is bound to anything."""
-    return ("ne", "b", "ref", held(body, expr), ("const", "ref", 0))
+    """__ISVALIDREF(r): whether a REFERENCE TO or an in-out is bound to anything, or an interface refers to anything."""
+    variable, kind = body.facts.variables.get(expr), body.facts.types[expr]
+    if expr in body.facts.followed:
+        reference = held(body, expr)
+    elif variable is not None and not (isinstance(kind, RefType) and kind.interface):
+        reference = ("load", "ref", body.slot(variable).address)
+    else:
+        reference = body.value(expr)
+    return ("ne", "b", "ref", reference, ("const", "ref", 0))
 
 
 def to_parameter(body: BodyContext, expr: tree.Member) -> Node:

@@ -13,7 +13,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file
 from fbvm.interchange.cx.markup import is_project
 from fbvm.interchange.imported import Imported
-from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX, TASK_SUFFIX
+from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX, TASK_SUFFIX, TASKS
 
 CX_SUFFIXES = (".cxp", ".cxt")
 TWINCAT_SUFFIXES = (*OBJECT_SUFFIXES, TASK_SUFFIX)
@@ -82,10 +82,15 @@ def given_sources(paths: Sequence[Path], resource: str | None = None, memory: bo
 
 
 def sources_by_name(found: Mapping[Path, Imported | None]) -> dict[str, Path | str]:
-    """By the name that messages use, each source of files in which `within` has looked: its path, or its text."""
+    """By the name that messages use, each source of files in which `within` has looked: its path, or its text.
+
+    Of several projects of TwinCAT the first runs its tasks; the others are libraries that it uses."""
     sources: dict[str, Path | str] = {}
+    projects = [path for path in found if path.suffix.lower() == PROJECT_SUFFIX]
     for path, made in found.items():
         sources.update({str(path): path} if made is None else made.files)
+        if path in projects[1:]:
+            sources.pop(f"{path}/{TASKS}", None)
     return sources
 
 

@@ -4,3 +4,5 @@ PROJECT_SUFFIX = ".plcproj"
 OBJECT_SUFFIXES = (".tcpou", ".tcdut", ".tcgvl", ".tcio")
 """Endings of files that hold declarations or bodies, in small letters."""
 TASK_SUFFIX = ".tctto"
+TASKS = "Tasks.st"
+"""What the source is called that says which programs run when."""

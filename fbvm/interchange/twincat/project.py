@@ -9,11 +9,9 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file, reason
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import Element, parse_markup
-from fbvm.interchange.twincat import OBJECT_SUFFIXES, TASK_SUFFIX
+from fbvm.interchange.twincat import OBJECT_SUFFIXES, TASK_SUFFIX, TASKS
 from fbvm.interchange.twincat.objects import ImportedObject, read_object
 
-TASKS = "Tasks.st"
-"""What the source is called that says which programs run when."""
 SPACE = "// a name that stands in front of other names\nVAR_GLOBAL\nEND_VAR\n"
 """A list of no global variables, whose file's name is known as a name space by that."""
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
