@@ -63,6 +63,8 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
     if dialect.instances_are_values and isinstance(target, StructType) and target.block:
         return kind == target
     kind, target = base(kind), base(target)
+    if isinstance(kind, RefType) and kind.moves and target in (ELEMENTARY["ULINT"], ELEMENTARY["LWORD"]):
+        return dialect.integers_and_bits  # a pointer has 64 bits
     return dialect.narrowing and _narrows(kind, target) or dialect.integers_and_bits and _holds_bits(kind, target)
 
 

@@ -25,6 +25,8 @@ def implicit(emitter: Emitter, node: Node, kind: Type, target: Type) -> Node:
         return node
     if wanted in TEXT_UNITS:
         return ("character", wanted, node)
+    if source == "ref":
+        return ("bits", wanted, "ref", node)
     if source in FLOATS and wanted not in FLOATS:
         return saturated(emitter, "truncate", node, wanted)
     return ("convert", wanted, source, node)

@@ -116,8 +116,9 @@ class TypeLayout(StatementLayout):
 
     # --- types ---
 
-    def type_declaration(self, word: Token, declarations: list[Phrase], end: Token) -> list[Phrase]:
-        return [Phrase(word.start, self.leaf(word), self.block(declarations, end), HARD, self.leaf(end))]
+    def type_declaration(self, word: Token, modifiers: list[Leaf], declarations: list[Phrase], end: Token) -> list[Phrase]:
+        words = tuple(part for each in modifiers for part in (" ", each))
+        return [Phrase(word.start, self.leaf(word), *words, self.block(declarations, end), HARD, self.leaf(end))]
 
     def join(self, items: list[Phrase], more: list[Phrase]) -> list[Phrase]:
         items += more
