@@ -118,6 +118,12 @@ def test_a_hint_becomes_a_quick_fix_that_helps(line: str, mended: str | None) ->
         assert HEAD + mended + "\nEND_PROGRAM\n" in texts, [fix.title for fix in found]
 
 
+def test_completion_offers_own_variables_before_those_of_all() -> None:
+    program, offset = at_mark("VAR_GLOBAL a : INT; END_VAR\nPROGRAM Main VAR b : INT; END_VAR b := 1;\n‸\nEND_PROGRAM\n")
+    labels = [item.label for item in nearest(complete(program, "pump.st", offset))]
+    assert labels.index("b") < labels.index("a")
+
+
 def test_completion_goes_through_pointers_and_knows_enumerators() -> None:
     head = HEAD.replace("    D AT", "    R1 : REF_TO Tank;\n    D AT")
     program, offset = at_mark(head + "D[0] := R1^.‸\nEND_PROGRAM\n", "codesys")
