@@ -53,7 +53,7 @@ class _Statements:
             return None
         if not self.scope.is_variable(expr):
             self.error("S0501", expr, f"this is a value of {kind} and cannot {purpose}",
-                       "only variables stand left of :=")
+                       objects.way_to_write(self.scope, expr) or "only variables stand left of :=")
             return None
         warn_of_written_counter(self.scope, expr)
         return kind if writable(self.scope, expr, purpose) else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from fbvm.base.types import RefType, StringType
 from fbvm.code.image import Image
 from fbvm.engine.trap import Trap
 from fbvm.watch.conditions import Condition, parse_condition
@@ -76,6 +77,9 @@ class Names:
         places = found.places if isinstance(found, Span) else (found,)
         if any(place.hops for place in places):
             raise UnknownPlace(f"{text} lies behind a reference: name the variable itself")
+        for place in places:
+            if isinstance(place.type, StringType | RefType):
+                raise UnknownPlace(f"{text} is of {place.type}: bits, numbers and times can be free, texts and references cannot")
         return [(place.offset, place.type.size, place.bit) for place in places]
 
 

@@ -19,9 +19,9 @@ def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple
     Never raises for any text: what cannot be understood is left out of the tree and has a diagnostic.  Tells now and then
     which character it has `reached`."""
     if xml := _XML.match(source.text):
-        return SourceText(0, len(source.text), ()), [Diagnostic(
-            "S0101", source, xml.start(1), xml.end(1), "this is XML, no source",
-            "`fbvm import FILE.xml -o DIR` makes sources of a project in PLCopen XML")]  # fmt: skip
+        hint = _TWINCAT_HINT if _TWINCAT.search(source.text) else _PLCOPEN_HINT
+        return SourceText(0, len(source.text), ()), [
+            Diagnostic("S0101", source, xml.start(1), xml.end(1), "this is XML, no source", hint)]  # fmt: skip
     builder = SourceBuilder(source)
     lexer = Lexer(source.text, builder.report)
     tokens = lexer.tokens()
@@ -37,6 +37,10 @@ def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple
 
 _XML = re.compile(r"\s*(<\?xml\b|<project\b)")
 """What exports of PLC tools begin with."""
+_TWINCAT = re.compile(r"<TcPlcObject\b|http://schemas\.microsoft\.com/developer/msbuild/")
+"""What stands in objects and projects of TwinCAT."""
+_PLCOPEN_HINT = "`fbvm import FILE.xml -o DIR` makes sources of a project in PLCopen XML"
+_TWINCAT_HINT = "it is of TwinCAT: check, run, test and export read .TcPOU, .plcproj and their like; its own editor formats them"
 
 
 def _counted(tokens: Iterator[Token], reached: Callable[[int], None]) -> Iterator[Token]:

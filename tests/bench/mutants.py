@@ -1,11 +1,12 @@
 """Breaks fbvm in small ways and counts how many of them the tests find.  It gates nothing.
 
-    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T]
+    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--slow]
 
 ROOM is a folder or file of `fbvm/` or `fblib/`: `check`, `units/etn21`, `omron/mtcp_etn`, `record/draw/why.py`.  A mutant is
 one edit of one file: another relation, AND for OR, a constant plus one, a condition negated, a statement removed, None for a
 result.  Each is written into a copy of the repository in a temporary folder, where the tests of the room run without the slow
-ones, first those that name the file.  A mutant that no test finds is printed as a difference.
+ones (with `--slow` all: some rooms have no others), first those that name the file.  A mutant that no test finds is printed as a
+difference.
 
 A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).
 Those that were looked at and stay are in mutants_survivors.md, each with its reason."""
@@ -205,8 +206,9 @@ def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
 class Copy:
     """A copy of the repository in which the tests run; the repository itself is only read."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, slow: bool = False) -> None:
         self.folder = folder / "fbvm"
+        self._marks = [] if slow else ["-m", "not slow"]
         self._environment = {**os.environ, "PYTHONPATH": str(self.folder), "XDG_CACHE_HOME": str(folder / "cache")}
         for name in COPIED:
             if (HOUSE / name).is_dir():
@@ -217,7 +219,7 @@ class Copy:
     def passes(self, tests: list[str], limit_s: float) -> bool:
         """True if the tests pass; False for a failure, and for tests that take more than `limit_s` seconds."""
         # `ulimit -t` holds for every process that a test starts, also for one in a session of its own, out of killpg's reach.
-        pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", *tests]
+        pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *self._marks, *tests]
         command = ["sh", "-c", f"ulimit -t {math.ceil(limit_s)}; exec {shlex.join(pytest)}"]
         with subprocess.Popen(command, cwd=self.folder, env=self._environment, stdout=subprocess.DEVNULL,
                               stderr=subprocess.DEVNULL, start_new_session=True) as running:
@@ -253,13 +255,14 @@ def main() -> int:
     options.add_argument("--count", type=int, default=20, help="mutants that are tried (20)")
     options.add_argument("--seed", type=int, default=0, help="which of all mutants (0)")
     options.add_argument("--seconds", type=float, default=600, help="none is begun after this time (600)")
+    options.add_argument("--slow", action="store_true", help="run the slow tests, too")
     given = options.parse_args()
     begun = time.monotonic()
     texts = {path: (HOUSE / path).read_text(encoding="utf-8") for path in files_of(given.room)}
     found = [mutant for path, text in texts.items() for mutant in mutants(path, text)]
     chosen = random.Random(given.seed).sample(found, min(given.count, len(found)))
     with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(Path(folder))
+        copy = Copy(Path(folder), given.slow)
         survivors, tried, whole_s = [], 0, {}
         for mutant in chosen:
             tests = tests_of(mutant.path, copy.folder)

@@ -32,6 +32,8 @@ from old_files import write_old_journal, write_old_trace
 
 from fbvm import Depth
 from fbvm.cli.main import main
+from fbvm.interchange.cx.compression import compress, decompress
+from fbvm.live.drawings import DrawingError, clean_drawing
 from fbvm.record.recording import container
 
 ROOT = Path(__file__).parents[2]
@@ -129,6 +131,8 @@ WORDS = (
 )  # fmt: skip
 TEXT = "<text>"
 """Stands for what is in the file, as an argument."""
+DRAWING = "<drawing>"
+"""Stands for what `fbvm live` does with a drawing."""
 KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
     "source": ("text.st", (
         ("check",), ("check", "--json"), ("fmt", "--diff"), ("fmt",), ("list",), ("list", "--native"), ("ladder",), ("sfc",),
@@ -160,6 +164,11 @@ KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
         ("import", "-o", "out", "--force"), ("import", "-o", "out", "--force", "--json"), ("diff", "", "good.cxt"),
         ("export", "counter.st", "-o", "out.cxt", "--into"),
     )),
+    "cxp": ("text.cxp", (
+        ("import", "-o", "out", "--force"), ("check",), ("list",), ("diff", "", "good.cxt"), ("run", "--scans", "3"),
+        ("export", "counter.st", "-o", "out.cxp", "--into"),
+    )),
+    "drawing": ("text.svg", ((DRAWING,),)),
     "property": ("property.txt", (
         ("prove", "counter.st", "--scans", "5", "--budget", "500ms", "--never", TEXT, "--"),
         ("prove", "counter.st", "--scans", "5", "--budget", "500ms", "--assume", TEXT, "--no-trap", "--"),
@@ -180,6 +189,7 @@ def seeds() -> dict[str, list[bytes]]:
     found = {"source": [path.read_bytes() for path in sources] + [text.encode() for text in (COUNTER, LIST, OBJECTS)],
              "xml": [path.read_bytes() for path in sorted((ROOT / "tests/plcopen/documents").glob("*.xml"))],
              "project": [PROJECT.encode()], "library": [LIBRARY.encode()], "property": [PROPERTY], "cx": [GOOD_CX],
+             "cxp": [compress(GOOD_CX)], "drawing": [(ROOT / "examples/conveyor/conveyor.svg").read_bytes()],
              "object": [text.encode() for name, text in twincat_files.FILES.items() if "POUs" in name],
              "plcproj": [twincat_files.PROJECT.encode()]}  # fmt: skip
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
@@ -204,6 +214,11 @@ def seeds() -> dict[str, list[bytes]]:
 
 def verb(*arguments: str, stdin: str = "step\nstep\nback\nprint D5\n") -> tuple[int, str]:
     """The exit status and the output of `fbvm` with these arguments.  Raises what the verb lets through."""
+    if arguments[0] == DRAWING:
+        try:
+            return 0, clean_drawing(Path(arguments[1]).read_bytes())[0]
+        except DrawingError as error:
+            return 3, str(error)
     result = CliRunner().invoke(main, arguments, input=stdin, catch_exceptions=False)
     return result.exit_code, result.output
 
@@ -270,13 +285,22 @@ def _damaged_recording(random: Random, data: bytes, other: bytes) -> bytes:
     return file.getvalue()
 
 
+def _damaged_project(random: Random, data: bytes, other: bytes) -> bytes:
+    """A compressed project with damage in what is compressed, or anywhere."""
+    if random.random() < 0.3:
+        return _damaged(random, data, other)
+    return compress(_damaged(random, decompress(data), decompress(other)))
+
+
 def _blocks(data: bytes) -> list[tuple[container.BlockHead, bytes]]:
     file = BytesIO(data)
     file.seek(len(container.MAGIC))
     return [(head, container.read_block(file, head)) for head in list(container.heads(file))]
 
 
-DAMAGE: dict[str, Callable[[Random, bytes, bytes], bytes]] = {"trace": _damaged_trace, "recording": _damaged_recording}
+DAMAGE: dict[str, Callable[[Random, bytes, bytes], bytes]] = {
+    "trace": _damaged_trace, "recording": _damaged_recording, "cxp": _damaged_project,
+}  # fmt: skip
 
 
 def broken(random: Random) -> tuple[str, bytes]:

@@ -56,3 +56,15 @@ def test_files_that_are_none_are_named(tmp_path: Path, verb: list[str]) -> None:
         (tmp_path / name).write_text(text)
         done = CliRunner().invoke(main, [*verb, str(tmp_path / name)])
         assert (done.exit_code, "X0101" in done.output) == (3, True), done.output
+
+
+@pytest.mark.slow
+def test_an_object_is_exported_and_what_plcopen_has_no_place_for_is_named(tmp_path: Path) -> None:
+    file, out = tmp_path / "FB_Counter.TcPOU", tmp_path / "out.xml"
+    plain = COUNTER[: COUNTER.index("    <Method")] + COUNTER[COUNTER.index("    <Action") :]
+    missing = f"{file}:13:43: error X0301: FB_Counter: METHOD Reset is not exported"
+    for text, status, said in ((COUNTER, 3, missing), (plain, 0, "")):
+        file.write_text(text, encoding="utf-8")
+        done = CliRunner().invoke(main, ["export", str(file), "-o", str(out)])
+        assert (done.exit_code, said in done.output) == (status, True)
+    assert '<pou name="FB_Counter"' in out.read_text(encoding="utf-8")

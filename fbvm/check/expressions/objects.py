@@ -71,6 +71,14 @@ def pointer_to_self(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type
     return pointer(kind)
 
 
+def way_to_write(scope: Scope, expr: tree.Expr) -> str:
+    """How a member of THIS or SUPER is written to that is named without ^; "" for any other expression."""
+    if isinstance(expr, tree.Member) and is_self(scope, expr.of):
+        assert isinstance(expr.of, tree.NameRef)
+        return f"write {expr.name.text} := or {expr.of.text}^.{expr.name.text} :="
+    return ""
+
+
 # --- members ----------------------------------------------------------------------------------------------------------
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.base.diagnostics import Source
+from fbvm.base.diagnostics import Source, errors
 from fbvm.base.files import SOURCE_BYTES, read_file, write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
@@ -46,13 +46,14 @@ def command(files: tuple[Path, ...], document: Path, saved: Path | None, plc: st
         created = datetime.fromtimestamp(int(latest), UTC).strftime("%Y-%m-%dT%H:%M:%S")
     except (ArithmeticError, ValueError, OSError):  # a time that no calendar has
         created = BEGINNING
-    made = export_xml(files, document.stem, created)
-    if made.diagnostics or as_json:
-        report_diagnostics(made.diagnostics, as_json)
+    given, found = inputs(files)
+    made = export_xml(given, document.stem, created)
+    if found or made.diagnostics or as_json:
+        report_diagnostics([*found, *made.diagnostics], as_json)
     if made.text is not None:
         with writing(document):
             write_file(document, made.text)
-    if made.errors:
+    if made.errors or errors(found):
         sys.exit(status.PROGRAM_ERRORS)
 
 

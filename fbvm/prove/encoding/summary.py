@@ -96,27 +96,38 @@ class _Fixpoint:
         self.changing: set[Signal] = set()
         self.written: set[Cell] = set()
         self.signals: dict[Term, Signal] = {}
+        self.inputs: dict[Term, Cell] = {}
 
     def summary(self) -> Summary:
         for _ in range(MOST_ROUNDS):
             before = len(self.partition.at), len(self.variable), len(self.written), len(self.changing)
-            scanned, inputs = self._scan()
-            self._take(scanned, inputs)
+            scanned = self._scan()
+            self._take(scanned)
             if before == (len(self.partition.at), len(self.variable), len(self.written), len(self.changing)):
-                return self._made(scanned, inputs)
+                return self._made(scanned)
         raise Refused("what is state cannot be told")
 
     def is_input(self, cell: Cell) -> bool:
         """True for a cell that is free in each scan: named so, or a CIO cell that no code writes."""
-        if cell.offset in self.free_bytes or (cell.kind == BIT and (cell.offset, cell.bit) in self.free_bits):
+        if self._is_named(cell):
             return True
         area = AREAS["CIO"]
         return area.offset <= cell.offset < area.offset + area.size_bytes and cell not in self.written
 
+    def _is_named(self, cell: Cell) -> bool:
+        return cell.offset in self.free_bytes or cell.kind == BIT and (cell.offset, cell.bit) in self.free_bits
+
     def initial(self, cell: Cell) -> Term:
+        if self._is_named(cell):
+            return self._input(cell)  # the code does not read it, the property does
         if cell in self.variable:
             return self.terms.variable(("state", cell), cell.width)
         return constant_of(self.terms, cell, self.power_on(cell.offset, cell.size))
+
+    def _input(self, cell: Cell) -> Term:
+        term = self.terms.variable(("input", cell), cell.width)
+        self.inputs[term] = cell
+        return term
 
     def signal(self, signal: Signal) -> Term:
         if signal[0] in ("level", "fresh") and signal not in self.changing:
@@ -125,20 +136,18 @@ class _Fixpoint:
         self.signals[term] = signal
         return term
 
-    def _scan(self) -> tuple[Scanned, dict[Term, Cell]]:
+    def _scan(self) -> Scanned:
         contents = Contents(self.terms, self.partition, self.initial)
-        inputs = {}
+        self.inputs = {}
         for cell in dict.fromkeys(cell for cells in self.partition.at.values() for cell in cells):
             if self.is_input(cell):
-                term = self.terms.variable(("input", cell), cell.width)
-                inputs[term] = cell
-                contents.written[cell] = term
+                contents.written[cell] = self._input(cell)
         begun = contents.child()
-        return scan(self.image, begun, self.signal, self.budget), inputs
+        return scan(self.image, begun, self.signal, self.budget)
 
-    def _take(self, scanned: Scanned, inputs: dict[Term, Cell]) -> None:
+    def _take(self, scanned: Scanned) -> None:
         """What the scan shows to be written, and to be state."""
-        given = {cell: term for term, cell in inputs.items()}
+        given = {cell: term for term, cell in self.inputs.items()}
         for cell in scanned.contents.written_since(None):
             value = scanned.contents.get(cell)
             if cell in given and value is given[cell]:
@@ -150,9 +159,10 @@ class _Fixpoint:
             if term is not self.signal(signal):
                 self.changing.add(signal)
 
-    def _made(self, scanned: Scanned, inputs: dict[Term, Cell]) -> Summary:
+    def _made(self, scanned: Scanned) -> Summary:
         terms, x = self.terms, scanned.execution
-        made = Summary(self.image, terms, scanned.contents, inputs=inputs, traps=x.traps, reached=x.reached, unknowns=x.unknowns)
+        made = Summary(self.image, terms, scanned.contents, inputs=self.inputs, traps=x.traps, reached=x.reached,
+                       unknowns=x.unknowns)  # fmt: skip
         for cell in sorted(self.variable):
             if self.is_input(cell):
                 continue
@@ -166,7 +176,7 @@ class _Fixpoint:
             made.next[term] = scanned.following.get(signal, term)
         made.signals = {term: signal for term, signal in self.signals.items() if term not in made.next}
         known = {cell for cells in self.partition.at.values() for cell in cells}
-        made.never_written = known - self.written - set(inputs.values())
+        made.never_written = known - self.written - set(self.inputs.values())
         return made
 
 

@@ -129,7 +129,7 @@ class Trace(ScanSource):
             if block.first >= wanted.stop:
                 break
             cursor, part = Cursor(read_chunk(self._file, block.at)), range(wanted.start, min(end, wanted.stop))
-            player = _Player(self, cursor, memory, follower, part)
+            player = _Player(self, cursor, memory, follower, part, block.first)
             try:
                 yield from player.play()
             except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError) as error:
@@ -139,8 +139,9 @@ class Trace(ScanSource):
 class _Player:
     """Reads one block: applies changes of memory and makes events."""
 
-    def __init__(self, trace: Trace, cursor: Cursor, memory: Memory, follower: Follower | None, wanted: range) -> None:
-        self._cursor, self._follower, self._wanted = cursor, follower, wanted
+    def __init__(self, trace: Trace, cursor: Cursor, memory: Memory, follower: Follower | None, wanted: range,
+                 first: int) -> None:  # fmt: skip
+        self._cursor, self._follower, self._wanted, self._next = cursor, follower, wanted, first
         self._moment = Moment(trace, memory)
         self._rung_sites, self._sites = trace.rung_sites, len(trace.sites)
         self._base = bytearray(memory.size)
@@ -156,8 +157,11 @@ class _Player:
             tag = cursor.number()
             if tag == SCAN:
                 scan = moment.scans + cursor.number()
+                if scan != self._next:
+                    raise ValueError(f"scan {scan} stands where scan {self._next} belongs")
                 if scan >= self._wanted.stop:
                     return
+                self._next = scan + 1
                 moment.scans, moment.now_ns = scan, moment.now_ns + cursor.number()
                 self._frames.clear()
             elif tag == PHASE:

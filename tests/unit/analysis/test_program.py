@@ -59,6 +59,12 @@ def test_a_new_pin_concerns_others_and_needs_a_whole_check() -> None:
     assert codes(program) == [("S0201", 4), ("S0402", 9)]
 
 
+def test_a_file_that_is_new_needs_a_whole_check() -> None:
+    program = edited(TWO)
+    program.replace("other.st", "VAR_GLOBAL shared : INT; END_VAR\n")
+    assert not program.check_changes()
+
+
 def test_a_local_variable_of_a_block_concerns_nobody_else() -> None:
     program = edited(TWO, ("    Runs :=", "VAR n : INT; m : TON; END_VAR\n    n := 1.5; Runs :="))
     assert program.check_changes()

@@ -118,6 +118,31 @@ def test_a_hint_becomes_a_quick_fix_that_helps(line: str, mended: str | None) ->
         assert HEAD + mended + "\nEND_PROGRAM\n" in texts, [fix.title for fix in found]
 
 
+def test_completion_offers_own_variables_before_those_of_all() -> None:
+    program, offset = at_mark("VAR_GLOBAL a : INT; END_VAR\nPROGRAM Main VAR b : INT; END_VAR b := 1;\n‸\nEND_PROGRAM\n")
+    labels = [item.label for item in nearest(complete(program, "pump.st", offset))]
+    assert labels.index("b") < labels.index("a")
+
+
+def test_completion_goes_through_pointers_and_knows_enumerators() -> None:
+    head = HEAD.replace("    D AT", "    R1 : REF_TO Tank;\n    D AT")
+    program, offset = at_mark(head + "D[0] := R1^.‸\nEND_PROGRAM\n", "codesys")
+    assert [item.label for item in nearest(complete(program, "pump.st", offset))] == ["Level", "State"]
+    program, offset = at_mark(head + "‸\nEND_PROGRAM\n", "codesys")
+    kinds = {item.label: item.kind for item in complete(program, "pump.st", offset)}
+    assert kinds["Filling"] == "enumerator"
+
+
+def test_an_unknown_name_is_declared_on_a_line_of_its_own_or_beside() -> None:
+    for text, mended in (
+        ("PROGRAM Main\nVAR\n    n : INT;\nEND_VAR\nn := ‸m;\nEND_PROGRAM\n", "    n : INT;\n    m : INT;\nEND_VAR"),
+        ("PROGRAM Main VAR n : INT; END_VAR n := ‸m; END_PROGRAM\n", "VAR n : INT; m : INT; END_VAR"),
+    ):
+        program, offset = at_mark(text)
+        [fix] = fixes(program, "pump.st", offset, offset)
+        assert mended in applied(program.files["pump.st"].text, fix.edits)
+
+
 def test_an_unknown_name_is_declared_with_a_type_that_fits() -> None:
     program, offset = at_mark(HEAD + "D[0] := ‸speed;\nEND_PROGRAM\n")
     assert [fix.title for fix in fixes(program, "pump.st", offset, offset)] == ["Declare speed : INT"]

@@ -291,6 +291,11 @@ def test_a_write_in_the_past_forgets_what_came_after(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))
     client.go("fbvm/stepScan", scans=20)
+    client.go("fbvm/gotoScan", scan=18)
+    locals_ = client.scopes()["Locals"]["variablesReference"]
+    client.ask("setVariable", variablesReference=locals_, name="R", value="1")
+    assert client.events("output")[-1]["output"] == "wrote Main.R := 1 in scan 18; scans 19..19 are forgotten\n"
+    client.go("fbvm/stepScan", scans=2)
     client.go("fbvm/gotoScan", scan=5)
     locals_ = client.scopes()["Locals"]["variablesReference"]
     assert client.ask("setVariable", variablesReference=locals_, name="N", value="99")["value"] == "99"
@@ -326,6 +331,13 @@ def test_a_run_with_an_end_ends_the_session(file: Path) -> None:
     client = Client()
     assert client.begin(program=str(file), **{"for": "1s"}) == {}
     assert client.events("exited") == [{"exitCode": 0}] and client.events("terminated") == [{}]
+
+
+def test_what_the_last_scans_said_comes_before_the_end(file: Path) -> None:
+    client = Client()
+    client.begin(lines(file, {"line": 19, "logMessage": "n={N}"}), program=str(file), **{"for": "50ms"})
+    events = [row["event"] for row in client.messages if row.get("event") in ("output", "exited")]
+    assert events[-2:] == ["output", "exited"] and "n=5" in client.events("output")[-1]["output"]
 
 
 def test_restart_keeps_the_breakpoints(file: Path) -> None:
@@ -460,6 +472,7 @@ def test_memory_is_read_and_written_in_words_with_their_high_byte_first(file: Pa
     written = client.ask("writeMemory", memoryReference="D200", offset=2, data=base64.b64encode(b"\xab\xcd").decode())
     assert written["bytesWritten"] == 2
     assert client.value("D201") == "43981 (16#ABCD)" and client.events("memory")[-1]["count"] == 2
+    assert client.events("memory")[-1]["offset"] == 0
     before = client.ask("readMemory", memoryReference=answer["address"], offset=-2, count=4)
     assert base64.b64decode(before["data"]) == b"\0\0\x12\x34"
     far = client.ask("readMemory", memoryReference="0x7FFFFFFF", count=8)

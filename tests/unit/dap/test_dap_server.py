@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from fbvm.dap.framing import Framer, FramingError, encode
-from fbvm.dap.server import pass_on, serve
+from fbvm.dap.server import DebugDoor, pass_on, serve
 from fbvm.dap.target import LaunchError, Target
 from fbvm.net.streams import Listener, connect
 
@@ -128,6 +128,14 @@ def served(*pieces: bytes) -> tuple[str, list[Message]]:
     return said, list(Framer().feed(bytes(sent)))
 
 
+def test_a_door_at_which_nobody_waits_ends_nothing() -> None:
+    def accept() -> Any:
+        raise OSError
+
+    door = DebugDoor(accept)
+    assert not door.is_called and door.serve(nothing) is False
+
+
 def test_messages_may_come_in_any_pieces() -> None:
     whole = encode({"seq": 1, "type": "request", "command": "initialize", "arguments": {"adapterID": "ü"}})
     for cut in range(1, len(whole), 7):
@@ -140,7 +148,7 @@ def test_a_client_that_goes_in_the_middle_of_a_message_is_told_of() -> None:
     assert served()[0] == ""
 
 
-@pytest.mark.parametrize("data", [b"x" * 5000, b"Content-Length: 99999999999\r\n\r\n", b"A: b\r\n\r\n",
+@pytest.mark.parametrize("data", [b"x" * 5000, b"Content-Length: 99999999999\r\n\r\n", b"A: b\r\n\r\n", b"\r\n\r\n",
                                   b"Content-Length: 2\r\n\r\n[]"])  # fmt: skip
 def test_bytes_that_are_no_messages_are_refused(data: bytes) -> None:
     with pytest.raises(FramingError):

@@ -16,6 +16,8 @@ from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
 from fbvm.live.updates import UPDATE_NS
 from fbvm.run.running import Running
+from fbvm.wire.link import Peer
+from fbvm.wire.tap import TapEvent, TapKind
 
 RUNGS = """PROGRAM Main
 VAR on, off, out : BOOL; n : UINT := 7; END_VAR
@@ -97,6 +99,13 @@ def test_the_source_has_the_values_that_stand_on_each_line(page: Page) -> None:
     assert line["names"] == ["Main.Pump", "Main.Level"]
 
 
+def test_a_source_of_one_line_is_shown() -> None:
+    text = "PROGRAM Main VAR n : INT; END_VAR n := 1; END_PROGRAM"
+    page = Page(text)
+    page.done("hello", version=1)
+    assert [line["text"] for line in page.done("source", plc="pump", instance="Main")["lines"]] == [text]
+
+
 def test_an_observed_scan_says_which_lines_it_executed(page: Page) -> None:
     page.done("look", plc="pump", names=[], instance="Main", scan=True)
     page.scan(2)
@@ -166,6 +175,8 @@ def test_faults_are_switched_on_and_off_by_name(page: Page) -> None:
     page.done("fault", kind="lossy", percent=50)
     assert [row.lose_percent for row in page.network.faults] == [0, 50] and page.network.faults[0].latency_ns == 30_000_000
     assert [(row["kind"], row["peer"]) for row in page.update()["faults"]] == [("slow", "192.168.250.1:502"), ("lossy", "all")]
+    for peer in ("192.168.250.1:70000", "192.168.250.1:999999", "192.168.250.1:x"):
+        assert "is no port" in page.ask("fault", kind="slow", peer=peer, time="30ms")["error"]
     page.done("mend", number=0)
     assert [row.lose_percent for row in page.network.faults] == [50]
     page.done("mend")
@@ -276,6 +287,7 @@ def test_a_scan_stands_at_a_breakpoint_and_goes_on_by_statements(page: Page) -> 
 def test_a_breakpoint_at_a_line_has_a_condition_and_is_listed(page: Page) -> None:
     page.done("break", plc="pump", kind="line", where="Main", when="Level = 25")
     assert page.update()["breaks"] == [f"line {next(iter(page.plc.breakpoints))}"]
+    assert page.bench.acts[-1].text == f"breakpoint at line {next(iter(page.plc.breakpoints))}"
     page.run(20)
     assert page.plc.read("Main.Level") == 25 and page.update()["halt"]["instance"] == "Main"
 
@@ -309,6 +321,15 @@ def test_a_write_at_a_breakpoint_is_recorded(page: Page) -> None:
 def test_what_has_passed_is_saved_for_wireshark(page: Page) -> None:
     data = base64.b64decode(page.done("capture", plc="pump")["pcapng"])
     assert data[:4] == bytes.fromhex("0a0d0d0a") and b"fbvm" in data
+    [unit] = [attached.unit.address for attached in page.plc.units]
+    empty, packets = len(data), []
+    for address in ("192.168.250.99", unit):
+        local, remote = Peer(address, 1025), Peer("192.168.250.1", 502)
+        tell = page.network.tap
+        assert tell is not None
+        tell(0, address, TapEvent(TapKind.SYN, local, remote, out=True))
+        packets.append(len(page.live.capture()) > empty)
+    assert packets == [False, True]
 
 
 def test_scan_times_are_told_as_a_histogram_where_they_are_looked_at(page: Page) -> None:

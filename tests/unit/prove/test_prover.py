@@ -12,6 +12,7 @@ from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, prove
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
 from fbvm.prove.runs import repeated
+from fbvm.watch.paths import UnknownPlace
 
 FEW = Limits(simulated_scans=200, scans=120)
 
@@ -126,6 +127,20 @@ def test_a_word_is_free_if_it_is_named() -> None:
     assert prove(image, Question(NEVER, "Main.Q"), FEW).word == "proved"
     verdict = prove(image, Question(NEVER, "Main.Q", free=("D100",)), FEW)
     assert verdict.word == "broken"
+
+
+def test_inputs_that_only_the_property_reads_are_free() -> None:
+    image = program("n := n;", "n, Unread : INT;")
+    for name, free in (("Main.Unread", ("Main.Unread",)), ("D5", ("D4..D6",)), ("Main.Level", ())):
+        verdict = prove(image, Question(ALWAYS, f"{name} = 0", free=free), FEW)
+        assert (verdict.word, verdict.run is not None and verdict.run.scans) == ("broken", 1), name
+
+
+def test_a_text_or_a_reference_cannot_be_free() -> None:
+    image = program("n := LEN(s);", "n : INT; s : STRING; r : REF_TO INT;")
+    for name in ("Main.s", "Main.r"):
+        with pytest.raises(UnknownPlace, match="texts and references cannot"):
+            prove(image, Question(ALWAYS, "Main.n = 0", free=(name,)), FEW)
 
 
 def test_a_variable_that_nothing_changes_is_told() -> None:

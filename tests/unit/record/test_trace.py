@@ -31,7 +31,9 @@ from fbvm.record.trace.format import (
     STATEMENT,
     Cursor,
     TraceError,
+    chunks,
     put,
+    read_chunk,
     write_chunk,
     xor,
 )
@@ -304,6 +306,18 @@ def _with_header(payload: bytes) -> bytes:
     file.write(MAGIC)
     write_chunk(file, HEADER, payload)
     return file.getvalue()
+
+
+def test_scans_with_other_numbers_than_their_block_says_are_told() -> None:
+    data = io.BytesIO(record(Plc(image()), 5))
+    data.seek(len(MAGIC))
+    _, block = chunks(data)
+    damaged = io.BytesIO(data.getvalue()[: block.at])
+    damaged.seek(0, io.SEEK_END)
+    write_chunk(damaged, BLOCK, read_chunk(data, block.at), first=1, scans=5)
+    damaged.seek(0)
+    with pytest.raises(TraceError, match="scan 0 stands where scan 1 belongs"):
+        list(Trace(damaged).moments())
 
 
 def test_a_damaged_block_is_told() -> None:

@@ -12,8 +12,11 @@ from hypothesis import strategies as st
 from fbvm.code.compiler import compile_text
 from fbvm.machine.breakpoints import Breakpoint
 from fbvm.machine.plc import Plc
+from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.scans import RecordedScans
 from fbvm.run.running import TimedWrite
 from fbvm.step.debugger import Debugger, Move
+from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position, Reached, Said
 from fbvm.step.session import Session
 from fbvm.step.world import Debugged, World
@@ -138,6 +141,47 @@ def test_a_hit_count_belongs_to_the_past() -> None:
     assert where(found) == (3, 5)
     found.session.goto(50)
     assert done(found.reverse()) and where(found) == (3, 5)
+
+
+def test_hits_in_scans_that_were_stepped_count() -> None:
+    found = debugger()
+    found.here.put([line("text.st:5", hits="7")])
+    done(found.scan(2))
+    done(found.resume())
+    assert where(found) == (3, 5)
+
+
+def test_a_recording_is_gone_through_by_statements() -> None:
+    image = compile_text(TEXT).image
+    assert image is not None
+    plc, recording = Plc(image), Recording()
+    recorded = recording.add("plc", plc)
+    plc.run(scans=3)
+    session = PastSession(RecordedScans(recorded, {}), "plc")
+    session.goto(1)
+    lines = []
+    for _ in range(4):
+        lines.append(session.facts.sites[session.statement.site].line if session.statement else None)
+        session.step()
+    assert lines == [13, 14, 4, 5] and session.read("Main.N") == 2
+
+
+def test_an_act_in_the_past_forgets_what_was_done_inside_the_same_scan_of_another_plc() -> None:
+    found = debugger(names=("a", "b"))
+    done(found.scan(3))
+    found.choose("b")
+    done(found.into())
+    assert found.session.here == Position(2, 1)
+    found.session.act(lambda plc: plc.write("Main.R", 77))
+    done(found.scan(3))
+    assert found.session.read("Main.R") == 77
+    found.choose("a")
+    found.session.goto(2)
+    found.session.act(lambda plc: plc.write("Main.R", 5))
+    for name, value in (("a", 5), ("b", 0)):
+        session = found.plcs[name].session
+        session.goto(5)
+        assert session.read("Main.R") == value
 
 
 def test_log_points_speak_once_a_scan_however_often_it_is_done_again() -> None:
@@ -267,5 +311,3 @@ def test_any_moves_end_in_the_memory_that_a_plain_run_has_there(moves: list[str]
         assert again.session.here == here
         assert (again.session.statement and again.session.statement.site) == (statement and statement.site)
         assert bytes(again.session.memory.u8) == memory
-
-

@@ -58,6 +58,9 @@ def test_a_response_code_of_the_unit_stops_it() -> None:
     reached = done(found.resume(5000))
     assert reached and reached.kind == "response" and "Response Code is 16#" in reached.reasons[0]
     assert found.session.here == reached.position
+    found.session.goto(0)
+    found.checks = {"plc": BetweenScans({"response": frozenset((0x9999,))})}
+    assert done(found.resume(reached.position.scan + 1)) is None
 
 
 def late_scans(wanted: frozenset[int], *began_ms: int) -> list[str]:

@@ -94,6 +94,12 @@ def test_what_changed_is_said() -> None:
     assert "  Main.N: 1 -> 0" in said(commands, "back")
 
 
+def test_a_value_that_changed_at_both_ends_is_said_once() -> None:
+    middle = "-" * 60
+    commands = made(f"PROGRAM Main\nVAR s : STRING := 'a{middle}b'; END_VAR\n    s := 'c{middle}d';\nEND_PROGRAM\n")
+    assert said(commands, "step").count("Main.s: ") == 1
+
+
 @pytest.mark.slow
 @given(moves=st.lists(st.sampled_from(["step", "next", "out", "scan", "back", "back scan", "goto 2", "run 14"]), max_size=12),
        button=st.integers(0, 12))  # fmt: skip
@@ -245,6 +251,7 @@ def test_the_scan_table_the_cause_and_the_calls() -> None:
     text = said(commands, "run 5", "scan", "table Main.T.Q")
     assert ">1" in text and ">2" in text
     assert "Q := Q * 2" in said(commands, "why Main.T.Q")
+    assert ">3" not in said(commands, "scan", "scan", "goto 2", "table Main.N")
     calls = said(commands, "run 5", "calls").splitlines()[-2:]
     assert [row.split()[1] for row in calls] == ["Main.T", "Main"]
 

@@ -75,3 +75,10 @@ def test_xml_is_one_mistake_with_its_mend(text: str) -> None:
     (diagnostic,) = compile_text(text).diagnostics
     assert diagnostic.code == "S0101" and "this is XML" in diagnostic.render()
     assert "fbvm import FILE.xml -o DIR" in diagnostic.render()
+
+
+def test_xml_of_twincat_is_told_from_plcopen() -> None:
+    for text in ('<?xml version="1.0"?>\n<TcPlcObject Version="1.1"/>',
+                 '<?xml version="1.0"?>\n<Project xmlns="http://schemas.microsoft.com/developer/msbuild/2003"/>'):
+        (diagnostic,) = compile_text(text).diagnostics
+        assert "of TwinCAT" in diagnostic.hint and "import" not in diagnostic.hint

@@ -149,6 +149,12 @@ def test_counts_of_two_processes_add_up(file: Path) -> None:
     assert (each.statements, each.branches) == (known.statements, known.branches)
 
 
+def test_counts_of_another_process_are_taken_as_they_are(file: Path) -> None:
+    other, mine = only(counted(file, 1, 2)), FileCoverage()
+    mine.add(other)
+    assert (mine.statements, mine.branches) == (other.statements, other.branches)
+
+
 def test_branches_of_an_image() -> None:
     image = compile_text("""FUNCTION F : BOOL VAR_INPUT x : INT; END_VAR F := x > 3; END_FUNCTION
 PROGRAM Main VAR a, b : INT; t : TON; END_VAR
