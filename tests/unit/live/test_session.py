@@ -12,6 +12,7 @@ from browsers import Page
 
 from fbvm.live.futures import Future, run_again
 from fbvm.live.groups import WatchGroups
+from fbvm.live.messages import dump, dump_in_steps
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
 from fbvm.live.updates import UPDATE_NS
@@ -416,3 +417,43 @@ def test_groups_are_kept_in_a_file_and_read_again_when_it_changes(page: Page, tm
     file.unlink()
     page.bench.groups.look()
     assert page.bench.groups.rows == {}
+
+
+def slices(page: Page, do: str, **fields: object) -> tuple[dict[str, Any], int]:
+    """A reply, and the number of slices between scans that it takes if time is up after each step."""
+    text, taken = page.session.answer(json.dumps({"id": 1, "do": do, **fields})), 1
+    while text is None:
+        text, taken = page.session.update(0, lambda: True), taken + 1
+    return json.loads(text)["ok"], taken
+
+
+def test_long_replies_are_worked_out_and_written_in_slices() -> None:
+    lines = "".join(f"a[{number}] := a[{number}] + 1;\n" for number in range(1, 301))
+    page = Page(f"PROGRAM Main\nVAR a : ARRAY[1..300] OF INT; END_VAR\n{lines}END_PROGRAM\n")
+    names = [f"Main.a[{number}]" for number in range(1, 301)]
+    seen, taken = slices(page, "look", plc="pump", names=[*names, "Main.b"])
+    assert list(seen["rows"]) == names and list(seen["unknown"]) == ["Main.b"] and taken > 60
+    listed, taken = slices(page, "parts", plc="pump", name="Main.a")
+    assert [part["name"] for part in listed["parts"]] == names and taken > 10
+    source, taken = slices(page, "source", plc="pump", instance="Main")
+    assert [line["names"] for line in source["lines"]][2:302] == [[name] for name in names] and taken > 75
+
+
+def test_what_is_looked_at_changes_in_the_order_of_the_questions(page: Page) -> None:
+    page.scan(3)
+    asked = [{"do": "look", "plc": "pump", "names": ["Main.Level"] * 40},
+             {"do": "view", "plc": "pump", "scan": 1}, {"do": "view", "plc": "pump"}]  # fmt: skip
+    told = [page.session.answer(json.dumps({"id": number, **one})) for number, one in enumerate(asked)]
+    assert told == [None] * 3
+    assert [json.loads(page.session.update(0) or "")["re"] for _ in asked] == [0, 1, 2]
+
+
+def test_a_message_that_is_written_in_steps_reads_the_same() -> None:
+    long = {str(number): [number] for number in range(200)}
+    for message in ({}, {"re": 1, "ok": {}}, {"re": None, "ok": {"a": [*range(200)], "b": "\u00e4", "c": long,
+                                                                     "d": {"e": [[]] * 60}}}, long):  # fmt: skip
+        steps = dump_in_steps(message)
+        with pytest.raises(StopIteration) as ended:
+            while True:
+                next(steps)
+        assert ended.value.value == dump(message)
