@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 
 from fbvm.live.messages import MOST_NAMES, MessageError
@@ -16,6 +16,8 @@ Names = dict[str, tuple[LivePlc, Place | Span]]
 """Names that pages know, each with its PLC and its place."""
 BESIDE = "/"
 """Parts the name of another PLC from a name of it: `tank/Main.Level`."""
+STEP = 10
+"""Names whose places are found in one step."""
 
 
 @dataclass
@@ -48,15 +50,17 @@ class Look:
         self.past = self.past_view = self.other = None
 
 
-def find_names(bench: Workbench, live: LivePlc, names: Sequence[str]) -> tuple[Names, dict[str, str]]:
-    """The places of names of a PLC, or of another one in front of a `/`; and why others are none."""
+def find_names(bench: Workbench, live: LivePlc, names: Sequence[str]) -> Generator[None, None, tuple[Names, dict[str, str]]]:
+    """The places of names of a PLC, or of another one in front of a `/`; and why others are none.  Found in short steps."""
     found: Names = {}
     unknown: dict[str, str] = {}
-    for name in names[:MOST_NAMES]:
+    for number, name in enumerate(names[:MOST_NAMES], 1):
         plc, _, path = name.rpartition(BESIDE)
         try:
             owner = bench.plc(plc) if plc else live
             found[name] = owner, owner.plc.find(path)
         except (MessageError, *REFUSED) as error:
             unknown[name] = str(error)
+        if number % STEP == 0:
+            yield
     return found, unknown

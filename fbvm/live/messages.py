@@ -7,8 +7,9 @@ for the next by `{"do": "ready"}`."""
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 VERSION = 1
@@ -19,6 +20,8 @@ MOST_TEXT = 4096
 """Characters of a text in a message."""
 MOST_NAMES = 1000
 """Names that a page sees at once."""
+PIECE = 50
+"""Items of a long list or mapping that are written as JSON in one step."""
 NUMBER = (int, float)
 
 
@@ -126,7 +129,40 @@ def _check(action: str, name: str, value: object, kind: type | tuple[type, ...])
 
 def dump(message: Mapping[str, Any]) -> str:
     """A message as it is sent."""
-    return json.dumps(message, separators=(",", ":"), ensure_ascii=False)
+    return _dumped(message)
+
+
+def _dumped(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+
+
+def dump_in_steps(message: Mapping[str, Any]) -> Generator[None, None, str]:
+    """As `dump`, in short steps: long lists and mappings in it are written in pieces."""
+    pieces: list[str] = []
+    for name, value in message.items():
+        pieces.append(f"{',' if pieces else ''}{json.dumps(name)}:")
+        if not isinstance(value, Mapping | list) or len(value) <= PIECE and not _holds_long(value):
+            pieces.append(_dumped(value))
+            continue
+        if isinstance(value, Mapping) and _holds_long(value):
+            pieces.append((yield from dump_in_steps(value)))
+            continue
+        items = iter(value.items() if isinstance(value, Mapping) else value)
+        opening, closing = "{}" if isinstance(value, Mapping) else "[]"
+        pieces.append(opening)
+        is_first = True
+        while part := list(islice(items, PIECE)):
+            pieces.append(("" if is_first else ",") + _dumped(dict(part) if isinstance(value, Mapping) else part)[1:-1])
+            is_first = False
+            yield
+        pieces.append(closing)
+    return f"{{{''.join(pieces)}}}"
+
+
+def _holds_long(value: Any) -> bool:
+    """True for a mapping in which a list or a mapping is long."""
+    return isinstance(value, Mapping) and len(value) <= PIECE and any(
+        isinstance(one, Mapping | list) and len(one) > PIECE for one in value.values())  # fmt: skip
 
 
 def message_id(text: str) -> int | None:

@@ -30,6 +30,8 @@ MOST_PICTURES = 200
 """Rungs and charts of one instance that are drawn."""
 MOST_ON_LINE = 8
 """Values beside one line."""
+SITES, LINES = 200, 2
+"""Statements, and lines of a source with their names, that are looked through in one step."""
 RUNG_WIDTH = 90
 MOST_DRAWN = 2000
 """Drawings that are kept; those with the same states and values are made once."""
@@ -63,33 +65,48 @@ def _instances(symbols: Mapping[str, Field]) -> Iterator[tuple[str, str]]:
                         if not field.reference and not field.absolute and "$" not in field.name]  # fmt: skip
 
 
-def source_of(image: Image, areas: Any, texts: Mapping[str, str], instance: str) -> dict[str, Any]:
+def source_of(image: Image, areas: Any, texts: Mapping[str, str], instance: str) -> Generator[None, None, dict[str, Any]]:
     """The source of an instance: file, number of the first line, and its lines, each with the names of the single values on it.
+    Found in short steps.
 
     Raises UnknownPlace for what is no instance."""
     place = find(image.symbols, areas, instance)
     if not isinstance(place, Place) or not isinstance(place.type, StructType):
         raise UnknownPlace(f"{instance} is no instance of a program or a function block")
-    body_name = place.type.name
-    sites = [site for site in image.sites if site.pou.upper().split(".")[0] == body_name.upper()]
+    pou = place.type.name.upper()
+    sites: list[tuple[str, int]] = []
+    for start in range(0, len(image.sites), SITES):
+        sites += [(site.file, site.line) for site in image.sites[start : start + SITES] if site.pou.upper().split(".")[0] == pou]
+        yield
     bodies = {*(rung.body for rung in image.rungs), *(chart.body for chart in image.charts)}
-    drawn = any(image.bodies[body].name.upper() == body_name.upper() for body in bodies)
-    if not sites or sites[0].file not in texts:
-        return {"file": "", "first": 1, "lines": [], "drawn": drawn, "pou": body_name}
-    file = sites[0].file
+    drawn = any(image.bodies[body].name.upper() == pou for body in bodies)
+    if not sites or sites[0][0] not in texts:
+        return {"file": "", "first": 1, "lines": [], "drawn": drawn, "pou": place.type.name}
+    file = sites[0][0]
     rows = texts[file].split("\n")
-    first = _begin(rows, min(site.line for site in sites if site.file == file), body_name)
-    last = min(len(rows), max(site.line for site in sites if site.file == file) + 3)
+    yield
+    numbers = [line for of, line in sites if of == file]
+    first = yield from _begin(rows, min(numbers), place.type.name)
+    last = min(len(rows), max(numbers) + 3)
     end = next((at for at in range(max(0, last - 4), len(rows))
                 if re.match(r"\s*END_(PROGRAM|FUNCTION_BLOCK|FUNCTION|METHOD)\b", rows[at], re.I)), last - 1)  # fmt: skip
-    lines = [{"text": row, "names": list(_names_on(row, image.symbols, areas, instance))} for row in rows[first - 1 : end + 1]]
-    return {"file": file, "first": first, "lines": lines, "drawn": drawn, "pou": body_name}
+    lines = []
+    for row in rows[first - 1 : end + 1]:
+        lines.append({"text": row, "names": list(_names_on(row, image.symbols, areas, instance))})
+        if len(lines) % LINES == 0:
+            yield
+    return {"file": file, "first": first, "lines": lines, "drawn": drawn, "pou": place.type.name}
 
 
-def _begin(rows: Sequence[str], line: int, pou: str) -> int:
+def _begin(rows: Sequence[str], line: int, pou: str) -> Generator[None, None, int]:
     """The line at which the declaration of a POU begins, whose first statement is on `line`."""
     head = re.compile(rf"\s*(PROGRAM|FUNCTION_BLOCK|FUNCTION)\b.*\b{re.escape(pou)}\b", re.I)
-    return next((at + 1 for at in range(min(line, len(rows)) - 1, -1, -1) if head.match(rows[at])), 1)
+    for at in range(min(line, len(rows)) - 1, -1, -1):
+        if head.match(rows[at]):
+            return at + 1
+        if at % SITES == 0:
+            yield
+    return 1
 
 
 def _names_on(row: str, symbols: Mapping[str, Field], areas: Any, instance: str) -> Iterator[str]:

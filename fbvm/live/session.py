@@ -11,8 +11,8 @@ from typing import Any
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.live.futures import REPEATED, order_of
 from fbvm.live.lesson import LiveLesson
-from fbvm.live.look import Look, find_names
-from fbvm.live.messages import ACTIONS, VERSION, MessageError, dump, message_id, parse
+from fbvm.live.look import STEP, Look, find_names
+from fbvm.live.messages import ACTIONS, VERSION, MessageError, dump, dump_in_steps, message_id, parse
 from fbvm.live.plcs import LivePlc
 from fbvm.live.program import source_of
 from fbvm.live.symbols import parts, row, search
@@ -30,6 +30,9 @@ MOST_WAITING = 50
 MOST_HISTORY, WHY_SCANS = 500, 300
 """Scans that are executed again for a trend, and for the cause of a value."""
 
+Reply = Generator[None, None, dict[str, Any]]
+"""A reply that is worked out in steps."""
+
 
 class Session:
     """A page's session at a workbench.  `answer` takes a message and returns the reply; `update` is what has changed."""
@@ -38,8 +41,8 @@ class Session:
         self._bench = workbench
         self._seen = Look(next(iter(workbench.plcs.values())))
         self._updates = Updates(workbench, self._seen)
-        self._replies: deque[tuple[int | None, Generator[None, None, Any]]] = deque()
-        """Replies that take longer, with the numbers of their questions."""
+        self._replies: deque[Generator[None, None, str]] = deque()
+        """Replies that take longer."""
         self._actions: dict[str, Callable[..., Any]] = {
             "hello": self._hello, "ready": self._take, "look": self._look, "program": self._program, "source": self._source,
             "search": self._search, "parts": self._parts, "history": self._history, "why": self._why, "test": self._test,
@@ -79,11 +82,25 @@ class Session:
             if isinstance(done, Generator):
                 if len(self._replies) >= MOST_WAITING:
                     raise MessageError("too many questions wait for their replies")
-                self._replies.append((number, done))
+                reply = self._reply(number, done)
+                if not self._replies:  # what is short is answered at once
+                    next(reply)
+                self._replies.append(reply)
                 return None
+        except StopIteration as ended:
+            whole: str = ended.value
+            return whole
         except (MessageError, *REFUSED) as error:
             return dump({"re": number if number is not None else message_id(text), "error": str(error)})
         return dump({"re": number, "ok": done if done is not None else {}})
+
+    def _reply(self, number: int | None, steps: Generator[None, None, Any]) -> Generator[None, None, str]:
+        """The text of a reply that is worked out and written in steps."""
+        try:
+            done = yield from steps
+        except (MessageError, *REFUSED) as error:
+            return dump({"re": number, "error": str(error)})
+        return (yield from dump_in_steps({"re": number, "ok": done if done is not None else {}}))
 
     @property
     def is_behind(self) -> bool:
@@ -94,15 +111,12 @@ class Session:
         """The next text for the page: a reply that took longer, or what has changed.  None if there is none, or if `is_late` says
         that time is up; then it is gone on with at the next call.  `now_ns` is the host's time."""
         while self._replies:
-            number, reply = self._replies[0]
             try:
-                next(reply)
+                next(self._replies[0])
             except StopIteration as ended:
                 self._replies.popleft()
-                return dump({"re": number, "ok": ended.value})
-            except REFUSED as error:
-                self._replies.popleft()
-                return dump({"re": number, "error": str(error)})
+                whole: str = ended.value
+                return whole
             if is_late():
                 return None
         return self._updates.next(now_ns, is_late)
@@ -152,12 +166,17 @@ class Session:
 
     def _look(self, plc: str, names: list[str] | None = None, instance: str | None = None, memory: str | None = None,
               first: int = 0, units: bool = False, network: bool = False, scan: bool = False,
-              pictures: bool = False, times: bool = False, plant: bool = False) -> dict[str, Any]:  # fmt: skip
+              pictures: bool = False, times: bool = False, plant: bool = False) -> Reply:  # fmt: skip
         """From now on the page sees these names and panels, and nothing else; `scan` wants to see inside scans."""
         live, look = self._bench.plc(plc), self._seen
-        found, unknown = find_names(self._bench, live, names or [])
         if memory is not None and memory not in live.plc.memory.areas:
             raise MessageError(f"this PLC has no area {memory[:10]!r}")
+        found, unknown = yield from find_names(self._bench, live, names or [])
+        rows = {}
+        for number, (name, (owner, place)) in enumerate(found.items(), 1):
+            rows[name] = row(place, owner.described)
+            if number % STEP == 0:
+                yield
         if live is not look.live:
             look.leave_past()
         if live is not look.live or not network:
@@ -168,7 +187,7 @@ class Session:
         self._look_anew()
         if look.instance and live.view is None:
             live.wish_view(self._bench.control.is_paused)
-        return {"unknown": unknown, "rows": {name: row(place, owner.described) for name, (owner, place) in found.items()}}
+        return {"unknown": unknown, "rows": rows}
 
     def _look_anew(self) -> None:
         self._updates.forget()
@@ -184,17 +203,17 @@ class Session:
     def _program(self, plc: str) -> dict[str, Any]:
         return {"instances": self._bench.plc(plc).instances}
 
-    def _source(self, plc: str, instance: str) -> dict[str, Any]:
+    def _source(self, plc: str, instance: str) -> Reply:
         live = self._bench.plc(plc)
         return source_of(live.plc.image, live.plc.memory.areas, live.texts, instance)
 
-    def _search(self, plc: str, text: str) -> Generator[None, None, dict[str, Any]]:
+    def _search(self, plc: str, text: str) -> Reply:
         live = self._bench.plc(plc)
         return search(live.plc, live.described, text)
 
-    def _parts(self, plc: str, name: str) -> dict[str, Any]:
+    def _parts(self, plc: str, name: str) -> Reply:
         live = self._bench.plc(plc)
-        return {"parts": parts(live.plc, live.described, name)}
+        return {"parts": (yield from parts(live.plc, live.described, name))}
 
     def _history(self, plc: str, names: list[str], scans: int) -> dict[str, Any]:
         """The values of some names in the last recorded scans, or the last before the one that is looked at."""
@@ -273,8 +292,10 @@ class Session:
         """What has passed the network last, as a file for Wireshark."""
         return {"pcapng": b64encode(self._bench.plc(plc).capture()).decode()}
 
-    def _view(self, plc: str, scan: int | None = None, future: int | None = None) -> dict[str, Any]:
-        """Looks at the end of a recorded scan, also of another future, or, without one, at the present again."""
+    def _view(self, plc: str, scan: int | None = None, future: int | None = None) -> Reply:
+        """Looks at the end of a recorded scan, also of another future, or, without one, at the present again.  It is no earlier
+        than what was asked to be looked at before."""
+        yield from ()
         if scan is None:
             self._seen.leave_past()
             self._look_anew()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
+from itertools import islice
 from typing import Any
 
 from fbvm.base.types import ArrayType, EnumType, Field, StructType, base
@@ -14,8 +15,8 @@ MOST_FOUND = 200
 MOST_PARTS = 500
 """Elements or members that are listed of one array or structure."""
 MOST_SEARCHED = 200_000
-STEP = 50
-"""Places that are searched in one step."""
+STEP, LISTED = 50, 10
+"""Places that are searched, and parts that are listed, in one step."""
 
 
 def search(plc: Plc, described: Mapping[str, str], text: str) -> Generator[None, None, dict[str, Any]]:
@@ -60,12 +61,15 @@ def row(place: Place | Span, described: Mapping[str, str]) -> dict[str, Any]:
     return made
 
 
-def parts(plc: Plc, described: Mapping[str, str], name: str) -> list[dict[str, Any]]:
-    """The elements of an array, the members of a structure or an instance.  Raises UnknownPlace."""
+def parts(plc: Plc, described: Mapping[str, str], name: str) -> Generator[None, None, list[dict[str, Any]]]:
+    """The elements of an array, the members of a structure or an instance, found in short steps.  Raises UnknownPlace."""
     place = plc.find(name)
-    if isinstance(place, Span):
-        return [row(one, described) for one in place.places[:MOST_PARTS]]
-    return [row(part, described) for part in _parts(place)]
+    rows = []
+    for part in islice(place.places, MOST_PARTS) if isinstance(place, Span) else _parts(place):
+        rows.append(row(part, described))
+        if len(rows) % LISTED == 0:
+            yield
+    return rows
 
 
 def _parts(place: Place) -> Iterator[Place]:

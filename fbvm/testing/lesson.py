@@ -21,9 +21,13 @@ def predicted(test_file: str, name: str) -> object:
         raise AssertionError(f"{FILE} cannot be read: {error}") from None
     if answers.get(name, "") == "":
         raise AssertionError(f"{FILE}: {name} is still empty; predict first, then look")
-    value: object = answers[name]
-    if isinstance(value, str):
-        if re.fullmatch(r"\s*[+-]?[0-9]{1,9}\s*", value):
-            return int(value)
-        return {"true": True, "false": False}.get(value.strip().lower(), value)
-    return value
+    return answer_value(answers[name])
+
+
+def answer_value(written: object) -> object:
+    """What an answer means: a number or a truth value also if it stands in quotes."""
+    if not isinstance(written, str):
+        return written
+    if re.fullmatch(r"\s*[+-]?[0-9]{1,9}\s*", written):
+        return int(written)
+    return {"true": True, "false": False}.get(written.strip().lower(), written)

@@ -7,11 +7,14 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from fbvm.testing.course.lessons import lessons
 
 pytestmark = pytest.mark.slow
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -55,7 +58,7 @@ class Live:
         self.file = file = folder / "pump.st"
         file.write_text(text)
         self._browser = browser
-        given = [] if verb in ("serve", "demo") or options and options[-1].startswith(str(folder)) else [str(file)]
+        given = [] if verb in ("serve", "demo", "learn") or options and options[-1].startswith(str(folder)) else [str(file)]
         self.process = subprocess.Popen([sys.executable, "-m", "fbvm", verb, *given, *options], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True)  # fmt: skip
         assert self.process.stdout is not None
@@ -424,4 +427,24 @@ def test_frames_are_saved_and_a_word_says_who_wrote_it(live: Any) -> None:
     page.locator("#cause:not([hidden])").wait_for()
     page.click("[data-panel=times]")
     page.locator("#histogram rect").first.wait_for()
+    assert run.complaints == []
+
+
+@pytest.mark.parametrize("number", [15, 16])
+def test_a_lesson_is_solved_on_its_page(live: Any, number: int, tmp_path: Path) -> None:
+    lesson = lessons()[number - 1]
+    page = (run := live(str(number), "--live", "--folder", str(tmp_path / "mine"), verb="learn")).window()
+    state(page, "pause")
+    answers = tomllib.loads((lesson.folder / "solution" / "answers.toml").read_text(encoding="utf-8"))
+    if number == 15:
+        page.fill(f"#questions input[name={next(iter(answers))}]", "7654")
+        page.locator("#prediction").get_by_role("button").click()
+        page.locator("#feedback", has_text="is still empty").wait_for()
+    for name, right in answers.items():
+        page.fill(f"#questions input[name={name}]", str(right).lower() if isinstance(right, bool) else str(right))
+    page.locator("#prediction").get_by_role("button").click()
+    page.locator("#feedback.good", has_text="That is what it does").wait_for()
+    shutil.copyfile(lesson.folder / "solution" / "program.st", tmp_path / "mine" / lesson.slug / "program.st")
+    page.click("#check")
+    page.locator("#feedback.good", has_text="Done").wait_for()
     assert run.complaints == []

@@ -1,8 +1,11 @@
-"""The report of a teacher's run: an HTML page with a row for each learner, a column for each lesson, and all failures."""
+"""The report of a teacher's run: an HTML page with a row for each learner, a column for each lesson,
+the first wrong prediction of each learner, and all failures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from html import escape
 from pathlib import Path
 from urllib.parse import quote
@@ -10,17 +13,29 @@ from urllib.parse import quote
 from fbvm.testing.course.lessons import OF_THE_LEARNER, Lesson, Result
 from fbvm.testing.pages import page_path
 
+_STYLE = """
+:root { color-scheme: light dark; --good: light-dark(#1b7f4d, #4cc38a); --bad: light-dark(#c92a2a, #ff8787) }
+body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 90rem; padding: 0 1rem; overflow-wrap: break-word }
+table { border-collapse: collapse } th, td { padding: .25rem .7rem; border-bottom: 1px solid #8884; text-align: left }
+tbody td { white-space: nowrap } .words td { white-space: normal; overflow-wrap: anywhere; min-width: 6rem; max-width: 30rem }
+.good { color: var(--good) } .bad { color: var(--bad) } td a { color: inherit } .none { opacity: .65 } .wide { overflow-x: auto }
+"""
+_STYLE_HASH = b64encode(sha256(_STYLE.encode()).digest()).decode()
+_POLICY = f"default-src 'none'; style-src 'sha256-{_STYLE_HASH}'; base-uri 'none'; form-action 'none'"
+"""No script, no other style, nothing from elsewhere: what learners have written stays text."""
 _PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title><style>
-:root {{ color-scheme: light dark; --good: light-dark(#1b7f4d, #4cc38a); --bad: light-dark(#c92a2a, #ff8787) }}
-body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 75rem; padding: 0 1rem }}
-table {{ border-collapse: collapse }} th, td {{ padding: .25rem .7rem; border-bottom: 1px solid #8884; text-align: left }}
-.good {{ color: var(--good) }} .bad {{ color: var(--bad) }} .none {{ opacity: .4 }} .wide {{ overflow-x: auto }}
-</style></head><body><h1>{title}</h1>
+<html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title><style>{style}</style></head><body><h1>{title}</h1>
 <p>A cell is the prediction, right or wrong, and how many checks of the program passed.</p>
-<div class="wide"><table><thead><tr><th>{heads}</thead><tbody>
+<div class="wide" tabindex="0" role="region" aria-label="Who did what"><table><thead><tr><th>{heads}</thead><tbody>
 {rows}
+</tbody></table></div>
+<h2>First wrong predictions</h2>
+<p>What each learner first predicted wrongly, as it was before it was corrected.</p>
+<div class="wide" tabindex="0" role="region" aria-label="First wrong predictions"><table class="words"><thead>
+<tr><th>learner<th>lesson<th>question<th>predicted<th>what happens</thead><tbody>
+{wrong}
 </tbody></table></div>
 {details}
 </body></html>
@@ -51,7 +66,18 @@ def report(results: Mapping[str, Mapping[str, Result]], lessons: tuple[Lesson, .
         f"<td>{sum(result.is_complete for result in begun.values())}" for name, begun in results.items())  # fmt: skip
     details = "\n".join(_details(name, lesson, begun[lesson.slug], out) for name, begun in results.items()
                         for lesson in lessons if lesson.slug in begun and begun[lesson.slug].failed)  # fmt: skip
-    return _PAGE.format(title="Lessons", heads=heads, rows=rows, details=details)
+    wrong = "\n".join(_first_wrong(name, begun, lessons) for name, begun in results.items())
+    return _PAGE.format(title="Lessons", policy=_POLICY, style=_STYLE, heads=heads, rows=rows, wrong=wrong, details=details)
+
+
+def _first_wrong(name: str, begun: Mapping[str, Result], lessons: Sequence[Lesson]) -> str:
+    """The rows of the first lesson in which a learner predicted something wrongly."""
+    lesson = next((one for one in lessons if one.slug in begun and begun[one.slug].first_wrong), None)
+    if lesson is None:
+        return f'<tr><th>{escape(name)}<td class="none" colspan="4">none'
+    return "\n".join(f"<tr><th>{escape(name)}<td>{lesson.number}. {escape(lesson.title)}<td>{escape(one.question)}"
+                     f'<td class="bad">{escape(one.given)}<td>{escape(one.right)}'
+                     for one in begun[lesson.slug].first_wrong)  # fmt: skip
 
 
 def _cell(name: str, lesson: Lesson, result: Result | None) -> str:

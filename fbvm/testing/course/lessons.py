@@ -7,7 +7,6 @@ A lesson is a folder of `examples/lessons/`: `lesson.md` is its text, `given.st`
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import subprocess
 import sys
@@ -22,6 +21,7 @@ from xml.etree import ElementTree
 
 from fbvm.base.data import data_folder
 from fbvm.base.files import write_file
+from fbvm.testing.course.predictions import ANSWER, LARGEST_BYTES, WrongAnswer, asked, first_wrong, keep_first_wrong
 from fbvm.testing.lesson import FILE as ANSWERS
 from fbvm.testing.pages import FOLDER
 
@@ -29,11 +29,8 @@ PROGRAM, GIVEN, TEXT, SOLUTION = "program.st", "given.st", "lesson.md", "solutio
 OF_THE_LEARNER = (PROGRAM, ANSWERS)
 DONE = ".done"
 PLUGIN = "fbvm.testing.plugin"
-LARGEST_BYTES = 1 << 20
-"""Of a learner's file; a larger one is left out."""
 QUIET = ("-q", "-rN", "--tb=short", "--import-mode=importlib", "-p", "no:cacheprovider", "--fbvm-no-warn", "all")
 PREDICTION = "test_prediction"
-_ANSWER = re.compile(r"\s*(\w+)\s*=\s*(.*)")
 
 
 @dataclass(frozen=True)
@@ -115,6 +112,7 @@ def prediction_mistake(lesson: Lesson, folder: Path) -> str:
         return said.split("\n", 1)[0].removeprefix("AssertionError: ")
     if not said or not said.startswith(("assert ", "AssertionError")):
         return ""  # given.st is broken, or the test: the check shows how
+    keep_first_wrong(target)
     return f"{ANSWERS}: this is not what the program does; read the text again, and look: fbvm step shows every statement"
 
 
@@ -153,19 +151,12 @@ def _mistake(name: str, said: str) -> str:
 
 def questions(lesson: Lesson, folder: Path) -> list[tuple[str, str, str]]:
     """What a learner is asked to predict: name, question, and the answer so far."""
-    found, asked = [], list[str]()
     text = (folder / lesson.slug / ANSWERS).read_text(encoding="utf-8")
     try:
         given = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         given = {}
-    for line in text.splitlines():
-        if line.startswith("#"):
-            asked.append(line.lstrip("# ").strip())
-        elif match := _ANSWER.fullmatch(line):
-            found.append((match[1], " ".join(asked), str(given.get(match[1], ""))))
-            asked = []
-    return found
+    return [(name, question, str(given.get(name, ""))) for name, question in asked(text)]
 
 
 def answer(lesson: Lesson, folder: Path, values: Mapping[str, str]) -> None:
@@ -173,7 +164,7 @@ def answer(lesson: Lesson, folder: Path, values: Mapping[str, str]) -> None:
     path = folder / lesson.slug / ANSWERS
     lines = []
     for line in path.read_text(encoding="utf-8").splitlines():
-        match = _ANSWER.fullmatch(line)
+        match = ANSWER.fullmatch(line)
         known = match is not None and match[1] in values
         lines.append(f"{match[1]} = {json.dumps(values[match[1]], ensure_ascii=False)}" if match and known else line)
     write_file(path, "\n".join(lines) + "\n")
@@ -196,12 +187,14 @@ def _ini(folder: Path) -> Path:
 
 @dataclass
 class Result:
-    """The result of one lesson: whether the prediction is right, checks of the program, and failed tests with their messages."""
+    """The result of one lesson: whether the prediction is right, what was first predicted wrongly, checks of the program, and
+    failed tests with their messages."""
 
     prediction: bool = False
     passed: int = 0
     checks: int = 0
     failed: list[tuple[str, str]] = field(default_factory=list)
+    first_wrong: list[WrongAnswer] = field(default_factory=list)
 
     @property
     def is_complete(self) -> bool:
@@ -221,13 +214,14 @@ def learners(folder: Path) -> list[tuple[str, dict[str, Path]]]:
 def check_class(folder: Path, out: Path) -> dict[str, dict[str, Result]]:
     """Checks all lessons of all learners with the lessons' own tests; traces and pages of failures stay in `out`."""
     results: dict[str, dict[str, Result]] = {}
+    works = learners(folder)
     out = out.resolve()
     listing = out / "results.xml"
     for old in (out / FOLDER, out / "traces"):
         shutil.rmtree(old, ignore_errors=True)
     listing.unlink(missing_ok=True)
     out.mkdir(parents=True, exist_ok=True)
-    for name, begun in learners(folder):
+    for name, begun in works:
         results[name] = {}
         for lesson in lessons():
             if lesson.slug in begun:
@@ -247,6 +241,11 @@ def check_class(folder: Path, out: Path) -> dict[str, dict[str, Result]]:
             result.passed += not why
         if why:
             result.failed.append((test, why))
+    for name, begun in works:
+        for lesson in lessons():
+            if lesson.slug in begun:
+                result = results[name][lesson.slug]
+                result.first_wrong = first_wrong(begun[lesson.slug], lesson.folder, result.prediction)
     return results
 
 

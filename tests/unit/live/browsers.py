@@ -80,10 +80,10 @@ def answered(data: bytes, bind: str = "127.0.0.1") -> tuple[int, bytes]:
 class Page:
     """A page's session at a PLC with an ETN21 and a Modbus server in memory, in virtual time; or as if connections were real."""
 
-    def __init__(self, text: str = PUMP, real: bool = False, **settings: Any) -> None:
+    def __init__(self, text: str = PUMP, real: bool = False, cycle_ns: int = 10_000_000, **settings: Any) -> None:
         image = compile_text(text).image
         assert image is not None
-        self.plc = Plc(image)
+        self.plc = Plc(image, cycle_ns)
         self.network = LoopNetwork()
         self.network.place(Peer("192.168.250.1", 502), ModbusPeer())
         for unit in usual_units([]):

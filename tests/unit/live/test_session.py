@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsers import Page
+from browsers import PUMP, Page
 
 from fbvm.live.futures import Future, run_again
 from fbvm.live.groups import WatchGroups
+from fbvm.live.messages import dump, dump_in_steps
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
+from fbvm.live.session import Session
 from fbvm.live.updates import UPDATE_NS
 from fbvm.run.running import Running
 from fbvm.wire.link import Peer
@@ -167,6 +169,21 @@ def test_a_pulled_cable_lets_nothing_pass_and_the_unit_says_so(page: Page) -> No
     assert not unit["plugged"] and page.network.faults[0].silent and not page.plc.units[0].unit.settings["link_up"]
     page.done("cable", plc="pump", unit="ETN21 0", plugged=True)
     assert page.network.faults == [] and page.plc.units[0].unit.settings["link_up"]
+
+
+@pytest.mark.slow
+def test_the_restart_button_of_a_unit_restarts_it(page: Page) -> None:
+    page.done("look", plc="pump", names=[], units=True)
+    page.scan(3)
+    [unit] = page.update()["units"]
+    [restart] = [address for address, said, *_ in unit["words"] if said.endswith("Restart Bit")]
+    [initializing] = [address for address, said, *_ in unit["words"] if said.endswith("Initializing Flag")]
+    page.done("write", plc="pump", name=restart, value="TRUE")
+    seen = [(True, False)]
+    while any(seen[-1]) and len(seen) < 1000:
+        page.scan()
+        seen.append((page.plc.read(restart), page.plc.read(initializing)))
+    assert (True, True) in seen and seen[-1] == (False, False), "it initializes, and turns the bit OFF when it is done"
 
 
 def test_faults_are_switched_on_and_off_by_name(page: Page) -> None:
@@ -437,3 +454,60 @@ def test_groups_are_kept_in_a_file_and_read_again_when_it_changes(page: Page, tm
     file.unlink()
     page.bench.groups.look()
     assert page.bench.groups.rows == {}
+
+
+def slices(page: Page, do: str, **fields: object) -> tuple[dict[str, Any], int]:
+    """A reply, and the number of slices between scans that it takes if time is up after each step."""
+    text, taken = page.session.answer(json.dumps({"id": 1, "do": do, **fields})), 1
+    while text is None:
+        text, taken = page.session.update(0, lambda: True), taken + 1
+    return json.loads(text)["ok"], taken
+
+
+@pytest.mark.slow
+def test_long_replies_are_worked_out_and_written_in_slices() -> None:
+    lines = "".join(f"a[{number}] := a[{number}] + 1;\n" for number in range(1, 121))
+    page = Page(f"PROGRAM Main\nVAR a : ARRAY[1..120] OF INT; END_VAR\n{lines}END_PROGRAM\n")
+    names = [f"Main.a[{number}]" for number in range(1, 121)]
+    seen, taken = slices(page, "look", plc="pump", names=[*names, "Main.b"])
+    assert list(seen["rows"]) == names and list(seen["unknown"]) == ["Main.b"] and taken > 24
+    listed, taken = slices(page, "parts", plc="pump", name="Main.a")
+    assert [part["name"] for part in listed["parts"]] == names and taken > 10
+    source, taken = slices(page, "source", plc="pump", instance="Main")
+    assert [line["names"] for line in source["lines"]][2:122] == [[name] for name in names] and taken > 60
+
+
+def test_what_is_looked_at_changes_in_the_order_of_the_questions(page: Page) -> None:
+    page.scan(3)
+    asked = [{"do": "look", "plc": "pump", "names": ["Main.Level"] * 40},
+             {"do": "view", "plc": "pump", "scan": 1}, {"do": "view", "plc": "pump"}]  # fmt: skip
+    told = [page.session.answer(json.dumps({"id": number, **one})) for number, one in enumerate(asked)]
+    assert told == [None] * 3
+    assert [json.loads(page.session.update(0) or "")["re"] for _ in asked] == [0, 1, 2]
+
+
+def test_a_message_that_is_written_in_steps_reads_the_same() -> None:
+    long = {str(number): [number] for number in range(200)}
+    for message in ({}, {"re": 1, "ok": {}}, {"re": None, "ok": {"a": [*range(200)], "b": "\u00e4", "c": long,
+                                                                     "d": {"e": [[]] * 60}}}, long):  # fmt: skip
+        steps = dump_in_steps(message)
+        with pytest.raises(StopIteration) as ended:
+            while True:
+                next(steps)
+        assert ended.value.value == dump(message)
+
+
+@pytest.mark.slow
+def test_two_pages_see_three_hours_of_virtual_time_and_where_they_end() -> None:
+    page = Page(PUMP, cycle_ns=10_000_000_000)
+    other = Session(page.bench)
+    for session in (page.session, other):
+        session.answer('{"do": "hello"}')
+        session.answer('{"do": "look", "plc": "pump", "names": ["Main.Level"]}')
+    updates = 0
+    for _ in range(3 * 60):
+        page.scan(6)
+        updates += bool(page.update().get("values"))
+    told = json.loads(other.update(page.now_ns) or "")["update"]
+    assert updates > 150 and told["ns"] == page.plc.now_ns == (3 * 3600 - 10) * 10**9 and told["values"]["Main.Level"]
+    assert page.done("view", plc="pump", scan=told["held"][0]) == {"scan": told["held"][0]}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+from base64 import b64encode
+from hashlib import sha256
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -29,6 +31,7 @@ from fbvm.testing.course.lessons import (
     questions,
     run_pytest,
 )
+from fbvm.testing.course.predictions import KEPT, first_wrong, keep_first_wrong
 from fbvm.testing.lesson import predicted
 
 HOUSE = Path(__file__).resolve().parents[3]
@@ -101,6 +104,8 @@ def test_a_class(tmp_path: Path) -> None:
         (tmp_path / "class" / "anna" / "lessons" / first.slug / path.name).write_bytes(path.read_bytes())
     (tmp_path / "class" / "bert" / "lessons" / first.slug / "test_lesson.py").write_text(
         "def test_prediction(): pass\ndef test_program(): pass\n", encoding="utf-8")  # nobody marks his own work
+    kept = tmp_path / "class" / "anna" / "lessons" / first.slug / KEPT
+    kept.write_text("lamp_on_in_scan = '<script>alert(1)</script>'\n", encoding="utf-8")
     results = check_class(tmp_path / "class", tmp_path / "out")
     assert results["anna"][first.slug].is_complete
     assert not results["bert"][first.slug].prediction
@@ -109,6 +114,9 @@ def test_a_class(tmp_path: Path) -> None:
     assert [row.split()[:4] for row in summary(results, lessons())[1:]] == [
         ["anna", "ok", "-", "1/4"], ["bert", "0/2", "-", "-"], ["carla", "-", "-", "-"]]  # fmt: skip
     page = report(results, lessons(), tmp_path / "out")
+    [row] = re.findall(r"<tr><th>anna<td>1\. .*", page)
+    assert "<td class=\"bad\">&lt;script&gt;alert(1)&lt;/script&gt;<td>4" in row, "right now, and wrong at first"
+    assert '<tr><th>bert<td class="none" colspan="4">none' in page, "what is empty is not wrong"
     for link in re.findall(r'href="([^#"]*)"', page):
         assert (tmp_path / "out" / unquote(link)).exists()
     [trace] = (tmp_path / "out" / "traces").glob("bert.*test_program*.fbtrace")
@@ -161,6 +169,7 @@ def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         code, output = called("1", "--check")
         assert code == 1 and message in output and "checked when the prediction is right" in output
         assert "4" not in output and "5" not in output, "the answer is not given away"
+        assert (answers.parent / KEPT).exists() == bool(written)
     for path in (lessons()[0].folder / "solution").iterdir():
         (tmp_path / "lessons" / lessons()[0].slug / path.name).write_bytes(path.read_bytes())
     code, output = called("1", "--check")
@@ -198,3 +207,32 @@ def test_a_wrong_program_is_told_in_sentences_and_a_right_one_ends_the_lesson(tm
     assert program_mistakes(lesson, tmp_path) == ["stop stops the motor", "stop wins while start is pressed"]
     (target / PROGRAM).write_bytes((lesson.folder / "solution" / PROGRAM).read_bytes())
     assert program_mistakes(lesson, tmp_path) == [] and is_done(lesson, tmp_path)
+
+
+def test_the_first_wrong_prediction_is_kept_when_it_is_corrected(tmp_path: Path) -> None:
+    lesson = lessons()[1]
+    answers = lesson.begin(tmp_path) / ANSWERS
+    for written in ('between = "false"\nat_the_end = ""', "between = true\nat_the_end = true"):
+        answers.write_text(written, encoding="utf-8")
+        keep_first_wrong(answers.parent)
+    [wrong] = first_wrong(answers.parent, lesson.folder, is_right=True)
+    assert (wrong.question, wrong.given, wrong.right) == ("true or false: Lamp between the two statements", "false", "true")
+
+
+@each_of(("written", "given"), [
+    ("between = true\nat_the_end = true", ["true"]), ('between = "TRUE"\nat_the_end = false', []), ("between = ", []),
+    ("other = 3", []), ("between = " + "9" * 5000, []), ("between = " + "[" * 5000, []),
+    ("between = 0x" + "f" * 9000, ["a number of thousands of digits"]), (f"between = '{'x' * 900}'", ["x" * 200])])  # fmt: skip
+def test_answers_that_are_not_kept_are_taken_as_they_are(written: str, given: list[str], tmp_path: Path) -> None:
+    (tmp_path / ANSWERS).write_text(written, encoding="utf-8")
+    assert [one.given for one in first_wrong(tmp_path, lessons()[1].folder, is_right=False)] == given
+    assert first_wrong(tmp_path, lessons()[1].folder, is_right=True) == []
+
+
+def test_the_report_lets_no_script_run_and_loads_nothing() -> None:
+    page = report({"<b>": {}}, lessons(), Path())
+    style = re.search(r"<style>(.*?)</style>", page, re.S)
+    assert style is not None
+    named = b64encode(sha256(style[1].encode()).digest()).decode()
+    assert f"content=\"default-src 'none'; style-src 'sha256-{named}'; base-uri 'none'; form-action 'none'\"" in page
+    assert "<b>" not in page and " style=" not in page and "src=" not in page
