@@ -8,14 +8,14 @@ from typing import Any
 
 from fbvm.dap.sources import Sources
 from fbvm.dap.target import Target
-from fbvm.record.trace.events import OUTSIDE, Frame
+from fbvm.record.trace.events import Frame
 from fbvm.step.commands import Commands
 from fbvm.step.debugger import Debugger
 from fbvm.step.past_session import PastSession
 from fbvm.step.session import Session
 from fbvm.step.stop_report import StopReport
 from fbvm.watch.paths import Place, Span
-from fbvm.watch.scopes import Scope, place_of
+from fbvm.watch.scopes import Scope
 
 Arguments = Mapping[str, Any]
 Body = dict[str, Any]
@@ -114,9 +114,7 @@ class DebugSession:
         session = self.plc(frame.plc if frame else None)
         newest = session.statement.frame if session.statement else None
         inner = newest if frame is None else frame.frame
-        path = session.names.instance(inner.base) if inner is not None and inner.base else ""
-        local = session.facts.local(inner.body, _newer(newest, inner)) if inner is not None and inner.body >= 0 else None
-        return Scope(session.player.find, place_of(session.player.find, path), local)
+        return session.scope(inner)
 
     def frame_of(self, arguments: Arguments) -> StackFrame | None:
         """The frame that a request names, None if it names none."""
@@ -127,12 +125,3 @@ class DebugSession:
     def supports(self, capability: str) -> bool:
         """True if the client declared something in `initialize`."""
         return bool(self.client.get(capability))
-
-
-def _newer(newest: Frame | None, wanted: Frame) -> int:
-    """How many executions of the same body are newer than a frame that is on the stack of the newest one."""
-    count = 0
-    while newest is not None and newest is not wanted and newest is not OUTSIDE:
-        count += newest.body == wanted.body
-        newest = newest.caller
-    return count

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Protocol, cast
 
 from fbvm.base.memory import Memory
-from fbvm.base.types import Field, fold
+from fbvm.base.types import Field, StructType, derives, fold
 from fbvm.code.image import Image, Site
 from fbvm.engine.choice.stoppable import StoppableEngine
 from fbvm.engine.choice.tiers import Engine, choice_of, substitutes_of
@@ -217,16 +217,31 @@ class BreakpointRows:
         pous = {self._image.sites[site].pou for site in lines.sites}
         if lines.base is not None:
             return True, lines.base
+        if any(self._owner(pou) for pou in pous):
+            return False, None
         found = instances(self._image.symbols, next(iter(pous)), 2) if len(pous) == 1 else []
         return len(found) < 2 and len(pous) == 1, found[0].offset if len(found) == 1 else 0
+
+    def _owner(self, pou: str) -> StructType | None:
+        """The block that a method, an action or an accessor of a property belongs to, None for other POUs."""
+        while "." in pou:
+            pou = pou.rpartition(".")[0]
+            if isinstance(found := self._image.types.get(fold(pou)), StructType) and found.block:
+                return found
+        return None
+
+    def _some_instance(self, pou: str) -> Place | None:
+        """An instance in which a POU is executed: of its block, or of one that extends this."""
+        owner = self._owner(pou)
+        kinds = [kind.name for kind in self._image.types.values() if derives(kind, owner)] if owner else [pou]
+        return next((place for kind in kinds for place in instances(self._image.symbols, kind, 1)), None)
 
     def _line_test(self, lines: Lines, when: str) -> LineTest | None:
         """The test of a condition in which variables of the POU need no path."""
         if not when:
             return None
         is_known, only = self._known_base(lines)
-        some = instances(self._image.symbols, self._image.sites[min(lines.sites)].pou, 1)
-        tried = Scope(self._inspected.find, some[0] if some else None, self._local(lines))
+        tried = Scope(self._inspected.find, self._some_instance(self._image.sites[min(lines.sites)].pou), self._local(lines))
         parse_condition(when, tried.find)  # says at once what is wrong with it
         parsed: dict[int, Condition] = {}
 

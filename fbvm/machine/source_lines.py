@@ -1,8 +1,8 @@
-"""The statements that a place in a source means: a line, a POU, a rung of it, one of its instances."""
+"""The statements that a place in a source means: a line, a POU, a rung of it, one of its instances, a method of one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 from fbvm.base.digits import whole_number
@@ -10,6 +10,9 @@ from fbvm.base.types import Field, StructType, fold
 from fbvm.code.image import Image, Site
 from fbvm.code.shapes import statements
 from fbvm.engine.choice.stoppable import STATEMENTS
+
+ACCESSORS = ("", ".Get", ".Set")
+"""What follows the name of a POU in that of its statements: nothing, or of a property the accessor."""
 
 
 class Lines(NamedTuple):
@@ -22,16 +25,15 @@ class Lines(NamedTuple):
 
 
 def find_lines(image: Image, where: str) -> Lines:
-    """The statements that `where` means: all that `find_line` takes, `Main#3` for a rung, `Main.P1` for one instance.
+    """The statements that `where` means: all that `find_line` takes, `Main#3` for a rung, `Main.P1` for one instance,
+    `Main.P1.Start` for a method or property of one instance.
 
     Raises ValueError."""
     pou, mark, number = where.rpartition("#")
     if mark and number.strip().isdecimal():
         return _rung(image, pou.strip(), whole_number(number), where)
-    if "." in where and ":" not in where and (found := _instance(image.symbols, where)):
-        kind, base = found
-        _, sites = find_line(image, kind)
-        return Lines(where.strip(), sites, base)
+    if "." in where and ":" not in where and (found := _of_instance(image, where.strip())):
+        return found
     return Lines(*find_line(image, where))
 
 
@@ -46,8 +48,32 @@ def _rung(image: Image, pou: str, number: int, where: str) -> Lines:
     raise ValueError(f"{where!r} is no rung; {known}")
 
 
-def _instance(symbols: Mapping[str, Field], path: str) -> tuple[str, int] | None:
-    """The POU and the offset of the instance that a path names, None if it names something else."""
+def _of_instance(image: Image, where: str) -> Lines | None:
+    """The first statements of an instance's own body, or of its method or property, None if a path names something else."""
+    if found := _instance(image.symbols, where):
+        kind, base = found
+        return Lines(where, find_line(image, kind.name)[1], base)
+    pous = {fold(site.pou) for site in _statements(image).values()}
+    path, member = where, ""
+    while "." in path and member.count(".") < 2:
+        path, _, last = path.rpartition(".")
+        member = f".{last.strip()}{member}"
+        owner = _instance(image.symbols, path)
+        if owner is not None and (pou := _member(owner[0], member, pous)):
+            return Lines(where, find_line(image, pou)[1], owner[1])
+    return None
+
+
+def _member(kind: StructType, member: str, pous: Collection[str]) -> str:
+    """The POU that an instance executes as its method or property `.Start`, its own or an inherited one; "" if there is none."""
+    pou = f"{kind.name}{member}"
+    if any(fold(f"{pou}{accessor}") in pous for accessor in ACCESSORS):
+        return pou
+    return next((found for parent in kind.parents if (found := _member(parent, member, pous))), "")
+
+
+def _instance(symbols: Mapping[str, Field], path: str) -> tuple[StructType, int] | None:
+    """The type and the offset of the instance that a path names, None if it names something else."""
     first, *names = path.strip().split(".")
     field, offset = symbols.get(fold(first)), 0
     for name in names:
@@ -56,14 +82,15 @@ def _instance(symbols: Mapping[str, Field], path: str) -> tuple[str, int] | None
         offset, field = offset + field.offset, field.type.member(name.strip())
     if field is None or field.reference or not isinstance(field.type, StructType) or not field.type.block:
         return None
-    return field.type.name, offset + field.offset
+    return field.type, offset + field.offset
 
 
 def find_line(image: Image, where: str) -> tuple[str, frozenset[int]]:
     """The line that `where` means, as `FILE:LINE`, and the numbers of the sites at which a breakpoint there stops.
 
     `where` is `FILE:LINE` (the next line with a statement, if that one has none; of the file's path its last parts are enough)
-    or the name of a POU (the line of its first statement).  Of several statements on one line the first one counts, in each
+    or the name of a POU (the line of its first statement; of a property with two accessors there are two, and its name stands for
+    them).  Of several statements on one line the first one counts, in each
     POU that has some there.  Raises ValueError, whose message names the files or POUs that there are."""
     file, colon, number = where.rpartition(":")
     statements = _statements(image)
@@ -72,14 +99,17 @@ def find_line(image: Image, where: str) -> tuple[str, frozenset[int]]:
         line = _line_from(inside, whole_number(number), where)
     else:
         inside = _of_pou(statements, where.strip())
-        line = min(site.line for site in inside.values())
+        sites = _first_of_each_pou(inside)
+        places = {f"{inside[number].file}:{inside[number].line}" for number in sites}
+        return places.pop() if len(places) == 1 else where.strip(), frozenset(sites)
     sites = _first_of_each_pou({number: site for number, site in inside.items() if site.line == line})
     return f"{image.sites[sites[0]].file}:{line}", frozenset(sites)
 
 
 def _of_pou(statements: dict[int, Site], name: str) -> dict[int, Site]:
-    """The statements of the POU of that name.  Raises ValueError if there are none."""
-    inside = {number: site for number, site in statements.items() if fold(site.pou) == fold(name)}
+    """The statements of the POU of that name, or of both accessors of a property.  Raises ValueError if there are none."""
+    named = {fold(f"{name}{accessor}") for accessor in ACCESSORS}
+    inside = {number: site for number, site in statements.items() if fold(site.pou) in named}
     if not inside:
         pous = ", ".join(sorted({site.pou for site in statements.values() if site.pou}))
         raise ValueError(f"{name!r} is neither FILE:LINE nor a POU with statements; POUs are {pous or 'none'}")
@@ -106,12 +136,12 @@ def _line_from(statements: dict[int, Site], line: int, where: str) -> int:
 
 
 def _first_of_each_pou(statements: dict[int, Site]) -> list[int]:
-    """Of statements on one line the first one of each POU, by the numbers of their sites."""
-    columns: dict[tuple[str, str], int] = {}
+    """Of some statements the first one of each POU, by the numbers of their sites."""
+    first: dict[tuple[str, str], tuple[int, int]] = {}
     for site in statements.values():
-        pou = site.file, site.pou
-        columns[pou] = min(site.column, columns.get(pou, site.column))
-    return [number for number, site in statements.items() if site.column == columns[site.file, site.pou]]
+        pou, place = (site.file, site.pou), (site.line, site.column)
+        first[pou] = min(place, first.get(pou, place))
+    return [number for number, site in statements.items() if (site.line, site.column) == first[site.file, site.pou]]
 
 
 def _statements(image: Image) -> dict[int, Site]:

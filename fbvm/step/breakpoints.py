@@ -6,15 +6,15 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fbvm.base.types import StructType, fold
+from fbvm.base.types import fold
 from fbvm.code.image import Site
 from fbvm.machine import breakpoints as machine
 from fbvm.machine.breakpoints import BreakpointRows
-from fbvm.machine.source_lines import find_line
+from fbvm.machine.source_lines import find_lines
 from fbvm.record.trace.events import Statement
 from fbvm.step.stepping import Stepping
 from fbvm.watch.conditions import Condition, ConditionError, parse_condition, split_condition
-from fbvm.watch.paths import Place, UnknownPlace
+from fbvm.watch.paths import UnknownPlace
 
 _LINE = re.compile(r".*:\s*\d+|[\w.]+#\d+")
 """FILE:LINE, or a rung."""
@@ -39,7 +39,7 @@ class Watched:
 
 
 def parse_breakpoint(text: str, session: Stepping, here: Site | None) -> Breakpoint:
-    """The breakpoint that a text names: `15`, `pump.st:15`, `Pump`, `Pump IF Main.Count > 5`, `Main.Count > 5`.
+    """The breakpoint that a text names: `15`, `pump.st:15`, `Pump`, `Main.P1.Start`, `Pump IF Main.Count > 5`, `Main.Count > 5`.
 
     `here` is the current statement, in whose file a line number alone is.  Raises ValueError for a line behind the last
     statement, ConditionError for a text that is no condition."""
@@ -52,17 +52,18 @@ def parse_breakpoint(text: str, session: Stepping, here: Site | None) -> Breakpo
         try:
             stops = parse_condition(where, session.find)
         except ConditionError:
-            if ":" not in where:
+            if ":" not in where and not _is_line(where, session):
                 raise
         else:
             holds = parse_condition(f"({where}) AND ({when})", session.find) if when else stops
             return Breakpoint(text, lambda statement: holds.holds(session.read))
-    found, sites = find_line(image, where)
-    if condition is None:
-        return Breakpoint(found, lambda statement: statement is not None and statement.site in sites)
-    guard = condition
-    return Breakpoint(f"{found} IF {when}",
-                      lambda statement: statement is not None and statement.site in sites and guard.holds(session.read))
+    found = find_lines(image, where)
+
+    def reached(statement: Statement | None) -> bool:
+        return (statement is not None and statement.site in found.sites and found.base in (None, statement.frame.base)
+                and (condition is None or condition.holds(session.read)))  # fmt: skip
+
+    return Breakpoint(f"{found.where} IF {when}" if when else found.where, reached)
 
 
 def any_reached(breakpoints: Sequence[Breakpoint], statement: Statement | None) -> bool:
@@ -71,8 +72,8 @@ def any_reached(breakpoints: Sequence[Breakpoint], statement: Statement | None) 
 
 
 def parse_row(text: str, session: Stepping, here: Site | None) -> machine.Breakpoint:
-    """A breakpoint: what `parse_breakpoint` takes, a rung (`Main#3`), an instance (`Main.P1`), or what is watched for changes
-    (`D200`, `Main.Count`, `D200..D209`); behind IF a condition, behind HITS a hit count.
+    """A breakpoint: what `parse_breakpoint` takes, a rung (`Main#3`), or what is watched for changes (`D200`, `Main.Count`,
+    `D200..D209`); behind IF a condition, behind HITS a hit count.
 
     Raises ValueError, UnknownPlace or ConditionError."""
     at = text.upper().find(" HITS ")
@@ -94,12 +95,20 @@ def _kind_of(where: str, session: Stepping) -> str:
     try:
         parse_condition(where, session.find)
     except ConditionError as error:
-        if _LINE.fullmatch(where):
+        if _LINE.fullmatch(where) or _is_line(where, session):
             return "line"
         try:
-            found = session.find(where)
+            session.find(where)
         except UnknownPlace:
             raise error from None
-        is_instance = isinstance(found, Place) and isinstance(found.type, StructType) and found.type.block
-        return "line" if is_instance else "change"
+        return "change"
     return "condition"
+
+
+def _is_line(where: str, session: Stepping) -> bool:
+    """Whether a text names statements: a line, a rung, an instance, a method of one."""
+    try:
+        find_lines(session.facts.image, where)
+    except ValueError:
+        return False
+    return True

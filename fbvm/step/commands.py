@@ -264,7 +264,7 @@ class Commands:
         match = re.fullmatch(r"(.+?)\s*:?=\s*(.+)", rest)
         if not match:
             raise CommandError("write NAME = VALUE")
-        found = self.session.find(match[1])
+        found = self.session.find_here(match[1])
         return found, parse_for(found, match[2])
 
     def _act(self, action: Action, name: str) -> Iterator[str]:
@@ -337,9 +337,9 @@ class Commands:
                 short = f"{command.short:<2}" if command.short else "  "
                 yield f"  {short} {command.usage:<32} {command.help}"
         if not rest:
-            yield "  LINE is 15, pump.st:15, a POU, a rung (Main#3) or an instance, alone or before IF CONDITION.  Behind HITS"
-            yield "  5 or HITS % 5 a breakpoint says at which passes it stops.  NAME is a variable, an address or a range,"
-            yield "  D200..D209.  NAME := VALUE writes, too.  An empty line moves again."
+            yield "  LINE is 15, pump.st:15, a POU, a rung (Main#3), an instance or its method, alone or before IF CONDITION."
+            yield "  Behind HITS 5 or HITS % 5 a breakpoint says at which passes it stops.  NAME is a variable, an address or"
+            yield "  a range, D200..D209.  NAME := VALUE writes, too.  An empty line moves again."
 
     def _quit(self, rest: str) -> None:
         self.ended = True
@@ -388,7 +388,7 @@ def _count(text: str, least: int = 1) -> int:
 
 
 def _place(session: Stepping, text: str) -> Place:
-    found = session.find(text) if text else None
+    found = session.find_here(text) if text else None
     if not isinstance(found, Place) or not is_single(found):
         raise CommandError("name one variable, not a block, an array or a range" if found else "name something")
     return found

@@ -52,6 +52,10 @@ class ProgramFacts:
         """The name of the POU that is body number `body`."""
         return self.image.bodies[body].name
 
+    def is_method(self, body: int) -> bool:
+        """True for a method, or an accessor of a property."""
+        return self.image.bodies[body].kind in ("METHOD", "GET", "SET")
+
     def local(self, body: int, older: int = 0) -> Mapping[str, Field]:
         """The variables of a body that live while it is executed, by folded name: those of a function, and VAR_TEMP.
 

@@ -15,7 +15,7 @@ from fbvm.record.draw.power import RungExecution
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartCall
 from fbvm.record.recording.recorded import RecordedPlc
-from fbvm.record.trace.events import Statement
+from fbvm.record.trace.events import OUTSIDE, Frame, Statement
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.facts import ProgramFacts
 from fbvm.step.position import Position
@@ -23,6 +23,7 @@ from fbvm.step.scan_replay import END, Action, MomentListener, Player, Stop, dep
 from fbvm.watch import places
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
+from fbvm.watch.scopes import Scope, place_of
 from fbvm.watch.values import Value
 
 QUIET_AREAS = frozenset(("A", "CF"))
@@ -125,6 +126,17 @@ class Stepping(ABC):
     def find(self, text: str) -> Place | Span:
         """The place or span of places that `text` names.  Raises UnknownPlace."""
         return self.player.find(text)
+
+    def scope(self, frame: Frame | None) -> Scope:
+        """The names as they are written inside a body in execution; of all, in none."""
+        path = self.names.instance(frame.base) if frame is not None and frame.base else ""
+        newest = self.statement.frame if self.statement else None
+        local = self.facts.local(frame.body, newer(newest, frame)) if frame is not None and frame.body >= 0 else None
+        return Scope(self.player.find, place_of(self.player.find, path), local)
+
+    def find_here(self, text: str) -> Place | Span:
+        """What `text` names inside the body that is executed, `Speed` as well as `Main.slow.Speed`.  Raises UnknownPlace."""
+        return self.scope(self.statement.frame if self.statement else None).find(text)
 
     def read(self, where: str | Place | Span) -> Value:
         """The value of a variable, address or range at the current position."""
@@ -271,3 +283,12 @@ def _behind(after: int, stop: Callable[[Statement | None], bool], number: int, s
 def reached_step(step: int, number: int, statement: Statement) -> bool:
     """A `Stop` at the statement with that number."""
     return number >= step
+
+
+def newer(newest: Frame | None, wanted: Frame) -> int:
+    """How many executions of the same body are newer than a frame that is on the stack of the newest one."""
+    count = 0
+    while newest is not None and newest is not wanted and newest is not OUTSIDE:
+        count += newest.body == wanted.body
+        newest = newest.caller
+    return count

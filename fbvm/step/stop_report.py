@@ -54,8 +54,10 @@ class StopReport:
         return f"{text}{short(site)} in {self.instance(session.statement.frame)}"
 
     def instance(self, frame: Frame) -> str:
-        """The path of an instance; a function has only its name."""
-        return self._session.names.instance(frame.base) or self._session.facts.body_name(frame.body)
+        """The path of an instance, with the method or property that is executed; a function has only its name."""
+        name = self._session.facts.body_name(frame.body)
+        path = self._session.names.instance(frame.base)
+        return f"{path}.{name.partition('.')[2]}" if path and self._session.facts.is_method(frame.body) else path or name
 
     def around(self, lines: int = AROUND) -> Iterator[str]:
         """The source around the next statement, whose line is marked with >; `lines` before and behind it."""
@@ -129,7 +131,7 @@ class StopReport:
 
     def value(self, text: str) -> str:
         """`Main.Delay.ET = T#20ms`; of words also the hexadecimal value, and the description of a unit's word."""
-        found = self._session.find(text)
+        found = self._session.find_here(text)
         value = self._session.read(found)
         if isinstance(found, Span):
             values = value if isinstance(value, list) else []
