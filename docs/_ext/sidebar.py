@@ -34,12 +34,12 @@ def marked(tree: str, page: str) -> str:
     anchor = tree.rindex('class="', 0, link) + len('class="')
     tree = tree[:anchor] + "current " + tree[anchor:]
     for at in reversed(around):
-        word = "current current-page " if at == around[-1] else "current "
+        word = " current current-page" if at == around[-1] else " current"
         end = tree.index('"', at)
         if "has-children" in tree[at:end]:
             box = tree.index("<input ", end) + len("<input ")
             tree = f'{tree[:box]}checked="" {tree[box:]}'
-        tree = tree[:at] + word + tree[at:]
+        tree = tree[:end] + word + tree[end:]
     return tree
 
 
