@@ -31,6 +31,7 @@ from fbvm.base.dialects import DIALECTS
 from fbvm.base.files import SETTINGS_BYTES
 from fbvm.base.host import foreign_path
 from fbvm.engine.choice.tiers import CHOICES
+from fbvm.interchange.formats.given import usual_dialect
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
 from fbvm.net.faults import Fault
@@ -115,7 +116,8 @@ PLC: Keys = {
     "sources": Key(texts, "Its source files, from the folder of the project file."),
     "program": Key(text, "The PROGRAM to run, where sources have several and no CONFIGURATION.", None),
     "resource": Key(text, "The RESOURCE to run, where a CONFIGURATION has several.", None),
-    "dialect": Key(one_of(tuple(DIALECTS)), "How to answer what compilers disagree about.", "standard"),
+    "dialect": Key(one_of(tuple(DIALECTS)), "How to answer what compilers disagree about; without it \"twincat\" if a source is "
+                                             "TwinCAT's, else \"standard\".", None),
     "libraries": Key(texts, "Folders of blocks that are asked before the shipped ones.", ()),
     "cycle": Key(time_ns, "The cycle time.", 10_000_000),
     "watch_cycle": Key(time_between(SHORTEST_NS, LONGEST_NS, "from 10ms to 40s"),
@@ -324,8 +326,9 @@ def near(path: Path) -> str:
 
 
 def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:
+    sources = tuple(folder / source for source in row["sources"])
     return PlcRow(
-        name, tuple(folder / source for source in row["sources"]), row["program"], row["resource"], row["dialect"],
+        name, sources, row["program"], row["resource"], row["dialect"] or usual_dialect(sources),
         tuple(folder / library for library in row["libraries"]), row["cycle"],
         row["watch_cycle"], row["pace"], row["engine"], row["count"],
         row["until"], row["watch"],

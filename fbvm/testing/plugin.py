@@ -60,7 +60,7 @@ class PlantMaker(Protocol):
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("fbvm_libraries", "folders of libraries of function blocks", type="paths", default=[])
-    parser.addini("fbvm_dialect", "whose answers are taken where compilers disagree (fbvm explain dialects)", default="standard")
+    parser.addini("fbvm_dialect", "whose answers are taken where compilers disagree (fbvm explain dialects)", default="")
     group = parser.getgroup("fbvm", "PLC programs")
     group.addoption("--fbvm-golden", action="store_true", help="write the golden traces of the tests anew")
     group.addoption("--fbvm-pages", type=int, default=MOST_PAGES, metavar="N",

@@ -127,7 +127,7 @@ class Rig:
     @classmethod
     def of(cls, what: str, cycle: str | int = "10ms", *, block: bool = True, folders: Sequence[Path] = (),
            libraries: Sequence[Path] = (), sources: Sequence[str] = (), text: str = "",
-           stubs: Mapping[str, Stub] | None = None, wanted: Wanted = ANY, dialect: str = "standard",
+           stubs: Mapping[str, Stub] | None = None, wanted: Wanted = ANY, dialect: str = "",
            **given: Any) -> Rig:  # fmt: skip
         """A rig by text: `"src/pump.st::Pump"`, `"src/pump.st"`, or `"TON"` from a library.
 

@@ -81,7 +81,7 @@ class StItem(pytest.Item):
         near = [self.path.parent] if self.path.parent != self.config.rootpath else []
         shelves = [LIBRARY, *library_folders(self.config, self.path), *near]
         warnings = warning_plugin(self.config)
-        dialect = self.config.getini("fbvm_dialect")
+        dialect = self.config.getini("fbvm_dialect") or "standard"
         compiled = partial(subject, [self.path], self.name, shelves, wanted=warnings.wanted, dialect=dialect)
         try:
             made = compiled()

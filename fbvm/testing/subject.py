@@ -23,7 +23,7 @@ from fbvm.check.symbols.library import Libraries
 from fbvm.check.symbols.report import Report
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
-from fbvm.interchange.formats.given import within
+from fbvm.interchange.formats.given import usual_dialect, within
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
@@ -91,17 +91,17 @@ class Subject:
 
 
 def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] = (), stubs: Mapping[str, Stub] | None = None,
-            text: str = "", wanted: Wanted = ANY, dialect: str = "standard", alone: bool = False) -> Subject:  # fmt: skip
+            text: str = "", wanted: Wanted = ANY, dialect: str = "", alone: bool = False) -> Subject:  # fmt: skip
     """Compiles the POU `name` of some files, or, without files, of a library; "" is the only POU, None the whole program.
 
     `text` is ST that is compiled with the files, `stubs` are ST or Python functions by the name of a block, `wanted` selects
-    the warnings, `dialect` is the dialect of the compiler.  With `alone` the files' other programs are left out.  Raises
-    SubjectError, and ValueError for an unknown dialect."""
+    the warnings, `dialect` is the dialect of the compiler, "" that of the files.  With `alone` the files' other programs are
+    left out.  Raises SubjectError, and ValueError for an unknown dialect."""
     __tracebackhide__ = True
     sources = [source for path in files for source in _read(path)] + ([Source("test.st", text)] if text else [])
     if alone and name:
         sources = [_without_other_programs(source, name) for source in sources]
-    stubs = stubs or {}
+    stubs, dialect = stubs or {}, dialect or usual_dialect(files)
     written = {fold(stubbed): stub for stubbed, stub in stubs.items() if isinstance(stub, str)}
     texts = tuple((source.name, source.text) for source in sources)
     key = texts, name, tuple(libraries), tuple(written.items()), wanted, dialect

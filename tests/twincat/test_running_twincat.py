@@ -12,6 +12,7 @@ from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
 from fbvm.interchange.formats.given import inputs
 from fbvm.machine.plc import Plc
+from fbvm.run.project import Project, read_project
 
 
 def test_a_project_runs_with_its_task(tmp_path: Path) -> None:
@@ -35,6 +36,24 @@ def test_an_object_runs_by_itself(tmp_path: Path) -> None:
     plc = Plc(made.image)
     plc.scan()
     assert plc.read("Main.n") == 7
+
+
+LONG = COUNTER.replace("nCount : INT;", "nCount : INT; tLong : LTIME := LTIME#213503d;")
+"""What is no LTIME elsewhere."""
+
+
+def test_files_have_the_dialect_of_their_tool_if_no_other_is_named(tmp_path: Path) -> None:
+    assert LONG != COUNTER
+    (tmp_path / "FB_Counter.TcPOU").write_text(LONG, encoding="utf-8")
+    (tmp_path / "main.st").write_text("PROGRAM Main VAR b : FB_Counter; END_VAR b(); END_PROGRAM")
+    both = [str(tmp_path / "main.st"), str(tmp_path / "FB_Counter.TcPOU")]
+    checked = [CliRunner().invoke(main, ["check", *both, *more]).exit_code for more in ([], ["--dialect", "standard"])]
+    assert checked == [0, 3]
+    rows = '[plc.one]\nsources = ["main.st", "FB_Counter.TcPOU"]\n[plc.two]\nsources = ["main.st"]\n'
+    (tmp_path / "fbvm.toml").write_text(rows, encoding="utf-8")
+    project = read_project(tmp_path / "fbvm.toml")
+    assert isinstance(project, Project)
+    assert [plc.dialect for plc in project.plcs] == ["twincat", "standard"]
 
 
 @pytest.mark.slow

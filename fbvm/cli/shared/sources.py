@@ -19,6 +19,7 @@ from fbvm.cli.shared.terminal import say, say_json
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.interchange.dialect_signs import guessed
+from fbvm.interchange.formats.given import usual_dialect
 
 AUTO = "auto"
 """The dialect that is chosen by what the files show."""
@@ -44,10 +45,12 @@ def _keep_in_context(context: click.Context, parameter: click.Parameter, value: 
 def compile_options(files: Sequence[Path]) -> dict[str, Any]:
     """The options --resource and --dialect of the present command, as keyword arguments of the compiler.
 
-    `--dialect auto` looks at the files, and says on stderr what it chose and why."""
+    Without --dialect TwinCAT's files have that of TwinCAT; `--dialect auto` looks at the files, and says on stderr what it chose
+    and why."""
     meta = click.get_current_context().meta
     given = {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
-    if given.get("dialect") == AUTO:
+    given.setdefault("dialect", usual_dialect(files))
+    if given["dialect"] == AUTO:
         chosen = guessed(families(files), sources_of(files))
         meta["fbvm.dialect"] = given["dialect"] = chosen.dialect
         say(f"dialect {chosen.dialect}: {chosen.because}", err=True)
@@ -68,7 +71,7 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
         click.option("--dialect", type=click.Choice([*DIALECTS, AUTO]), expose_value=False, callback=_keep_in_context,
                      help="How to answer what compilers disagree about; `fbvm explain dialects` says which answers, `auto` looks "
-                     "for signs in the files and says which it takes."),
+                     "for signs in the files and says which it takes.  Without it: twincat for files of TwinCAT, else standard."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
     ):  # fmt: skip
         function = decorate(function)

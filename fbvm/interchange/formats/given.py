@@ -4,7 +4,7 @@ The readers of other tools' files are loaded when there is such a file: most run
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +21,11 @@ SUFFIXES = (*CX_SUFFIXES, PROJECT_SUFFIX, *TWINCAT_SUFFIXES)
 """Endings, in small letters, of files of other tools; PLCopen XML is known by what it says."""
 DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
 """What a document in PLCopen XML has among its first bytes."""
+
+
+def usual_dialect(paths: Iterable[Path]) -> str:
+    """The dialect of files for which nobody has named one: that of the tool whose files they are."""
+    return "twincat" if any(path.suffix.lower() in (PROJECT_SUFFIX, *TWINCAT_SUFFIXES) for path in paths) else "standard"
 
 
 def is_cx_project(path: Path) -> bool:

@@ -18,7 +18,7 @@ from fbvm.cli.shared.options import mapping
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.dap.target import LaunchError, Target, checked
-from fbvm.interchange.formats.given import given_sources, inputs
+from fbvm.interchange.formats.given import given_sources, inputs, usual_dialect
 from fbvm.machine.plc import Plc
 from fbvm.record.recording.container import RecordingError
 from fbvm.record.recording.file_reader import RecordingFile
@@ -96,7 +96,7 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     if errors(said):
         raise LaunchError("the project cannot be taken over", _said(said))
     compilation = compile_files(sources, program=given.get("main"), libraries=libraries, runnable=True, drawn=True,
-                                resource=given.get("resource"), dialect=given.get("dialect", "standard"))  # fmt: skip
+                                resource=given.get("resource"), dialect=given.get("dialect") or usual_dialect(files))  # fmt: skip
     image = _image(compilation.image, compilation.diagnostics)
     sets = [_SetRow.of(row) for row in given.get("set", ())]
     image = image.with_e_banks(e_banks_in([row.name for row in sets] + list(given.get("force", {}))))
