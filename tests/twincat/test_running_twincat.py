@@ -56,6 +56,12 @@ def test_files_have_the_dialect_of_their_tool_if_no_other_is_named(tmp_path: Pat
     assert [plc.dialect for plc in project.plcs] == ["twincat", "standard"]
 
 
+def test_an_import_says_that_none_is_needed(tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, ["import", str(write_project(tmp_path)), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "Plant.plcproj needs no import: `fbvm check" in " ".join(done.output.split())
+
+
 @pytest.mark.slow
 def test_a_mistake_is_shown_at_its_line_of_the_file(tmp_path: Path) -> None:
     project = write_project(tmp_path)

@@ -16,7 +16,7 @@ from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
 from fbvm.interchange.cx.read.importing import import_project
-from fbvm.interchange.formats.given import is_cx_project
+from fbvm.interchange.formats.given import is_cx_project, usual_dialect
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
 
@@ -40,6 +40,9 @@ def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: st
 
     Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
     blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
+    if usual_dialect([file]) == "twincat":
+        raise click.UsageError(f"{file} needs no import: `fbvm check {file}` and all other verbs on programs take TwinCAT's "
+                               "files as they are")  # fmt: skip
     if not is_cx_project(file):
         made = import_xml(file, order=order or "")
     else:
