@@ -75,7 +75,7 @@ class ExpressionLayout:
         return []
 
     def one(self, item: Any) -> list[Any]:
-        return [item]
+        return self.add([], item)
 
     def add(self, items: list[Any], item: Any) -> list[Any]:
         items.append(self.leaf(item) if isinstance(item, Token) else item)

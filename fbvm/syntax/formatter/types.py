@@ -116,7 +116,11 @@ class TypeLayout(StatementLayout):
 
     # --- types ---
 
-    def type_declaration(self, word: Token, modifiers: list[Leaf], declarations: list[Phrase], end: Token) -> list[Phrase]:
+    def type_declaration(self, word: Token, declarations: list[Phrase], end: Token) -> list[Phrase]:
+        return self.modified_type_declaration(word, [], declarations, end)
+
+    def modified_type_declaration(self, word: Token, modifiers: list[Leaf], declarations: list[Phrase],
+                                  end: Token) -> list[Phrase]:
         words = tuple(part for each in modifiers for part in (" ", each))
         return [Phrase(word.start, self.leaf(word), *words, self.block(declarations, end), HARD, self.leaf(end))]
 

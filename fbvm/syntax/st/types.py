@@ -32,8 +32,11 @@ EnumMember = tuple[Name, Expr | None]
 class Types(Statements):
     """The functions of the rules of types."""
 
-    def type_declaration(self, word: Token, modifiers: list[Token], declarations: list[Declaration],
-                         end: Token) -> list[Declaration]:
+    def type_declaration(self, word: Token, declarations: list[Declaration], end: Token) -> list[Declaration]:
+        return declarations
+
+    def modified_type_declaration(self, word: Token, modifiers: list[Token], declarations: list[Declaration],
+                                  end: Token) -> list[Declaration]:
         return declarations
 
     def type_decl(self, token: Token, colon: Token, spec: TypeSpec, sign: Token | None, initial: Initial | None,
