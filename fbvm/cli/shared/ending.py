@@ -91,7 +91,8 @@ def loading() -> Iterator[None]:
 
 def _end_at_once(number: int, frame: FrameType | None) -> None:
     global _asked
-    _asked = signal.Signals(number)
+    if not by_other_than_ctrl_c():  # else this Ctrl-C is another signal that was passed on
+        _asked = signal.Signals(number)
     sys.stderr.write(f"{sentence()}\n")
     sys.stderr.flush()
     os._exit(exit_status())

@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from depth import times
 
 from fbvm.base.data import data_folder
+from fbvm.base.host import handling
 from fbvm.cli.main import GROUP_OF, main
 from fbvm.cli.shared import ending
 
@@ -180,3 +181,15 @@ def test_what_is_held_is_not_left_half_done() -> None:
         done.append(1)
     assert done == [1]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@needs_signals
+def test_sigterm_is_named_also_while_the_signals_are_being_taken_over_one_by_one(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`loading` takes SIGINT before SIGTERM: between the two SIGTERM is passed on as a Ctrl-C to it."""
+    ended: list[int] = []
+    monkeypatch.setattr(ending.os, "_exit", ended.append)
+    with ending.heard(), handling([signal.SIGINT], ending._end_at_once):
+        signal.raise_signal(signal.SIGTERM)
+    assert (ended, capsys.readouterr().err) == ([143], "terminated\n")
