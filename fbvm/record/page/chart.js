@@ -3,6 +3,7 @@
 const RULER = 38, LANE = 18;
 const PICTURE_MS = 8, LABELS_MS = 4;
 const FEW_PARTS = 8;
+const NAMES = 8;
 
 class Chart {
   constructor(run, state, move) {
@@ -36,7 +37,7 @@ class Chart {
 
   // --- what is chosen
 
-  /** Takes the signals that the filter lets through, and makes their names. */
+  /** Takes the signals that the filter lets through; `values` makes the rows with their names. */
   choose() {
     const words = this.state.filter.toLowerCase().split(/\s+/).filter(Boolean), start = this.run.place(Math.floor(this.state.start));
     const end = this.run.place(Math.ceil(this.state.start + this.state.span) - 1) + 1;
@@ -47,7 +48,7 @@ class Chart {
       signal.column.extremes(start, end);
       return signal.column.least !== signal.column.most;
     });
-    this.labels.replaceChildren(...this.shown.map((number, at) => this.label(number, at)));
+    this.labels.replaceChildren();
     this.labels.style.top = `${this.head}px`;
     this.spacer.style.height = `${this.head + this.shown.length * ROW}px`;
   }
@@ -76,18 +77,30 @@ class Chart {
     return row;
   }
 
-  /** Writes the values at the cursor beside the names: of the rows in view at once, of the others when there is time. */
+  /** Writes the values at the cursor beside the names: of the rows in view at once, of the others, and these themselves, when
+   * there is time; true if some are left. */
   values(moved) {
     const rows = this.labels.children, top = Math.floor(this.scroll.scrollTop / ROW), seen = Math.ceil(this.scroll.clientHeight / ROW);
+    const until = performance.now() + LABELS_MS;
+    this.name(top + seen + 1);
     if (moved) this.old = new Set(rows);
     for (let at = top; at <= top + seen && at < rows.length; at++) this.write(rows[at]);
-    const until = performance.now() + LABELS_MS;
     for (const row of this.old) {
       if (performance.now() > until) break;
       this.write(row);
     }
-    return this.old.size > 0;
+    while (rows.length < this.shown.length && performance.now() < until) this.name(rows.length + NAMES);
+    return !this.isWritten;
   }
+
+  /** Makes the rows before number `end` that are not there. */
+  name(end) {
+    const made = this.shown.slice(this.labels.children.length, end).map((number, at) => this.label(number, this.labels.children.length + at));
+    for (const row of made) this.old.add(row);
+    this.labels.append(...made);
+  }
+
+  get isWritten() { return this.old.size === 0 && this.labels.children.length === this.shown.length; }
 
   write(row) {
     if (!this.old.delete(row)) return;

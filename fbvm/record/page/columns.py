@@ -11,8 +11,11 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import compress
 from math import isfinite
 from mmap import mmap
+from operator import ne
+from struct import Struct
 
 from fbvm.base.areas import FLAG_AREAS, PAGE_BYTES, Area
 from fbvm.base.memory import FORMATS
@@ -24,11 +27,15 @@ LINE = 512
 """Bytes that are compared and kept together."""
 MOST_HELD_BYTES = 64 << 20
 """Of the scans of a block; then it ends earlier."""
+_PAGE_LINES = PAGE_BYTES // LINE
+_SPLIT = Struct(f"{LINE}s" * _PAGE_LINES)
+"""Splits a page into its lines."""
 LATEST_CHANGES = 64
 """Scans that are known for each cell in which it changed."""
 _EXTREMES = {BIT: (0, 1), TEXT: (0, 1)}
 """The least and the greatest value of cells of which nobody wants to know more than that they changed."""
 _LETTERS = {BIT: "B", TEXT: "I"} | {code: FORMATS[code] for code in SIZES if code not in (BIT, TEXT)}
+_UNSIGNED = {2: "H", 4: "I", 8: "Q"}
 
 
 @dataclass
@@ -91,16 +98,22 @@ class Columns:
         self.streams: list[bytes] = []
         self._wanted, self._text, self._watched = list(dict.fromkeys(cells)), text, watched
         self._areas = [area for area in areas if area.unit_bits == 16 and area.name not in FLAG_AREAS]
+        self._area_lines = {line for area in self._areas
+                            for line in range(area.offset // LINE, (area.offset + area.size_bytes - 1) // LINE + 1)}
         self._numbers: dict[Cell, int] = {}
         self._at: dict[int, list[int]] = {}
         """Columns by the bytes that they lie in."""
-        self._pages: list[bytes] = []
+        self._views: list[memoryview] = []
+        """The pages of the memory as it is now."""
+        self._pages: list[bytearray] = []
+        """The pages as they were after the last scan."""
+        self._known: dict[int, tuple[bytes, ...]] = {}
+        """The lines of those pages that have ever changed."""
         self._lines: dict[int, tuple[bytes, list[int], list[bytes]]] = {}
         """Of each line that changed in this block: what it was before, places of scans in the block, what it was from then on."""
         self._times = array("q")
         self._moved: set[int] = set()
         """The lines that changed in this scan."""
-        self._scan = 0
 
     def __len__(self) -> int:
         """The number of scans."""
@@ -112,14 +125,10 @@ class Columns:
 
     def add(self, moment: Moment) -> None:
         """Takes the end of a scan."""
-        memory = moment.memory.map
         if not self._pages:
             self._begin(moment)
-        self._scan = moment.scans
-        for number, known in enumerate(self._pages):
-            page = memory[number * PAGE_BYTES:(number + 1) * PAGE_BYTES]
-            if page != known:
-                self._page(number, known, page)
+        for number in compress(range(len(self._pages)), map(ne, self._pages, self._views)):
+            self._page(number)
         for texts in self.texts.values():
             texts.add(moment, self._moved, self._text)
         self._moved.clear()
@@ -131,14 +140,15 @@ class Columns:
         """Ends the last block."""
         if self._times:
             self._end_block()
-        self._pages = []
+        self._views, self._pages, self._known = [], [], {}
 
     # --- a block --------------------------------------------------------------------------------------------------------
 
     def _begin(self, moment: Moment) -> None:
         memory = moment.memory.map
         self.first = moment.scans
-        self._pages = [memory[at:at + PAGE_BYTES] for at in range(0, moment.memory.size, PAGE_BYTES)]
+        self._views = [moment.memory.u8[at:at + PAGE_BYTES] for at in range(0, moment.memory.size, PAGE_BYTES)]
+        self._pages = [bytearray(view) for view in self._views]  # comparing one with a view of bytes copies nothing
         self._new_column(Cell("i64", -1), moment.now_ns.to_bytes(8, "little"))
         for cell in self._wanted:
             if cell.code == TEXT:
@@ -161,26 +171,29 @@ class Columns:
                 self._at.setdefault(at, []).append(number)
         return number
 
-    def _page(self, number: int, known: bytes, page: bytes) -> None:
+    def _page(self, number: int) -> None:
         """Notes the lines of a page that are others now."""
-        self._pages[number] = page
-        first = number * (PAGE_BYTES // LINE)
-        for at in range(0, PAGE_BYTES, LINE):
-            line = page[at:at + LINE]
-            if line != (before := known[at:at + LINE]):
-                self._moved.add(first + at // LINE)
-                _, places, lines = self._lines.setdefault(first + at // LINE, (before, [], []))
-                places.append(len(self._times))
-                lines.append(line)
+        page, place, first = self._pages[number], len(self._times), number * _PAGE_LINES
+        before = self._known.get(number) or _SPLIT.unpack(page)
+        page[:] = self._views[number]
+        self._known[number] = now = _SPLIT.unpack(page)
+        for at in compress(range(_PAGE_LINES), map(ne, before, now)):
+            line = first + at
+            self._moved.add(line)
+            known = self._lines.get(line)
+            if known is None:
+                known = self._lines[line] = (before[at], [], [])
+            known[1].append(place)
+            known[2].append(now[at])
 
     def _end_block(self) -> None:
         count = len(self._times)
         touched, lines = {0}, dict[int, _Lines]()
         for number, (before, places, changed) in sorted(self._lines.items()):
-            line = lines[number] = _Lines(before, places, changed, count)
-            for at in line.changed:
+            lines[number] = _Lines(before, places, changed, count)
+            for at in lines[number].changed() if number in self._area_lines else ():
                 self._word(number * LINE + at, before)
-                touched.update(self._at.get(number * LINE + at, ()))
+            touched.update(*(self._at.get(at, ()) for at in range(number * LINE, (number + 1) * LINE)))
         for number in sorted(touched | set(self.texts)):
             self._end_column(number, self._values(number, lines, count))
         self.blocks.append(count)
@@ -211,6 +224,9 @@ class Columns:
         if size == 1:
             column = self._bytes(cell.offset, lines, count)
             return column.translate(_bits(cell.bit)) if cell.code == BIT else column
+        line = lines.get(cell.offset // LINE)
+        if line and cell.offset % size == 0:
+            return line.elements(cell.offset % LINE, size)
         made = bytearray(size * count)
         for at in range(size):
             made[at::size] = self._bytes(cell.offset + at, lines, count)
@@ -221,7 +237,7 @@ class Columns:
         line = lines.get(at // LINE)
         if line:
             return line.column(at % LINE)
-        return self._pages[at // PAGE_BYTES][at % PAGE_BYTES:at % PAGE_BYTES + 1] * count
+        return bytes(self._pages[at // PAGE_BYTES][at % PAGE_BYTES:at % PAGE_BYTES + 1]) * count
 
     def _end_column(self, number: int, values: bytes) -> None:
         column, block = self.columns[number], len(self.blocks)
@@ -280,17 +296,23 @@ class _Lines:
         whole = [before] * places[0]
         for line, start, end in zip(lines, places, [*places[1:], count], strict=True):
             whole += [line] * (end - start)
-        self._before, self._count, self._whole = before, count, b"".join(whole)
-        moved, number = 0, int.from_bytes(before, "little")
-        for line in lines:
-            moved |= number ^ int.from_bytes(line, "little")  # a byte that was never another than at first is 0 here
-        self.changed = [at for at, byte in enumerate(moved.to_bytes(LINE, "little")) if byte]
+        self._before, self._distinct, self._whole = before, lines, b"".join(whole)
+
+    def changed(self) -> list[int]:
         """The bytes of the line that are not the same all the time."""
-        self._moved = frozenset(self.changed)
+        moved, number = 0, int.from_bytes(self._before, "little")
+        for line in self._distinct:
+            moved |= number ^ int.from_bytes(line, "little")  # a byte that was never another than at first is 0 here
+        return [at for at, byte in enumerate(moved.to_bytes(LINE, "little")) if byte]
 
     def column(self, at: int) -> bytes:
         """What byte `at` was."""
-        return self._whole[at::LINE] if at in self._moved else self._before[at:at + 1] * self._count
+        return self._whole[at::LINE]
+
+    def elements(self, at: int, size: int) -> bytes:
+        """What the element of `size` bytes at `at`, a multiple of its size, was."""
+        elements: memoryview = memoryview(self._whole).cast(_UNSIGNED[size])  # type: ignore[call-overload]
+        return elements[at // size :: LINE // size].tobytes()
 
 
 def _filled(column: Column, blocks: int) -> Iterator[Entry]:
@@ -343,8 +365,8 @@ def _numbers(values: bytes, code: str) -> list[float]:
 
 def _extremes(values: bytes, code: str) -> tuple[float, float]:
     """The least and the greatest of some numbers, infinities and what is no number left out."""
-    numbers = _numbers(values, code)
-    low, high = min(numbers), max(numbers)
+    numbers = sorted(_numbers(values, code))  # most go up and down in long runs, which is quicker than a look for each end
+    low, high = numbers[0], numbers[-1]
     if code in ("f32", "f64") and not all(map(isfinite, numbers)):
         finite = [number for number in numbers if isfinite(number)] or [0.0]
         return min(finite), max(finite)

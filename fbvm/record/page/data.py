@@ -27,7 +27,7 @@ from fbvm.record.trace.scan_source import Moment, ScanSource
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import UnknownPlace
 
-MOST_ROWS = 32_000
+MOST_ROWS = 24_000
 """Rows of statements and phases that a page carries, about; a program of 400 statements has some 800 rows a scan."""
 PROBED_SCANS = 4
 """The last scans, whose rows say about how many a scan has."""
@@ -128,16 +128,15 @@ def _windows(source: ScanSource, insides: Insides, scans: range, inside: Sequenc
     """What happened inside the scans for which there is room."""
     if source.depth is Depth.SCANS or not scans:
         return []
-    chosen = [scans]
-    if len(scans) > PROBED_SCANS:
-        probe = insides.window(scans[-PROBED_SCANS:], MOST_ROWS)
-        rows = max(map(len, probe.rows.values()), default=1)
-        chosen = chosen_windows(scans, max(PROBED_SCANS, MOST_ROWS // rows), inside, changes)
+    if len(scans) <= PROBED_SCANS:
+        return [window for window in [insides.window(scans, MOST_ROWS)] if window.scans]
+    probe = insides.window(scans[-PROBED_SCANS:], MOST_ROWS)
+    rows = max(map(len, probe.rows.values()), default=1)
     made: list[Window] = []
     room = MOST_ROWS
-    for window in reversed(chosen):
-        made.insert(0, insides.window(window, max(1, room)))
-        room -= sum(map(len, made[0].rows.values()))
+    for piece in reversed(chosen_windows(scans, max(PROBED_SCANS, MOST_ROWS // rows), inside, changes)):
+        made.insert(0, insides.window(piece, max(1, room), probe if piece.stop == scans.stop else None))
+        room -= made[0].count
         if room <= 0:
             break
     return [window for window in made if window.scans]

@@ -59,14 +59,22 @@ class Insides:
         self.sites: dict[int, int] = {}
         """Statements that occur, by site, and the numbers that they have on the page."""
         self.pictures: list[str] = []
+        self._located: dict[tuple[int, int], tuple[int, int]] = {}
         self._drawings: dict[tuple[object, ...], int] = {}
         self._at: dict[int, list[int]] = {}
         for number, signal in enumerate(signals):
             for offset in range(signal.place.offset, signal.place.offset + max(1, signal.place.type.size)):
                 self._at.setdefault(offset, []).append(number)
 
-    def window(self, scans: range, most_rows: int) -> Window:
-        """What happened inside these scans; if there are more rows, in the latest of them."""
+    def window(self, scans: range, most_rows: int, end: Window | None = None) -> Window:
+        """What happened inside these scans; if there are more rows, in the latest of them.  `end` is what is known already of
+        the last ones."""
+        if end is not None and end.scans:
+            if end.scans.start <= scans.start:
+                return end
+            made = self.window(range(scans.start, end.scans.start), max(1, most_rows - end.count))
+            made.append(end)
+            return made
         made = Window(self, self._source, most_rows)
         begin = scans.start - 1 if scans.start > self._source.scans.start else scans.start
         made.shown_from = scans.start
@@ -84,9 +92,13 @@ class Insides:
 
     # --- asked by a window ----------------------------------------------------------------------------------------------
 
-    def site(self, number: int) -> int:
-        """The number of a statement on the page."""
-        return self.sites.setdefault(number, len(self.sites))
+    def located(self, site: int, base: int) -> tuple[int, int]:
+        """The numbers that a statement and the instance that begins at a byte have on the page."""
+        known = self._located.get((site, base))
+        if known is None:
+            where = self.sites.setdefault(site, len(self.sites)) if site >= 0 else site
+            known = self._located[site, base] = where, self.instance(base)
+        return known
 
     def instance(self, base: int) -> int:
         """The number of the instance that begins at a byte."""
@@ -141,13 +153,20 @@ class Window:
         self._memory: Snapshot | None = None
         self._statement: tuple[int, Frame] | None = None
         self._row: list[Any] | None = None
-        self._count = 0
+        self.count = 0
+        """The number of rows that are kept."""
         self._lead_in = 0
 
     @property
     def scans(self) -> range:
         """The scans whose rows are kept."""
         return range(next(iter(self.rows)), next(reversed(self.rows)) + 1) if self.rows else range(0)
+
+    def append(self, following: Window) -> None:
+        """Adds what is known of the scans behind these."""
+        self.rows.update(following.rows)
+        self.ladder.update(following.ladder)
+        self.count += following.count
 
     def phase(self, moment: Moment, phase: Phase) -> None:
         """Records changes that no statement has made."""
@@ -170,13 +189,12 @@ class Window:
         if self._has_pictures:
             self._power.event(moment, event)
             self._chart_recorder.event(moment, event)
-        if isinstance(event, Statement):
-            self._statement, self._row = (event.site, event.frame), None
+        if type(event) is Statement:
+            self._statement = event.site, event.frame
             self._open(moment, event.site, event.frame)
-        elif isinstance(event, Contact):
-            self._add(moment.scans, [self._insides.site(event.site), self._insides.instance(event.frame.base), POWER,
-                                     str(int(event.value))])  # fmt: skip
-        elif isinstance(event, Write) and event.old != event.value:
+        elif type(event) is Contact:
+            self._add(moment.scans, [*self._insides.located(event.site, event.frame.base), POWER, str(int(event.value))])
+        elif type(event) is Write and event.old != event.value:
             if self._statement != (event.site, event.frame) or self._row is None:
                 self._statement = event.site, event.frame
                 self._open(moment, event.site, event.frame)
@@ -184,8 +202,7 @@ class Window:
             self._row += self._insides.new_values(self._known, self._insides.written(event), moment)
 
     def _open(self, moment: Moment, site: int, frame: Frame) -> None:
-        where = self._insides.site(site) if site >= 0 else site
-        self._row = [where, self._insides.instance(frame.base)]
+        self._row = [*self._insides.located(site, frame.base)]
         self._add(moment.scans, self._row)
 
     def _add(self, scan: int, row: list[Any]) -> None:
@@ -195,16 +212,18 @@ class Window:
                 self._lead_in = 0
                 raise TooManyRows(scan)
             return
-        rows = self.rows.setdefault(scan, [])
+        if scan not in self.rows:
+            self.rows[scan] = []
+        rows = self.rows[scan]
         if len(rows) >= MOST_IN_SCAN:
-            self._count -= len(rows) - FIRST_IN_SCAN
+            self.count -= len(rows) - FIRST_IN_SCAN
             del rows[FIRST_IN_SCAN:]
             raise TooManyRows(scan)
         rows.append(row)
-        self._count += 1
-        while self._count > self._most_rows and len(self.rows) > 1:
+        self.count += 1
+        while self.count > self._most_rows and len(self.rows) > 1:
             gone, rows = self.rows.popitem(last=False)
-            self._count -= len(rows)
+            self.count -= len(rows)
             self.ladder.pop(gone, None)
 
     # --- drawings -------------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ function start(data, bytes) {
   const panels = {scan: new ScanPanel(run, state, move), memory: new MemoryPanel(run, state, move),
                   frames: new FramesPanel(run, state, move)};
   const where = document.getElementById("where");
-  let waiting = 0, choose = true, shown = null, naming = 0, took = 0;
+  let waiting = 0, writing = 0, choose = true, shown = null, naming = 0, took = 0;
 
   /** Changes the state and has everything drawn anew with the next picture. */
   function move(change) {
@@ -54,8 +54,14 @@ function start(data, bytes) {
     }
     clearTimeout(naming);
     naming = setTimeout(() => history.replaceState(null, "", `#${state.scan}`), 200);
-    if (isRough || later) move({});
+    if (isRough) move({});
+    else if (later) writing ||= requestAnimationFrame(write);
     took = performance.now() - begun;
+  }
+
+  /** Goes on with the rows beside the chart for which there was no time; the chart itself stays. */
+  function write() {
+    writing = chart.values(false) ? requestAnimationFrame(write) : 0;
   }
 
   /** A step inside the scan; behind the last one comes the next scan. */
@@ -108,7 +114,7 @@ function start(data, bytes) {
   move({scan: Number.isFinite(wanted) ? wanted : data.pinned.length ? run.last : run.first});
   draw();
   // for those who measure or test the page
-  window.fbvm = {move, count: run.count, drawn: () => took, written: () => !waiting && chart.old.size === 0, opened: performance.now()};
+  window.fbvm = {move, count: run.count, drawn: () => took, written: () => !waiting && chart.isWritten, opened: performance.now()};
 }
 
 try {

@@ -116,7 +116,7 @@ class ScanListener:
             self._follower.phase(self._at(plc, plc.scans), phase)
 
     def event(self, plc: Plc, event: Event) -> None:
-        self._follower.event(self._at(plc, plc.scans), event)
+        self._follower.event(self._moment, event)  # which the phase before has set
 
     def passed(self, now_ns: int, unit: str, event: TapEvent) -> None:
         """Passes on an event of the network."""
