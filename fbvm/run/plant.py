@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from ipaddress import IPv4Address
 
@@ -62,13 +62,13 @@ class Plant:
     """The PLCs of a project, compiled, connected and ready for `run_all`.
 
     `net` ("loop" or "tcp") takes the place of the file's; `for_ns` and `scans`, if one is given, take the place of the file's
-    bounds for PLCs that have no end of their own; `wanted` says which warnings are shown.  Mistakes of the project are in
-    `diagnostics`; if there is an error, the plant is closed.  Raises OSError if the host's network cannot be used, or not by a
-    door."""
+    bounds for PLCs that have no end of their own; `wanted` says which warnings are shown.  `images`, by the names of rows, are
+    programs that are compiled already: no source is read for them.  Mistakes of the project are in `diagnostics`; if there is an
+    error, the plant is closed.  Raises OSError if the host's network cannot be used, or not by a door."""
 
     def __init__(
         self, project: Project, *, net: str | None = None, for_ns: int | None = None, scans: int | None = None,
-        wanted: Wanted = ANY,
+        wanted: Wanted = ANY, images: Mapping[str, Image] | None = None,
     ) -> None:  # fmt: skip
         self.project, self._wanted = project, wanted
         self.diagnostics: list[Diagnostic] = []
@@ -80,7 +80,7 @@ class Plant:
         self.for_ns = for_ns if given else project.for_ns
         self.scans = scans if given else project.scans
         for kind in self.kinds:
-            image = self._image(kind.row)
+            image = images[kind.row.name] if images else self._image(kind.row)
             if image:
                 self._build(kind, image)
         if (net or project.net) != project.net:
@@ -207,17 +207,17 @@ class Plant:
     def _writes(self, plc: Plc, sets: Iterable[SetRow], where: Path) -> Iterator[TimedWrite]:
         for number, row in enumerate(sets):
             try:
-                yield TimedWrite(found := plc.find(row.name), _value(found, row.value), row.at_ns)
+                yield TimedWrite(found := plc.find(row.name), value_for(found, row.value), row.at_ns)
             except (LookupError, TypeError, ValueError) as error:
                 self._report((*where, "set", number), str(error))
 
 
-def _value(where: Place | Span, written: object) -> object:
+def value_for(where: Place | Span, written: object) -> object:
     """A value of TOML as one of the type of `where`; texts are read as literals of a program.  Raises ValueError, TypeError."""
     if isinstance(where, Span):
         if not isinstance(written, list) or len(written) != len(where.places):
             raise ValueError(f"{where.name} takes a list of {len(where.places)} values")
-        return [_value(place, item) for place, item in zip(where.places, written, strict=True)]
+        return [value_for(place, item) for place, item in zip(where.places, written, strict=True)]
     if isinstance(written, str):
         return parse_value(where.type, written, where.name)
     return conform(where.type, written, where.name)

@@ -47,10 +47,11 @@ Keys = Mapping[str, Key]
 
 @dataclass
 class Reading:
-    """One file that is being read; its mistakes come into `diagnostics`."""
+    """One file that is being read, of `kind`; its mistakes come into `diagnostics`."""
 
     source: Source
     diagnostics: list[Diagnostic] = field(default_factory=list)
+    kind: str = "project"
 
     def load(self) -> dict[str, Any]:
         """The file as Python reads TOML; {} and a diagnostic if it is no TOML."""
@@ -76,7 +77,7 @@ class Reading:
             if name not in keys:
                 near = get_close_matches(name, keys, 1)
                 hint = f"did you mean {near[0]}?" if near else f"keys are {', '.join(keys)}"
-                self.report("P0102", (*path, name), f"{_called((*path, name))} is no key of a project", hint)
+                self.report("P0102", (*path, name), f"{_called((*path, name))} is no key of a {self.kind}", hint)
         return {name: self._value(written, name, key, (*path, name)) for name, key in keys.items()}
 
     def _value(self, table: Mapping[str, Any], name: str, key: Key, path: Path) -> Any:
@@ -212,6 +213,29 @@ def one_of(names: Sequence[str]) -> Kind:
 def kind_of_text(called: str, value: Callable[[object], str]) -> Kind:
     """A text of which `value` says what is wrong by ValueError."""
     return Kind(called, value)
+
+
+def one_or_more(kind: Kind) -> Kind:
+    """A value of a kind, or a list of such values; it becomes a tuple."""
+
+    def value_of(value: object) -> tuple[Any, ...]:
+        if isinstance(value, list) and not value:
+            raise ValueError("a list without a value says nothing")
+        return tuple(kind.value(item) for item in (value if isinstance(value, list) else [value]))
+
+    return Kind(f"{kind.called}, or a list of such", value_of)
+
+
+def first_and_last(kind: Kind) -> Kind:
+    """A value of a kind, or a list of two, the first and the last of a range."""
+
+    def value_of(value: object) -> tuple[Any, Any]:
+        found = [kind.value(item) for item in (value if isinstance(value, list) else [value, value])]
+        if len(found) != 2 or found[0] > found[1]:
+            raise ValueError(f"{value!r} is no range; write [first, last]")
+        return found[0], found[1]
+
+    return Kind(f"{kind.called}, or a list of two, the first and the last", value_of)
 
 
 text = Kind("a text", _text)

@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
@@ -16,13 +15,13 @@ from fbvm.interchange.formats.given import inputs
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.recording.recording import Recording
 from fbvm.run.plant import Kind, Plant
+from fbvm.run.plc_names import PlcNames
 from fbvm.run.project import FILE, Project, read_project
 from fbvm.syntax.text import read
 from fbvm.testing.rig import DEFAULT_LIMIT, Rig, to_ns
 from fbvm.testing.subject import Subject, SubjectError
 from fbvm.watch.conditions import parse_condition
-from fbvm.watch.paths import Place, UnknownPlace
-from fbvm.watch.values import Value, show_time
+from fbvm.watch.values import show_time
 
 
 class PlantRig:
@@ -113,25 +112,9 @@ class PlantRig:
         if callable(condition):
             function = condition
             return lambda: bool(function(self))
-        owners: dict[Place, tuple[Rig, Place]] = {}
-
-        def find(text: str) -> Place:
-            name, _, path = text.partition(".")
-            if name not in self.rigs:
-                raise UnknownPlace(f"{text} begins with the name of no PLC; there is {', '.join(self.rigs)}")
-            place = self.rigs[name].find(path)
-            if not isinstance(place, Place):
-                raise UnknownPlace(f"{text} is a range; name one place")
-            made = replace(place, name=text)
-            owners[made] = self.rigs[name], place
-            return made
-
-        def value(place: Place) -> Value:
-            rig, own = owners[place]
-            return rig.plc.read(own)
-
-        parsed = parse_condition(condition, find)
-        return lambda: parsed.holds(value)
+        names = PlcNames({name: (rig.find, rig.plc.read) for name, rig in self.rigs.items()})
+        parsed = parse_condition(condition, names.find)
+        return lambda: parsed.holds(names.read)
 
 
 def project_near(folders: Sequence[Path], named: str) -> Path:
