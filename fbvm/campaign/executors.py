@@ -1,0 +1,56 @@
+"""Who executes the tasks of a campaign: this process, or several of this machine.
+
+An executor is used in a `with` statement; `done` gives back each task with what came of it, None for one that ends its
+process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import Protocol
+
+from fbvm.campaign.processes import Crashed, Late, Pool
+from fbvm.campaign.work import Bench, Done, Task
+
+LIMIT_NS = 600_000_000_000
+"""How long a task may take.  Scans have a budget of statements, so only what hangs itself takes longer."""
+
+
+class Executor(AbstractContextManager["Executor"], Protocol):
+    """Does tasks."""
+
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
+        """Each task with what came of it, in the order in which they end."""
+
+
+class InThisProcess(Executor):
+    """Does one task after the other, in this process."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Nothing to give back."""
+
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
+        for task in tasks:
+            yield task, self._bench.work(0, task)
+
+
+class InProcesses(Executor):
+    """Does so many tasks at once, each in a process of its own."""
+
+    def __init__(self, bench: Bench, jobs: int) -> None:
+        self._pool = Pool[Task, Done](jobs, bench.prepare, bench.work)
+
+    def __enter__(self) -> InProcesses:
+        self._pool.__enter__()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._pool.__exit__(kind, error, trace)
+
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
+        for task, found in self._pool.results(tasks, LIMIT_NS):
+            yield task, None if isinstance(found, Late | Crashed) else found

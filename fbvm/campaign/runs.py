@@ -1,0 +1,106 @@
+"""Executes the runs of a campaign; the results are the same whoever executes them, and in whatever order they come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from fbvm.campaign.execution import Result
+from fbvm.campaign.executors import Executor, InProcesses, InThisProcess
+from fbvm.campaign.groups import Group, grouped
+from fbvm.campaign.judge import CRASHED, Failure
+from fbvm.campaign.plan import Plan
+from fbvm.campaign.shrinking import Shrunk
+from fbvm.campaign.work import Batch, Bench, Shrinking, Task
+from fbvm.run.time_limit import stopwatch
+
+BATCH_NS = 200_000_000
+"""About how long a batch takes; to send one costs half a millisecond."""
+MOST_IN_BATCH = 500
+QUICK_NS = 1_000_000_000
+"""What takes less time is done in this process: others take about as long to begin."""
+MOST_SHRUNK = 20
+"""Groups whose first run is made smaller."""
+
+
+@dataclass
+class Outcome:
+    """What came of a campaign so far."""
+
+    plan: Plan
+    results: dict[int, Result] = field(default_factory=dict)
+    shrunk: dict[int, Shrunk] = field(default_factory=dict)
+    """The smallest failing runs, by the number of the first run of their group."""
+    failing: int = 0
+    """How many runs failed."""
+
+    def add(self, results: Sequence[Result]) -> None:
+        """Takes further results."""
+        self.results.update((result.number, result) for result in results)
+        self.failing += sum(result.failure is not None for result in results)
+
+    @property
+    def rows(self) -> list[Result]:
+        """The results in the order of their numbers."""
+        return [self.results[number] for number in sorted(self.results)]
+
+    @property
+    def groups(self) -> list[Group]:
+        """The groups of failing runs; those with most runs come first."""
+        found = grouped(self.results)
+        for group in found:
+            group.shrunk = self.shrunk.get(group.first)
+        return found
+
+    @property
+    def left(self) -> list[int]:
+        """The numbers of the runs without a result."""
+        return [number for number in range(self.plan.count) if number not in self.results]
+
+
+def conduct(bench: Bench, outcome: Outcome, jobs: int, take: Callable[[Sequence[Result]], None],
+            others: Executor | None = None, *, shrinks: bool = True) -> None:  # fmt: skip
+    """Executes the runs that have no result in `outcome`; then, if it `shrinks`, makes the first run of each group of failures
+    smaller.
+
+    `take` is called with results as they come, and enters them.  `others` execute runs, else `jobs` processes of this machine, or
+    this process if that is quicker.  What is in `outcome` at a KeyboardInterrupt is good.
+
+    Raises Wrong for a project that cannot be executed; ConditionError, LookupError, TypeError and ValueError for names and
+    conditions that do not fit its programs."""
+    left, elapsed = outcome.left, stopwatch()
+    if left:
+        take([bench.execution().result(bench.variant(left.pop(0)))])  # and what does not fit is found here
+    once_ns = elapsed()
+    if others is None and (jobs == 1 or once_ns * len(left) < QUICK_NS):
+        others, size = InThisProcess(bench), 1
+    else:
+        others = others or InProcesses(bench, jobs)
+        size = max(1, min(BATCH_NS // max(once_ns, 1), MOST_IN_BATCH, len(left) // jobs))
+    with others:
+        _execute(others, left, size, take)
+        if shrinks:
+            _shrink(others, outcome)
+
+
+def _execute(executor: Executor, numbers: Sequence[int], size: int, take: Callable[[Sequence[Result]], None]) -> None:
+    """Executes runs in batches.  Of a batch that has ended its process each run is tried alone."""
+    batches: list[Task] = [Batch(tuple(numbers[at : at + size])) for at in range(0, len(numbers), size)]
+    alone: list[Task] = []
+    for task, found in executor.done(batches):
+        assert isinstance(task, Batch)
+        if isinstance(found, list):
+            take(found)
+        else:
+            alone += [Batch((number,)) for number in task.numbers]
+    for task, found in executor.done(alone):
+        assert isinstance(task, Batch)
+        ended = [Result(number, failure=Failure(CRASHED, "the process of the run ended")) for number in task.numbers]
+        take(found if isinstance(found, list) else ended)
+
+
+def _shrink(executor: Executor, outcome: Outcome) -> None:
+    groups = [group for group in outcome.groups if group.failure.kind != CRASHED][:MOST_SHRUNK]
+    for task, found in executor.done([Shrinking(outcome.results[group.first]) for group in groups]):
+        if isinstance(task, Shrinking) and isinstance(found, Shrunk):
+            outcome.shrunk[task.result.number] = found

@@ -1,0 +1,129 @@
+"""The results of a campaign in a folder: lines that are added while it runs, from which it is resumed, and a table at its end."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import fbvm
+from fbvm.base.files import write_file
+from fbvm.campaign.execution import Result
+from fbvm.campaign.judge import Failure
+from fbvm.campaign.plan import Plan
+from fbvm.campaign.runs import Outcome
+from fbvm.campaign.variants import draw
+
+LINES, TABLE = "results.jsonl", "results.csv"
+FORMAT = 1
+
+
+class OtherCampaign(Exception):
+    """The folder holds results of another campaign; the message says so."""
+
+
+class Store:
+    """The file of results of a folder, which is made if it is missing.  `mark` stands for all that results depend on.
+
+    Raises OtherCampaign for a file with results of anything else, OSError."""
+
+    def __init__(self, folder: Path, mark: str) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / LINES
+        self.known: list[Result] = []
+        """The results that are there."""
+        head = {"format": FORMAT, "fbvm": fbvm.__version__, "campaign": mark}
+        if path.exists():
+            self._file: BinaryIO = open(path, "r+b")  # noqa: SIM115 - close closes it
+            self._resume(head)
+        else:
+            self._file = open(path, "wb")  # noqa: SIM115
+        if not self._file.tell():
+            self._write(head)
+
+    def _resume(self, head: dict[str, Any]) -> None:
+        """Reads the whole lines that there are; what a crash has cut off is written over."""
+        good = 0
+        for number, line in enumerate(self._file):
+            if not line.endswith(b"\n"):
+                break
+            try:
+                read = json.loads(line)
+                if number:
+                    self.known.append(result_of(read))
+            except (ValueError, TypeError, KeyError):
+                break
+            if not number and read != head:
+                self._file.close()
+                raise OtherCampaign("holds results of another campaign, another program or another version of fbvm")
+            good += len(line)
+        self._file.seek(good)
+        self._file.truncate()
+
+    def add(self, results: Sequence[Result]) -> None:
+        """Keeps results.  They are in the file when this returns."""
+        for result in results:
+            self._write(asdict(result))
+        self._file.flush()
+
+    def _write(self, row: dict[str, Any]) -> None:
+        self._file.write(json.dumps(row, allow_nan=False).encode() + b"\n")
+
+    def close(self) -> None:
+        """Closes the file."""
+        self._file.close()
+
+
+def result_of(row: dict[str, Any]) -> Result:
+    """The result that a line of the file is.  Raises KeyError, TypeError for anything else."""
+    failure = row["failure"]
+    return Result(int(row["number"]), row["scans"], row["time_ns"], row["memory"], Failure(**failure) if failure else None,
+                  tuple(row["shown"]))  # fmt: skip
+
+
+# --- as a table -------------------------------------------------------------------------------------------------------
+
+
+def columns(plan: Plan) -> list[str]:
+    """The names of the columns of the table."""
+    return ["run", "seed", *(axis.name for axis in plan.axes), "faults", "power", "result", "failed", "plc", "scan", "time_ms",
+            "code", "file", "line", "scans", *plan.shown]  # fmt: skip
+
+
+def rows(outcome: Outcome) -> Iterator[list[Any]]:
+    """The rows of the table, in the order of the runs: the same for the same campaign, whoever has executed it."""
+    plan = outcome.plan
+    for result in outcome.rows:
+        variant, failure = draw(plan, result.number), result.failure
+        values = [axis.text(variant.value(plan, at)) for at, axis in enumerate(plan.axes)]
+        said = [failure.kind, failure.text, failure.plc, failure.scan, _ms(failure.now_ns), failure.code, failure.file,
+                failure.line or ""] if failure else ["good", "", "", "", _ms(result.time_ns), "", "", ""]  # fmt: skip
+        yield [result.number, variant.seed, *values, "; ".join(map(str, variant.faults)), "; ".join(map(str, variant.cuts)),
+               *said, result.scans, *result.shown]  # fmt: skip
+
+
+def _ms(time_ns: int) -> int | float:
+    return time_ns // 1_000_000 if time_ns % 1_000_000 == 0 else time_ns / 1e6
+
+
+def write_table(path: Path, outcome: Outcome) -> None:
+    """Writes the table as CSV.  Raises OSError."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns(outcome.plan))
+    writer.writerows(rows(outcome))
+    write_file(path, text.getvalue())
+
+
+def write_parquet(path: Path, outcome: Outcome) -> None:
+    """Writes the table as Parquet.  Raises ImportError without pyarrow, OSError."""
+    import pyarrow  # type: ignore[import-not-found, unused-ignore]
+    from pyarrow import parquet  # type: ignore[import-not-found, unused-ignore]
+
+    names, lines = columns(outcome.plan), list(rows(outcome))
+    table = {name: [line[at] if line[at] != "" else None for line in lines] for at, name in enumerate(names)}
+    parquet.write_table(pyarrow.table(table), path)

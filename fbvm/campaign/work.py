@@ -1,0 +1,90 @@
+"""What a process does for a campaign: executes runs in batches, and makes failing runs small.
+
+Images travel to it, not sources."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import fbvm
+from fbvm.campaign.execution import Execution, Result
+from fbvm.campaign.plan import Plan
+from fbvm.campaign.shrinking import Shrunk, shrink
+from fbvm.campaign.variants import Variant, draw
+from fbvm.code.image import Image
+from fbvm.code.store.encoding import decode, encode
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A task: some runs, by their numbers.  What comes of it is a list of results."""
+
+    numbers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Shrinking:
+    """A task: the failing run that is to be made smaller, by its result."""
+
+    result: Result
+
+
+Task = Batch | Shrinking
+Done = list[Result] | Shrunk
+
+
+class Mismatch(Exception):
+    """A process has another version of fbvm, or has received another program than was sent."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """All that a process needs: the plan, the programs as bytes with their fingerprints by name, and the version of fbvm."""
+
+    plan: Plan
+    images: tuple[tuple[str, str, bytes], ...]
+    version: str
+    mark: str
+    """A hash of all that results depend on."""
+
+    @classmethod
+    def of(cls, plan: Plan, images: Mapping[str, Image]) -> Bench:
+        """The bench of a campaign."""
+        encoded = tuple((name, image.fingerprint, encode(image)) for name, image in images.items())
+        depends = repr((fbvm.__version__, plan, [(name, fingerprint) for name, fingerprint, _ in encoded]))
+        return cls(plan, encoded, fbvm.__version__, hashlib.sha256(depends.encode()).hexdigest())
+
+    def prepare(self, number: int) -> None:
+        """Makes a process ready.  Raises Mismatch."""
+        self.execution()
+
+    def execution(self) -> Execution:
+        """What executes runs in this process.  Raises Mismatch."""
+        if self.version != fbvm.__version__:
+            raise Mismatch(f"this process has fbvm {fbvm.__version__}, not {self.version}")
+        if self.mark not in _executions:
+            images = {}
+            for name, fingerprint, content in self.images:
+                images[name] = decode(content)
+                if images[name].fingerprint != fingerprint:
+                    raise Mismatch(f"{name} has arrived as another program")
+            _executions.clear()
+            _executions[self.mark] = Execution(self.plan, images)
+        return _executions[self.mark]
+
+    def variant(self, number: int) -> Variant:
+        """The run with this number."""
+        return draw(self.plan, number)
+
+    def work(self, number: int, task: Task) -> Done:
+        """Does a task."""
+        execution = self.execution()
+        if isinstance(task, Batch):
+            return [execution.result(self.variant(number)) for number in task.numbers]
+        return shrink(execution, self.variant(task.result.number), task.result)
+
+
+_executions: dict[str, Execution] = {}
+"""Of this process, by the mark of the bench."""
