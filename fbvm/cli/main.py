@@ -37,6 +37,8 @@ VERB_GROUPS = {
     "projects": ("Projects and lessons", {
         "new": "Make a project with a block and its test.",
         "test": "Run the tests of a project.",
+        "campaign": "Run a project many times under faults, and tell in which ways it fails.",
+        "sweep": "Run a program once for each value of its parameters, and print the results.",
         "mutate": "Tell which small mistakes in a project's programs its tests would miss.",
         "learn": "Learn in sixteen lessons what a scan cycle really does.",
     }),

@@ -14,7 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import notice_teller, say_doors, unusable
 from fbvm.cli.shared.project_arguments import check_project_options, read_given_project
-from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run
+from fbvm.cli.shared.run_recording import record_plant, record_run
 from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, scans_in, value_text
 from fbvm.cli.shared.sources import report_diagnostics, show_diagnostic
 from fbvm.cli.shared.terminal import say, say_json
@@ -71,7 +71,7 @@ def run_project(file: Path, context: click.Context) -> int:
         with record_run(context.params, {"project": project.source.name}) as recorded, \
                 RunProgress(None if as_json else first, plant.scans, plant.for_ns) as progress:  # fmt: skip
             if recorded.recording:
-                _record(plant, recorded, context.params)
+                record_plant(plant, recorded.add, context.params)
 
             def tick() -> None:
                 progress.update(first)
@@ -105,15 +105,6 @@ def _run_live(file: Path, net: str | None, options: Mapping[str, Any]) -> None:
 
     origin = project_origin(file, net, lambda run: run, options["for_ns"], options["scans"])
     serve_page(origin, Control(), PageOptions(), {name: options[name] for name in ("journal", "trace", "verify")})
-
-
-def _record(plant: Plant, recorded: RunRecording, options: Mapping[str, Any]) -> None:
-    """Records all PLCs of a plant, each by its name."""
-    for kind in plant.kinds:
-        row = kind.row
-        text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect)
-        for name, run in zip(kind.names, kind.runs, strict=True):
-            recorded.add(name, run.plc, described(run.plc, text, options, row.sources, row.libraries))
 
 
 def _refuse(diagnostics: list[Diagnostic], as_json: bool) -> int:

@@ -29,6 +29,7 @@ from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.selection import select
 from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
+from fbvm.run.plant import Plant
 from fbvm.watch.paths import UnknownPlace
 
 INTERRUPTED_SCANS = 400
@@ -141,6 +142,15 @@ def described(plc: Plc, program: ProgramText, options: Mapping[str, Any], files:
     except UnknownPlace as error:
         raise click.UsageError(str(error)) from None
     return Described(program, statement_lines(plc.image, files, libraries), Depth(options["depth"]), options["selected"])
+
+
+def record_plant(plant: Plant, add: Callable[[str, Plc, Described], object], options: Mapping[str, Any]) -> None:
+    """Has all PLCs of a plant recorded by `add`, each by its name."""
+    for kind in plant.kinds:
+        row = kind.row
+        text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect)
+        for name, run in zip(kind.names, kind.runs, strict=True):
+            add(name, run.plc, described(run.plc, text, options, row.sources, row.libraries))
 
 
 def program_text(files: Sequence[Path], libraries: Sequence[Path], **choices: Any) -> ProgramText:
