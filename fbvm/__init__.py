@@ -13,7 +13,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.2.0.dev0"
+from fbvm.base.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from fbvm.base.diagnostics import Diagnostic as Diagnostic

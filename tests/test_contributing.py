@@ -246,7 +246,7 @@ def test_a_lesson(copy: Copy) -> None:
 def test_the_version_is_said_once_and_alike() -> None:
     project = tomllib.loads((HOUSE / "pyproject.toml").read_text(encoding="utf-8"))
     assert "version" not in project["project"]
-    assert project["tool"]["hatch"]["version"]["path"] == "fbvm/__init__.py"
+    assert project["tool"]["hatch"]["version"]["path"] == "fbvm/base/version.py"
     assert CliRunner().invoke(main, ["--version"]).output == f"fbvm, version {fbvm.__version__}\n"
     changes = (HOUSE / "CHANGELOG.md").read_text(encoding="utf-8")
     released = re.findall(r"^## \[?(\d+\.\d+\.\d+)\]?(.*)$", changes, re.M)

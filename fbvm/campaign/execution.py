@@ -85,19 +85,15 @@ class Execution:
 
     def _execute(self, plant: Plant, runs: Mapping[str, Running], judge: Judge, variant: Variant) -> Seen | None:
         """Scans all PLCs in the order of time, until the end or the first failure."""
-        for kind in plant.kinds:
-            later_ns = phase_ns(self.plan, variant, kind.row.name)
-            for run in kind.runs:
-                run.begin(0)
-                run.due_ns += later_ns
+        self._begin(plant, variant)
         rows = {name: kind.row.name for kind in plant.kinds for name in kind.names}
         cuts = deque(variant.cuts)
+        ends = [run for kind in plant.kinds if kind.row.until is not None for run in kind.runs]
         going = list(runs.values())
-        while going:
+        while going and not (ends and all(run.reason for run in ends)):
             now_ns = min(run.due_ns for run in going)
             if cuts and cuts[0].at_ns <= now_ns:
-                cut = cuts.popleft()
-                self._cut(cut, runs[cut.plc], rows[cut.plc], variant)
+                self._cut(cut := cuts.popleft(), runs[cut.plc], rows[cut.plc], variant)
                 continue
             for run in going:
                 if run.due_ns == now_ns:
@@ -108,6 +104,13 @@ class Execution:
                 return None
             going = [run for run in going if not run.reason]
         return None
+
+    def _begin(self, plant: Plant, variant: Variant) -> None:
+        for kind in plant.kinds:
+            later_ns = phase_ns(self.plan, variant, kind.row.name)
+            for run in kind.runs:
+                run.begin(0)
+                run.due_ns += later_ns
 
     def _cut(self, cut: Cut, run: Running, row: str, variant: Variant) -> None:
         """Takes the power from a PLC.  Parameters of its beginning are written again: they are part of the program."""

@@ -10,8 +10,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import fbvm
 from fbvm.base.files import write_file
+from fbvm.base.version import VERSION
 from fbvm.campaign.execution import Result
 from fbvm.campaign.judge import Failure
 from fbvm.campaign.plan import Plan
@@ -36,7 +36,7 @@ class Store:
         path = folder / LINES
         self.known: list[Result] = []
         """The results that are there."""
-        head = {"format": FORMAT, "fbvm": fbvm.__version__, "campaign": mark}
+        head = {"format": FORMAT, "fbvm": VERSION, "campaign": mark}
         if path.exists():
             self._file: BinaryIO = open(path, "r+b")  # noqa: SIM115 - close closes it
             self._resume(head)

@@ -8,7 +8,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import fbvm
+from fbvm.base.version import VERSION
 from fbvm.campaign.execution import Execution, Result
 from fbvm.campaign.plan import Plan
 from fbvm.campaign.shrinking import Shrunk, shrink
@@ -53,8 +53,8 @@ class Bench:
     def of(cls, plan: Plan, images: Mapping[str, Image]) -> Bench:
         """The bench of a campaign."""
         encoded = tuple((name, image.fingerprint, encode(image)) for name, image in images.items())
-        depends = repr((fbvm.__version__, plan, [(name, fingerprint) for name, fingerprint, _ in encoded]))
-        return cls(plan, encoded, fbvm.__version__, hashlib.sha256(depends.encode()).hexdigest())
+        depends = repr((VERSION, plan, [(name, fingerprint) for name, fingerprint, _ in encoded]))
+        return cls(plan, encoded, VERSION, hashlib.sha256(depends.encode()).hexdigest())
 
     def prepare(self, number: int) -> None:
         """Makes a process ready.  Raises Mismatch."""
@@ -62,8 +62,8 @@ class Bench:
 
     def execution(self) -> Execution:
         """What executes runs in this process.  Raises Mismatch."""
-        if self.version != fbvm.__version__:
-            raise Mismatch(f"this process has fbvm {fbvm.__version__}, not {self.version}")
+        if self.version != VERSION:
+            raise Mismatch(f"this process has fbvm {VERSION}, not {self.version}")
         if self.mark not in _executions:
             images = {}
             for name, fingerprint, content in self.images:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fbvm.cli.shared import status
-from fbvm.cli.shared.campaigns import check_parquet, plan_options, planned, processes, refuse, write_results
+from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.terminal import say, say_json
 

@@ -69,6 +69,8 @@ VERBS: dict[str, list[list[str]]] = {
     "live": [[DEMO]],
     "peer": [["--port", "0"]], "demo": [[]], "new": [["project", ]], "test": [["tests"]], "learn": [["1"]],
     "mutate": [["--tests", "tests"]],
+    "campaign": [[DEMO, *PEER, "--faults", "1", "--runs", "1000000", "--for", "100s", "--jobs", "2"]],
+    "sweep": [[DEMO, *PEER, "--vary", "Main.Quantity=1..120", "--for", "10000s", "--jobs", "2"]],
     "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["long.fbtrace", "Main.Step"]],
     "lsp": [[]],
     "prove": [["big.st", "--always", "Main.b0.a <> 4711", "--budget", "100s", "--scans", "100000"]],

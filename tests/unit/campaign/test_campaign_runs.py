@@ -1,0 +1,225 @@
+"""Runs of a campaign: judged, grouped, made smaller, recorded, resumed, and the same whoever executes them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.base.data import data_folder
+from fbvm.campaign.axes import axis_from_text
+from fbvm.campaign.execution import Result
+from fbvm.campaign.executors import InProcesses, InThisProcess
+from fbvm.campaign.judge import CRASHED
+from fbvm.campaign.plan import Moments, PowerRule
+from fbvm.campaign.plan_file import Written, with_about
+from fbvm.campaign.planning import images_of, plan_of, program_project
+from fbvm.campaign.runs import Outcome, conduct
+from fbvm.campaign.store import LINES, TABLE, Store, write_table
+from fbvm.campaign.work import Batch, Bench, Done, Task
+from fbvm.cli.main import main
+
+MIX = """PROGRAM Main
+VAR
+    Up, Down, Busy : BOOL;
+    Count : INT;
+    Limit : INT := 5;
+    Wait  : TIME := T#100ms;
+    t     : TON;
+    a     : ARRAY[1..8] OF INT;
+END_VAR
+VAR RETAIN Kept : INT; END_VAR
+    t(IN := NOT t.Q, PT := Wait);
+    IF t.Q THEN
+        Count := Count + 1;
+        a[Count] := Count;
+        Kept := Kept + 1;
+    END_IF;
+    Up := Count > 2;
+    Down := Count > Limit;
+    Busy := Count = 3;
+END_PROGRAM
+"""
+TRAPPED, BOTH = ("trap", "mix.st", 14), ("never", "mix.st", 18)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "mix.st").write_text(MIX)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def bench_of(**about: Any) -> Bench:
+    """The bench of a campaign over mix.st, of which each run takes a second."""
+    rules = {name: about.pop(name) for name in ("cuts", "axes") if name in about}
+    written = replace(with_about(Written(), **{"for": 1_000_000_000, **about}), **rules)
+    project = program_project([Path("mix.st")], written.about, Path())
+    images, _ = images_of(project)
+    return Bench.of(plan_of(written, project, images), images)
+
+
+def fbvm(*arguments: str) -> tuple[int, str]:
+    result = CliRunner().invoke(main, ["campaign", *arguments])
+    return result.exit_code, result.stdout if result.exit_code < 2 else result.stderr
+
+
+def groups(said: str) -> dict[tuple[str, str, int], Any]:
+    return {(group["kind"], group["file"], group["line"]): group for group in json.loads(said)["groups"]}
+
+
+def test_failures_are_grouped_by_the_statement_that_brought_them(folder: Path) -> None:
+    status, said = fbvm("mix.st", "--vary", "Main.Limit=4..20", "--for", "2s", "--never", "Main.Up AND Main.Down", "--json")
+    found = groups(said)
+    assert (status, {key: group["runs"] for key, group in found.items()}) == (1, {TRAPPED: 13, BOTH: 4})
+    assert (found[BOTH]["first"], found[BOTH]["values"], found[BOTH]["scan"]) == (0, {"Main.Limit": 4}, 58)
+    assert found[TRAPPED]["code"] == "R0102"
+    rows = list(csv.DictReader((folder / "campaign-results" / TABLE).read_text().splitlines()))
+    assert [(row["Main.Limit"], row["result"], row["line"]) for row in rows[3:5]] == [("7", "never", "18"), ("8", "trap", "14")]
+
+
+def test_a_late_answer_is_told_with_the_statement_of_its_trigger(folder: Path) -> None:
+    late = ["--within", "Main.Busy", "Main.Count = 4", "150ms", "--for", "1200ms", "--json"]
+    status, said = fbvm("mix.st", "--vary", "Main.Wait=T#10ms,T#100ms,T#300ms", *late)
+    assert (status, [(key, group["first"]) for key, group in groups(said).items()]) == (
+        1, [(TRAPPED, 0), (("within", "mix.st", 19), 2)])
+
+
+def test_what_has_to_hold_before_the_end_fails_without_it(folder: Path) -> None:
+    status, said = fbvm("mix.st", "--vary", "Main.Wait=T#100ms,T#300ms", "--until", "Main.Count = 5", "--for", "1s", "--json")
+    assert (status, [(kind, group["first"]) for (kind, _, _), group in groups(said).items()]) == (1, [("until", 1)])
+    assert fbvm("mix.st", "--vary", "Main.Wait=T#100ms", "--until", "Main.Count = 5", "--for", "1s", "--fresh")[0] == 0
+
+
+def test_the_recording_of_a_group_does_the_run_again_to_the_bit(folder: Path) -> None:
+    fbvm("mix.st", "--cuts", "2", "--runs", "5", "--for", "3s", "--always", "Main.Kept < 8")
+    recording = str(folder / "campaign-results" / "1.fbtrace")
+    result = CliRunner().invoke(main, ["replay", recording, "--show", "Main.Kept", "--json"])
+    assert (result.exit_code, json.loads(result.stdout)["values"]) == (0, {"Main.Kept": 8})
+
+
+def test_a_power_cut_keeps_what_is_retained_and_parameters_and_nothing_else(folder: Path) -> None:
+    """Behind the cut, 100 ms before the end, there was time for one count: the retained one goes on, the other begins anew."""
+    rule = PowerRule(Moments((700_000_000, 700_000_000), (200_000_000, 200_000_000)), ())
+    for is_cold, kept in ((False, 7), (True, 1)):
+        bench = bench_of(runs=1, show=("Main.Kept", "Main.Count", "Main.Wait"), cuts=(replace(rule, is_cold=is_cold),),
+                         axes=(axis_from_text("Main.Wait=T#90ms"),))  # fmt: skip
+        result = bench.execution().result(bench.variant(0))
+        assert (result.failure, result.shown) == (None, (kept, 1, 90_000_000))
+
+
+@pytest.mark.slow
+def test_processes_give_the_results_of_this_process(folder: Path) -> None:
+    bench = bench_of(never=("Main.Up AND Main.Down",), runs=40)
+    batches = [Batch(tuple(range(at, at + 10))) for at in range(0, 40, 10)]
+    tables = []
+    for number, executor in enumerate((InThisProcess(bench), InProcesses(bench, 2))):
+        outcome = Outcome(bench.plan)
+        with executor:
+            for _, found in executor.done(batches):
+                assert isinstance(found, list)
+                outcome.add(found)
+        write_table(folder / f"{number}.csv", outcome)
+        tables.append((folder / f"{number}.csv").read_bytes())
+    assert tables[0] == tables[1]
+    assert len(tables[0].splitlines()) == 41
+
+
+
+class KillsRun(Bench):
+    """A bench whose processes end when they come to run 7, as a defect of machine code would end them."""
+
+    def work(self, number: int, task: Task) -> Done:
+        if isinstance(task, Batch) and 7 in task.numbers:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().work(number, task)
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_its_process_is_a_failure_and_nothing_else_is_lost(folder: Path) -> None:
+    bench = bench_of(runs=20)
+    outcome = Outcome(bench.plan)
+    conduct(KillsRun(**vars(bench)), outcome, 2, outcome.add, InProcesses(KillsRun(**vars(bench)), 2))
+    assert sorted(outcome.results) == list(range(20))
+    assert [(result.number, result.failure.kind) for result in outcome.rows if result.failure] == [(7, CRASHED)]
+
+
+def test_a_campaign_goes_on_where_it_was_cut_off(folder: Path) -> None:
+    """Killed while it wrote a line: the table is that of a campaign in one piece, and whole runs are not executed again."""
+    arguments = ["mix.st", "--vary", "Main.Limit=1..8", "--for", "1s", "--never", "Main.Up AND Main.Down", "--jobs", "1"]
+    assert fbvm(*arguments)[0] == 1
+    kept, lines = folder / "campaign-results" / TABLE, folder / "campaign-results" / LINES
+    whole, text = kept.read_bytes(), lines.read_bytes().splitlines(keepends=True)
+    assert len(text) == 9
+    marked = text[2].replace(b'"memory": ', b'"memory": 1')
+    lines.write_bytes(text[0] + text[1] + marked + text[3][:20])
+    assert fbvm(*arguments)[0] == 1
+    assert kept.read_bytes() == whole
+    assert lines.read_bytes().splitlines(keepends=True) == [text[0], text[1], marked, *text[3:]]
+
+
+def test_results_of_another_campaign_are_not_mixed(folder: Path) -> None:
+    assert fbvm("mix.st", "--vary", "Main.Limit=1..3", "--for", "100ms")[0] == 0
+    (folder / "mix.st").write_text(MIX.replace("Count > 2", "Count > 1"))
+    status, said = fbvm("mix.st", "--vary", "Main.Limit=1..3", "--for", "100ms")
+    assert status == 2
+    assert "holds results of another campaign, another program or another version of fbvm" in said and "--fresh" in said
+    assert fbvm("mix.st", "--vary", "Main.Limit=1..3", "--for", "100ms", "--fresh")[0] == 0
+
+
+PLANTED = ("Failures := Failures + 1;", "Failures := Failures + 1; Level := Wanted;")
+"""Of the gateway: it tells the panel what it wants to hear when the tank could not be read."""
+
+
+class Interrupted(InThisProcess):
+    """Is interrupted by Ctrl-C after some runs."""
+
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
+        for number, found in enumerate(super().done(tasks)):
+            if number == 3:
+                raise KeyboardInterrupt
+            yield found
+
+
+def test_what_was_done_before_ctrl_c_is_kept(folder: Path) -> None:
+    bench = bench_of(runs=20)
+    outcome, store = Outcome(bench.plan), Store(folder / "kept", bench.mark)
+
+    def take(found: Sequence[Result]) -> None:
+        store.add(found)
+        outcome.add(found)
+
+    with closing(store), pytest.raises(KeyboardInterrupt):
+        conduct(bench, outcome, 1, take, Interrupted(bench))
+    with closing(Store(folder / "kept", bench.mark)) as again:
+        assert again.known == outcome.rows
+        assert len(again.known) == 4
+
+
+@pytest.mark.slow
+def test_the_row_of_three_plcs_is_good_and_a_fault_planted_in_a_copy_is_found(folder: Path) -> None:
+    for name, planted in (("good", False), ("bad", True)):
+        copy = folder / name
+        shutil.copytree(data_folder("examples") / "row", copy)
+        if planted:
+            path = copy / "gateway.st"
+            text = path.read_text()
+            assert PLANTED[0] in text
+            path.write_text(text.replace(*PLANTED))
+        status, said = fbvm(str(copy), "--runs", "6", "--jobs", "1", "--out", f"{name}-results", "--json")
+        assert status == planted
+        found = json.loads(said)["groups"]
+        assert len(found) == planted
+    [group] = found
+    assert (group["text"], len(group["faults"])) == ("panel.Main.Done AND tank.Main.Level < 700.0", 1)
+    assert Path(group["file"]).read_text().splitlines()[group["line"] - 1].strip() == "Done := Level >= Wanted;"
