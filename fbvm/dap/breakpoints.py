@@ -11,8 +11,10 @@ from fbvm.dap.memory import place_of as byte_of
 from fbvm.dap.session import Arguments, Body, Container, DebugSession, Refusal
 from fbvm.machine.breakpoints import Breakpoint, BreakpointRows
 from fbvm.machine.source_lines import find_lines
+from fbvm.record.recording.file_scans import FileScans
 from fbvm.step.debugger import Debugger
 from fbvm.step.filters import BETWEEN, FILTERS, BetweenScans
+from fbvm.step.past_session import PastSession
 from fbvm.watch.conditions import ConditionError
 from fbvm.watch.paths import UnknownPlace
 from fbvm.watch.scopes import instances
@@ -244,9 +246,13 @@ class BreakpointRequests:
     def _apply_filters(self, debugger: Debugger) -> None:
         wanted: dict[str, frozenset[int]] = {name: _codes(self._filters[name]) for name in BETWEEN if name in self._filters}
         debugger.checks = {}
-        for name in debugger.plcs if wanted else ():
-            if self.debug.plc(name).facts.described or wanted.keys() - {"response"}:
-                debugger.checks[name] = BetweenScans(wanted)
+        for name in debugger.plcs:
+            session = self.debug.plc(name)
+            source = session.source if isinstance(session, PastSession) else None
+            differs = source.begins_to_differ if isinstance(source, FileScans) and source.may_differ else None
+            never = {key for key, can in (("response", session.facts.described), ("differs", differs)) if not can}
+            if wanted.keys() - never:
+                debugger.checks[name] = BetweenScans(wanted, differs)
 
 
 def _codes(condition: str) -> frozenset[int]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fbvm.base.types import fold
 from fbvm.dap.session import Arguments, Body, DebugSession, Refusal
-from fbvm.dap.variables import text_of, variable
+from fbvm.dap.variables import property_row, text_of, variable
 from fbvm.step.commands import COMMANDS_BY_WORD, CommandError, completed
 from fbvm.watch.conditions import ConditionError, parse_expression
 from fbvm.watch.paths import Place, Span, UnknownPlace
@@ -52,6 +52,9 @@ def _value(debug: DebugSession, scope: Scope, plc: str | None, text: str, is_bar
     if isinstance(found, Span):
         values = [text_of(debug, session, place) for place in found.places]
         return {"result": "[" + ", ".join(values) + "]", "variablesReference": 0}
+    if found is None and (made := session.property(text, scope)):
+        row = property_row(debug, session, made, made.place.name)
+        return {"result": row["value"], "type": row["type"], "variablesReference": 0, "presentationHint": row["presentationHint"]}
     term = parse_expression(text, scope.find)
     try:
         value = term.value(session.player.read)

@@ -12,6 +12,7 @@ from fbvm.base.types import BOOL, ArrayType, EnumType, Field, StructType, base
 from fbvm.dap.memory import reference_of
 from fbvm.dap.session import Body, Container, DebugSession, Refusal, StackFrame
 from fbvm.step.past_session import PastSession
+from fbvm.step.properties import PropertyValue
 from fbvm.step.session import Session
 from fbvm.watch.paths import Place, Span, element
 from fbvm.watch.places import parse_for
@@ -60,6 +61,8 @@ def _add_sections(debug: DebugSession, rows: list[Body], frame: StackFrame) -> N
     for name, kinds, hint in (*SECTIONS, ("Locals", (), "locals")):
         chosen = [field for field in fields if (field.kind in kinds if kinds else field.kind not in special)]
         _add(debug, rows, name, _fields(debug, session, instance, chosen), len(chosen), hint=hint)
+    properties = session.properties.of(instance.type)
+    _add(debug, rows, "Properties", _values(debug, session, instance, properties), len(properties), expensive=True)
 
 
 def _add_frame(debug: DebugSession, rows: list[Body], session: Session | PastSession, scope: Scope) -> None:
@@ -121,6 +124,57 @@ def _fields(debug: DebugSession, session: Session | PastSession, instance: Place
         return [variable(debug, session, _member(session, instance, field), field.name) for field in chosen]
 
     return Container(children, lambda name: session.player.find(f"{instance.name}.{name}"))
+
+
+def _members(debug: DebugSession, session: Session | PastSession, instance: Place, fields: Sequence[Field],
+             properties: Sequence[str]) -> Container:  # fmt: skip
+    """The variables of an instance, and its properties, whose accessors are executed when somebody asks for the value."""
+    variables_of = _fields(debug, session, instance, fields)
+
+    def children(start: int, count: int | None) -> list[Body]:
+        end = len(fields) + len(properties) if count is None else start + count
+        chosen = properties[max(0, start - len(fields)) : max(0, end - len(fields))]
+        return variables_of.children(start, count) + [_lazy(debug, session, instance, name) for name in chosen]
+
+    return Container(children, variables_of.named)
+
+
+def _lazy(debug: DebugSession, session: Session | PastSession, instance: Place, name: str) -> Body:
+    """The row of a property that is not read yet: its one child has the value."""
+    container = _values(debug, session, instance, [name])
+    return {"name": name, "value": "", "evaluateName": f"{instance.name}.{name}", "variablesReference": debug.refer(container),
+            "presentationHint": {"kind": "property", "attributes": ["readOnly"], "lazy": True}}  # fmt: skip
+
+
+def _values(debug: DebugSession, session: Session | PastSession, instance: Place, names: Sequence[str]) -> Container:
+    """Properties, which are read when a client asks for the rows."""
+    return Container(lambda start, count: _property_rows(debug, session, instance, _chosen(names, start, count)), _unwritable)
+
+
+def _chosen(names: Sequence[str], start: int, count: int | None) -> Sequence[str]:
+    return names[start : None if count is None else start + count]
+
+
+def _property_rows(debug: DebugSession, session: Session | PastSession, instance: Place, names: Sequence[str]) -> list[Body]:
+    """The values of properties of an instance; of one whose accessor ends with a trap, what it says."""
+    rows: list[Body] = []
+    for name in names:
+        try:
+            made = session.property(f"{instance.name}.{name}", Scope(session.player.find))
+        except ValueError as error:
+            rows.append({"name": name, "value": str(error), "variablesReference": 0})
+            continue
+        if made is not None:
+            rows.append(property_row(debug, session, made, name))
+    return rows
+
+
+def property_row(debug: DebugSession, session: Session | PastSession, made: PropertyValue, name: str) -> Body:
+    """The row of a property that was read."""
+    value = session.names.name_references(made.place.type, made.value)
+    return {"name": name, "value": _shown(debug, made.place, value) if value is not None else "NULL",
+            "type": made.place.type.name, "evaluateName": made.place.name, "variablesReference": 0,
+            "presentationHint": {"kind": "property", "attributes": ["readOnly"]}}  # fmt: skip
 
 
 def _member(session: Session | PastSession, instance: Place, field: Field) -> Place:
@@ -214,8 +268,9 @@ def variable(debug: DebugSession, session: Session | PastSession, place: Place, 
     if isinstance(plain, StructType):
         fields = [field for field in plain.fields.values() if "$" not in field.name]
         row |= {"memoryReference": reference_of(place.offset)} if not place.hops else {}
-        row["namedVariables"] = len(fields)
-        row["variablesReference"] = debug.refer(_fields(debug, session, place, fields))
+        properties = session.properties.of(plain) if plain.block else []
+        row["namedVariables"] = len(fields) + len(properties)
+        row["variablesReference"] = debug.refer(_members(debug, session, place, fields, properties))
     elif place.area:
         row["memoryReference"] = reference_of(place.offset)
     return row

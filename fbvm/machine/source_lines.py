@@ -59,17 +59,17 @@ def _of_instance(image: Image, where: str) -> Lines | None:
         path, _, last = path.rpartition(".")
         member = f".{last.strip()}{member}"
         owner = _instance(image.symbols, path)
-        if owner is not None and (pou := _member(owner[0], member, pous)):
+        if owner is not None and (pou := pou_of_member(owner[0], member, pous)):
             return Lines(where, find_line(image, pou)[1], owner[1])
     return None
 
 
-def _member(kind: StructType, member: str, pous: Collection[str]) -> str:
+def pou_of_member(kind: StructType, member: str, pous: Collection[str]) -> str:
     """The POU that an instance executes as its method or property `.Start`, its own or an inherited one; "" if there is none."""
     pou = f"{kind.name}{member}"
     if any(fold(f"{pou}{accessor}") in pous for accessor in ACCESSORS):
         return pou
-    return next((found for parent in kind.parents if (found := _member(parent, member, pous))), "")
+    return next((found for parent in kind.parents if (found := pou_of_member(parent, member, pous))), "")
 
 
 def _instance(symbols: Mapping[str, Field], path: str) -> tuple[StructType, int] | None:

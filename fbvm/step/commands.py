@@ -388,7 +388,12 @@ def _count(text: str, least: int = 1) -> int:
 
 
 def _place(session: Stepping, text: str) -> Place:
-    found = session.find_here(text) if text else None
+    try:
+        found = session.find_here(text) if text else None
+    except UnknownPlace:
+        if session.property(text):
+            raise CommandError(f"{text} is a property, which is computed when it is read; name a variable") from None
+        raise
     if not isinstance(found, Place) or not is_single(found):
         raise CommandError("name one variable, not a block, an array or a range" if found else "name something")
     return found

@@ -1,8 +1,9 @@
-"""What stops a run between two scans: a Modbus exception reply, a response code of a unit that is not 0, a late scan."""
+"""What stops a run between two scans: a Modbus exception reply, a response code of a unit that is not 0, a late scan, a scan
+whose memory is not the recorded one."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -37,18 +38,23 @@ FILTERS = (
            "the code, such as 16#0302"),
     Filter("late", "Late scans", "with real connections: a scan began a period or more after it was due", False,
            "the delay in ms, such as 5"),
+    Filter("differs", "Scans that differ from the recording", "this version of fbvm computes another memory than was recorded",
+           True),
     Filter("warning", "Warnings of the run", "what the program asks and the PLC does not do", False),
 )  # fmt: skip
 """Traps stop a run whether or not their filters are on: nothing continues behind one."""
-BETWEEN = ("modbus", "response", "late")
+BETWEEN = ("modbus", "response", "late", "differs")
 """The filters that are looked at between two scans."""
 
 
 @dataclass
 class BetweenScans:
-    """The filters of `BETWEEN` of one PLC.  `wanted` has those that are on, with their codes, none for all."""
+    """The filters of `BETWEEN` of one PLC.  `wanted` has those that are on, with their codes, none for all.
+
+    `differs` says of a scan of a recording whether its memory is the first that is not the recorded one."""
 
     wanted: Mapping[str, frozenset[int]]
+    differs: Callable[[int], bool] | None = None
     found: str = ""
     kind: str = ""
 
@@ -64,8 +70,12 @@ class BetweenScans:
                 add_tap(network, self._tap)
 
     def checked(self, plc: Plc) -> bool:
-        """Called after each scan: True if an exception reply has passed in it, or a response code has come."""
+        """Called after each scan: True if something of what is wanted has happened in it."""
         if self._is_late(plc):
+            return True
+        if "differs" in self.wanted and self.differs and self.differs(plc.scans - 1):
+            self.found = f"scan {plc.scans - 1} comes out differently here: its memory is not the recorded one"
+            self.kind = "differs"
             return True
         passed, self._passed = self._passed, []
         if passed:

@@ -8,6 +8,7 @@ from fbvm.code.image import Site
 from fbvm.record.draw.why import Follower
 from fbvm.record.recording.last_change import may_change
 from fbvm.record.trace.outline import outer_statements
+from fbvm.record.trace.results import results_of
 from fbvm.step.scan_replay import Moment
 from fbvm.step.stepping import Stepping
 from fbvm.step.stop_report import StopReport
@@ -22,7 +23,9 @@ class SessionEvents:
         self._session, self._report = session, report
         self.names: Names = session.names
         self.sites = session.facts.image.sites
-        self.outer = outer_statements(session.facts.image)
+        image = session.facts.image
+        self.outer, self.results = outer_statements(image), results_of(image)
+        self.bodies = [(body.name, body.kind) for body in image.bodies]
 
     @property
     def scans(self) -> range:

@@ -19,6 +19,7 @@ from fbvm.record.trace.events import OUTSIDE, Frame, Statement
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.facts import ProgramFacts
 from fbvm.step.position import Position
+from fbvm.step.properties import Properties, PropertyValue
 from fbvm.step.scan_replay import END, Action, MomentListener, Player, Stop, depth
 from fbvm.watch import places
 from fbvm.watch.names import Names
@@ -44,6 +45,7 @@ class Stepping(ABC):
 
     def __init__(self, player: Player) -> None:
         self.player = player
+        self.properties = Properties(player.facts)
         self.here = Position()
         self._mark: Memory | None = None
 
@@ -137,6 +139,13 @@ class Stepping(ABC):
     def find_here(self, text: str) -> Place | Span:
         """What `text` names inside the body that is executed, `Speed` as well as `Main.slow.Speed`.  Raises UnknownPlace."""
         return self.scope(self.statement.frame if self.statement else None).find(text)
+
+    def property(self, text: str, scope: Scope | None = None) -> PropertyValue | None:
+        """The value of the property that `text` names in a scope, or inside the body that is executed; None if it names none.
+
+        Raises ValueError if it cannot be computed."""
+        here = scope or self.scope(self.statement.frame if self.statement else None)
+        return self.properties.read(text, here, self.player.memory)
 
     def read(self, where: str | Place | Span) -> Value:
         """The value of a variable, address or range at the current position."""

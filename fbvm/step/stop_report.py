@@ -12,7 +12,7 @@ from fbvm.record.draw.sfc_text import ChartState, sfc_text
 from fbvm.record.trace.events import Frame
 from fbvm.step.stepping import Stepping
 from fbvm.syntax.ladder.drawing.widths import Annotations
-from fbvm.watch.paths import Place, Span
+from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value, show, show_time
 
 AROUND = 2
@@ -131,7 +131,12 @@ class StopReport:
 
     def value(self, text: str) -> str:
         """`Main.Delay.ET = T#20ms`; of words also the hexadecimal value, and the description of a unit's word."""
-        found = self._session.find_here(text)
+        try:
+            found = self._session.find_here(text)
+        except UnknownPlace:
+            if made := self._session.property(text):
+                return self._one(made.place, made.value)
+            raise
         value = self._session.read(found)
         if isinstance(found, Span):
             values = value if isinstance(value, list) else []

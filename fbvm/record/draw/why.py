@@ -9,16 +9,19 @@ import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from operator import attrgetter
 from typing import Protocol
 
 from fbvm.base.memory import Memory, Snapshot, compare
+from fbvm.base.types import fold
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase
-from fbvm.record.trace.events import Cut, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.events import Cut, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.format import xor
 from fbvm.record.trace.recorder import Signal
+from fbvm.record.trace.results import Results
 from fbvm.watch.names import Names, is_single
-from fbvm.watch.paths import Place
+from fbvm.watch.paths import Place, find_place
 from fbvm.watch.places import dereferenced
 from fbvm.watch.values import Value, show_time
 
@@ -71,6 +74,10 @@ class EventSource(Protocol):
     @property
     def outer(self) -> Sequence[int]: ...
     @property
+    def bodies(self) -> Sequence[tuple[str, str]]: ...
+    @property
+    def results(self) -> Results: ...
+    @property
     def scans(self) -> range: ...
     def at(self, scan: int) -> Readable: ...
     def follow(self, follower: Follower, scans: range | None = None) -> None: ...
@@ -80,12 +87,15 @@ class EventSource(Protocol):
 
 @dataclass(frozen=True)
 class Fact:
-    """A read of a place: its value, and the number of the event; `guard` if a condition around the statement has read it."""
+    """A read of a place: its value, and the number of the event; `guard` if a condition around the statement has read it.
+
+    `returned` is the assignment of what a method or property has returned."""
 
     place: Place
     value: str
     order: int
     guard: bool = False
+    returned: Change | None = None
 
 
 @dataclass(frozen=True)
@@ -124,10 +134,14 @@ class _Changes:
         self._changes: dict[int, list[tuple[int, Change]]] = {}
         self._large: list[tuple[range, bytes, Change]] = []
         """Writes of more than LARGEST_BYTES: the offsets, the bits that changed as compressed bytes, and the change."""
-        self._reads: dict[tuple[Frame, int], dict[int, Fact]] = {}
-        """By execution of a body and statement the last read of each place, by its `id`: a loop reads the same time and again."""
+        self._reads: dict[tuple[Frame, int], dict[object, Fact]] = {}
+        """By execution of a body and statement the last read of each place, by its `id`: a loop reads the same time and again.
+        What a method returns is known by its body, instance and number."""
         self._nameless: dict[int, tuple[Fact, ...]] = {}
         """By offset the operands of values without a name: conditions of rungs, variables of functions."""
+        self._returned: dict[Frame, dict[int, Change]] = {}
+        """By execution of a body and offset its last write of bytes without a name: of variables that end with it."""
+        self._result_places: dict[int, list[Place]] = {}
         self._pending: list[Fact] = []
         """The operands of a value without a name that was read and not yet written from: the condition of an interlock."""
         self._guards: list[Fact] = []
@@ -175,16 +189,19 @@ class _Changes:
         elif isinstance(event, Write):
             self._written(moment, event)
             self._pending = []
+        elif isinstance(event, Return):
+            self._return(moment, event.frame)
         elif isinstance(event, Cut):
             self._known, self._cut = moment.memory.snapshot(), True
 
     def _written(self, moment: Instant, event: Write) -> None:
         if self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
             self._nameless[event.offset] = tuple(_once(self._facts(event.frame, event.site)))[:MOST_FACTS]
+            if event.frame.body in self._trace.results:
+                change = self._change(moment, event, self._nameless[event.offset])
+                self._returned.setdefault(event.frame, {})[event.offset] = change
         elif event.old != event.value:
-            site = self._trace.sites[event.site] if event.site >= 0 else None
-            change = Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(event.frame.base),
-                            tuple(self._facts(event.frame, event.site)))  # fmt: skip
+            change = self._change(moment, event, tuple(self._facts(event.frame, event.site)))
             if len(event.value) > LARGEST_BYTES:
                 offsets = range(event.offset, event.offset + len(event.value))
                 self._large.append((offsets, zlib.compress(xor(event.old, event.value), 1), change))
@@ -194,6 +211,44 @@ class _Changes:
                     bits = 1 << event.bit if event.bit < 8 else old ^ new
                     self._changes.setdefault(at, []).append((bits, change))
 
+    def _change(self, moment: Instant, event: Write, facts: tuple[Fact, ...]) -> Change:
+        site = self._trace.sites[event.site] if event.site >= 0 else None
+        return Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(event.frame.base), facts)
+
+    def _return(self, moment: Instant, frame: Frame) -> None:
+        """Counts what a body returns as read by the statement that has called it: of a method or property the result, of a
+        function what its result is made of.
+
+        Of a body with frames on the stack it is all that its variables are made of: no event tells where its frame lies."""
+        written = self._returned.pop(frame, None)
+        if not written or frame.caller is None:
+            return
+        name, kind = self._trace.bodies[frame.body]
+        path = self._trace.names.instance(frame.base) if kind in ("METHOD", "GET") else ""
+        facts = self._reads.setdefault((frame.caller, frame.site), {})
+        for number, place in enumerate(self._results(frame.body)):
+            offsets = range(place.offset, place.offset + max(1, place.type.size))
+            changes = [change for offset, change in written.items() if offset in offsets or place.hops]
+            if not path or place.hops:
+                facts.update((id(fact.place), fact) for change in changes for fact in change.facts)
+                continue
+            if not changes:
+                continue
+            change = max(changes, key=attrgetter("order"))
+            called = f"{path}.{name.partition('.')[2].removesuffix('.Get')}"
+            place = replace(place, name=called if place.name == called.rpartition(".")[2] else f"{called}.{place.name}")
+            text = Signal(place, place.name).text(self._trace.names.read(moment.read, place))
+            key = frame.body, frame.base, number
+            facts.pop(key, None)
+            facts[key] = Fact(place, text, self.order, returned=change)
+
+    def _results(self, body: int) -> list[Place]:
+        """The places of the result and outputs of a body; those on the stack of frames lie behind a reference."""
+        if body not in self._result_places:
+            fields = self._trace.results[body]
+            self._result_places[body] = [find_place({fold(field.name): field}, {}, field.name) for field in fields]
+        return self._result_places[body]
+
     def _facts(self, frame: Frame, site: int) -> Iterator[Fact]:
         """The reads of a statement, then those of the conditions around it."""
         own = self._reads.get((frame, site), {})
@@ -201,7 +256,7 @@ class _Changes:
         while site >= 0 and (site := self._trace.outer[site]) >= 0:
             last = list(islice(reversed(self._reads.get((frame, site), {}).values()), MOST_FACTS))
             for fact in reversed(last):
-                yield Fact(fact.place, fact.value, fact.order, True)
+                yield replace(fact, guard=True)
 
     def last(self, place: Place, before: int) -> Change | None:
         """The last change of a place before the event with number `before`."""
@@ -275,9 +330,10 @@ class _Search:
             self._found[key] = change
         return self._found.get(key)
 
-    def explain(self, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:
-        """The causes of a value at event `before`, as far as they are known."""
-        change = self._last(place, before)
+    def explain(self, place: Place, value: str, before: int, deepest: int, known: set[object],
+                returned: Change | None = None) -> Cause:  # fmt: skip
+        """The causes of a value at event `before`, as far as they are known; `returned` made it if a method has returned it."""
+        change = returned or self._last(place, before)
         cause = Cause(place, value, change)
         key = place, change.order if change else -1
         if key in known:
@@ -285,7 +341,7 @@ class _Search:
             return cause
         known.add(key)
         for fact in _once(change.facts) if change and deepest else ():
-            inner = self.explain(fact.place, fact.value, fact.order, deepest - 1, known)
+            inner = self.explain(fact.place, fact.value, fact.order, deepest - 1, known, fact.returned)
             inner.guard = fact.guard
             cause.causes.append(inner)
         return cause

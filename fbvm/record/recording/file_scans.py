@@ -36,6 +36,15 @@ class FileScans(RecordedScans):
         return self._file.texts
 
     @property
+    def may_differ(self) -> bool:
+        """True if scans may come out differently here: another version of fbvm has made the recording, or of another program."""
+        return not self._file.is_same and not isinstance(self._file.program, str)
+
+    def begins_to_differ(self, scan: int) -> bool:
+        """True for the first scan behind a keyframe whose memory is not the recorded one, as far as the recording says so."""
+        return self.may_differ and self._file.differs(self._file.keyframe(scan)) == scan
+
+    @property
     def warning(self) -> str:
         """What a reader has to know about the values that were had; "" if they are those of the run."""
         if self.differs is None:

@@ -12,6 +12,7 @@ from fbvm.record.trace.events import Event, NetworkEvent
 from fbvm.record.trace.observing import observing
 from fbvm.record.trace.outline import outer_statements
 from fbvm.record.trace.packets import add_tap
+from fbvm.record.trace.results import results_of
 from fbvm.record.trace.scan_source import Follower, Moment, ScanSource
 from fbvm.record.trace.writer import Depth, descriptions, meanings
 from fbvm.watch.names import Names
@@ -35,6 +36,7 @@ class RecordedScans(ScanSource):
         self.names = Names.of(image, plc.memory.areas)
         self.sites, self.rungs, self.charts = image.sites, image.rungs, image.charts
         self.outer = outer_statements(image)
+        self.results = results_of(image)
         self.bodies = [(body.name, body.kind) for body in image.bodies]
         self.described, self.meanings = descriptions(plc), meanings(plc)
 

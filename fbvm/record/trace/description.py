@@ -8,7 +8,7 @@ from typing import Any
 from fbvm.base.areas import Mailbox
 from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.engine.observation import NO_SITE
-from fbvm.record.trace import symbols
+from fbvm.record.trace import results, symbols
 from fbvm.record.trace.format import LARGEST_BYTES
 from fbvm.record.trace.scan_source import ScanSource
 from fbvm.record.trace.writer import Depth
@@ -37,6 +37,7 @@ def describe(source: ScanSource, head: Mapping[str, Any]) -> int:
         source.sites = [Site(head["files"][file], pou, line, column) for file, pou, line, column in head["sites"]]
         source.outer = [int(number) for number in head["outer"]]
         source.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
+        source.results = results.from_data(head["results"]) if "results" in head else {}
         source.rungs = tuple(_rung(*row) for row in head["rungs"])
         source.charts = tuple(_chart(*row) for row in head.get("charts", ()))
         if len(source.outer) != len(source.sites) or not {*source.outer, *(rung.site for rung in source.rungs)} <= {

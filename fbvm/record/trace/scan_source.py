@@ -15,6 +15,7 @@ from fbvm.base.types import Field
 from fbvm.code.image import RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
 from fbvm.record.trace.events import Event, NetworkEvent
+from fbvm.record.trace.results import Results
 from fbvm.record.trace.writer import Depth
 from fbvm.watch import places
 from fbvm.watch.names import Names
@@ -66,6 +67,8 @@ class ScanSource(ABC):
     """For each site the site of the statement around it (`outline.outer_statements`)."""
     bodies: Sequence[tuple[str, str]]
     """Name and kind of each body."""
+    results: Results
+    """What bodies return; empty in traces that are older than this row."""
     rungs: Sequence[RungPicture]
     charts: Sequence[SfcPicture]
     described: Mapping[str, str]

@@ -75,8 +75,8 @@ class _Writer:
 
     def field(self, field: Field) -> list[Any]:
         flags = field.absolute | field.reference << 1 | field.constant << 2 | field.hexadecimal << 3
-        space = (field.space,) if field.space else ()
-        return [field.name, self.type(field.type), field.offset, field.kind, field.bit, flags, *space]
+        rest = (field.space, *field.frame_at) if field.space or field.frame_at else ()
+        return [field.name, self.type(field.type), field.offset, field.kind, field.bit, flags, *rest]
 
     def type(self, kind: Type) -> Any:
         """A type as data: an elementary type is its name, any other type a list with its kind in front."""
@@ -112,9 +112,9 @@ class _Reader:
         self._made: dict[int, StructType] = {}
 
     def field(self, row: list[Any]) -> Field:
-        name, kind, offset, section, bit, flags, *space = row
+        name, kind, offset, section, bit, flags, *rest = row
         return Field(str(name), self.type(kind), int(offset), str(section), bit, bool(flags & 1), bool(flags & 2),
-                     bool(flags & 4), bool(flags & 8), str(space[0]) if space else "")  # fmt: skip
+                     bool(flags & 4), bool(flags & 8), str(rest[0]) if rest else "", tuple(map(int, rest[1:])))  # fmt: skip
 
     def type(self, data: Any) -> Type:
         if isinstance(data, str):

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 from fbvm.base.areas import AREAS
 from fbvm.code.image import Image
 from fbvm.machine.plc import Phase, Plc
-from fbvm.record.trace import symbols
+from fbvm.record.trace import results, symbols
 from fbvm.record.trace.events import Call, Contact, Cut, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.format import (
     BLOCK,
@@ -280,6 +280,7 @@ def description(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[
         "rungs": [[rung.body, rung.site, rung.number, rung.comment, rung.steps] for rung in image.rungs],
         "charts": [astuple(chart) for chart in image.charts],
         "outer": outer_statements(image), "bodies": [[body.name, body.kind] for body in image.bodies],
+        "results": results.to_data(results.results_of(image)),
         "described": descriptions(plc), "meanings": known,
         "lines": {file: {str(n): text for n, text in rows.items()} for file, rows in lines.items()},
     }  # fmt: skip

@@ -35,3 +35,19 @@ def test_a_method_of_one_instance_stops_with_its_variables(tmp_path: Path) -> No
     shown = {name: row["value"] for scope in list(client.scopes().values())[:4]
              for name, row in client.rows(scope["variablesReference"]).items()}  # fmt: skip
     assert {name: shown.get(name) for name in ("Wanted", "half", "Speed")} == {"Wanted": "20", "half": "10", "Speed": "0"}
+
+
+def test_properties_are_rows_whose_accessors_run_when_they_are_opened(tmp_path: Path) -> None:
+    file = tmp_path / "motors.st"
+    file.write_text(TEXT.replace("END_METHOD", "END_METHOD\nPROPERTY Twice : INT\nGET Twice := 2 * Speed; END_GET\nEND_PROPERTY"),
+                    encoding="utf-8")  # fmt: skip
+    client = Client()
+    client.begin({"setFunctionBreakpoints": {"breakpoints": [{"name": "Main.fast.Start", "condition": "Wanted > Speed"}]}},
+                 program=str(file))  # fmt: skip
+    client.go("fbvm/stepScan")
+    client.go("next")
+    main = client.rows(client.scopes()["Locals"]["variablesReference"])["slow"]
+    row = client.rows(main["variablesReference"])["Twice"]
+    assert row["presentationHint"]["lazy"] and row["value"] == ""
+    assert client.rows(row["variablesReference"])["Twice"]["value"] == "6"
+    assert client.ask("evaluate", expression="Main.slow.Twice", context="watch")["result"] == "6"

@@ -116,16 +116,21 @@ def test_a_bit_of_a_word_that_was_written_whole() -> None:
     assert [change and change.scan for change in changes] == [9, 7, 7]
 
 
-def _causes(text: str, name: str, *ons: str) -> list[tuple[str, str]]:
-    """What gave a place its value after 30 scans, each with the value that it had."""
+def _recorded(text: str, scans: int = 1, *ons: str) -> Trace:
+    """The trace of some scans of a program, in which BOOL variables become TRUE after the first."""
     plc, file = Plc(image(text)), io.BytesIO()
     writer = TraceWriter(plc, file, Depth.STATEMENTS)
     plc.scan()
     for on in ons:
         plc.write(on, True)
-    plc.run(scans=29)
+    plc.run(scans=scans - 1)
     writer.close()
-    cause = ask(Trace(io.BytesIO(file.getvalue())), name, 29, 1)
+    return Trace(io.BytesIO(file.getvalue()))
+
+
+def _causes(text: str, name: str, *ons: str) -> list[tuple[str, str]]:
+    """What gave a place its value after 30 scans, each with the value that it had."""
+    cause = ask(_recorded(text, 30, *ons), name, 29, 1)
     return [(inner.place.name, inner.value) for inner in cause.causes]
 
 
@@ -277,3 +282,63 @@ def test_a_cause_from_outside_in_the_third_scan_and_none_before_the_first(first:
     for asked in (2, 3, 100, 101, 102, 104):
         assert cause_text(trace, ask(trace, "Main.Given", first + asked)) == \
             f"Main.Given = 9 since scan {first + 2} ({10 * first + 20}ms), from outside the program"
+
+
+OBJECTS = """FUNCTION_BLOCK Motor
+    VAR speed : INT; END_VAR
+    METHOD PUBLIC Start : INT
+    VAR_INPUT much : INT; END_VAR
+    VAR_OUTPUT twice : INT; END_VAR
+    twice := 2 * much;
+    Start := speed;
+    END_METHOD
+    PROPERTY PUBLIC Actual : INT
+    GET Actual := speed * 2; END_GET
+    SET speed := Actual; END_SET
+    END_PROPERTY
+    END_FUNCTION_BLOCK
+    PROGRAM Main
+    VAR fast, slow : Motor; limit : INT := 7; seen, got, doubled : INT; high, even : BOOL; END_VAR
+    fast.Actual := 5;
+    slow.Actual := limit;
+    seen := fast.Actual + slow.Actual;
+    IF fast.Actual > 9 THEN high := TRUE; END_IF;
+    got := fast.Start(much := 2);
+    WHILE slow.Actual < 10 DO EXIT; END_WHILE;
+    slow.Start(much := limit, twice => doubled);
+    END_PROGRAM"""
+
+
+@pytest.mark.parametrize(
+    ("name", "causes"),
+    [
+        ("seen", ["Main.fast.Actual = 10 line 10", "Main.slow.Actual = 14 line 10"]),
+        ("high", ["Main.fast.Actual = 10 line 10"]),
+        ("got", ["Main.fast.Start.twice = 4 line 6", "Main.fast.Start = 5 line 7"]),
+        ("doubled", ["Main.limit = 7", "Main.slow.Start.twice = 14 line 6", "Main.slow.Start = 7 line 7"]),
+        ("slow.speed", ["Main.limit = 7"]),
+    ],
+)
+def test_what_a_property_or_method_returns_names_its_assignment(name: str, causes: list[str]) -> None:
+    found = ask(_recorded(OBJECTS), f"Main.{name}", 0).causes
+    lines = [f" line {cause.change.site.line}" if cause.change and cause.change.site else "" for cause in found]
+    assert [f"{cause.place.name} = {cause.value}{line}" for cause, line in zip(found, lines, strict=True)] == causes
+
+
+def test_a_method_that_calls_itself_returns_what_its_calls_have_read() -> None:
+    text = OBJECTS.replace("Start := speed;", "IF much > 1 THEN Start := THIS^.Start(much - 1); RETURN; END_IF; Start := speed;")
+    assert [(cause.place.name, cause.value) for cause in ask(_recorded(text), "Main.got", 0).causes] == [("Main.fast.speed", "5")]
+
+
+def test_the_result_of_a_function_is_made_of_the_globals_that_it_has_read() -> None:
+    text = """VAR_GLOBAL offset : INT := 3; END_VAR
+        FUNCTION Shifted : INT
+        VAR_INPUT raw : INT; END_VAR
+        VAR_EXTERNAL offset : INT; END_VAR
+        Shifted := raw + offset;
+        END_FUNCTION
+        PROGRAM Main
+        VAR raw : INT := 5; shown : INT; END_VAR
+        shown := Shifted(raw);
+        END_PROGRAM"""
+    assert sorted(cause.place.name for cause in ask(_recorded(text), "Main.shown", 0).causes) == ["Main.raw", "offset"]

@@ -101,3 +101,26 @@ def test_names_in_a_method_are_those_of_the_call_and_of_the_object(commands: Com
 def test_what_is_no_method_is_refused(commands: Commands, where: str) -> None:
     with pytest.raises(CommandError, match="has no"):
         list(commands.run(f"break {where}"))
+
+
+def test_a_property_is_read_through_its_accessor_without_a_trace(commands: Commands) -> None:
+    list(commands.run("scan"))
+    before = bytes(commands.session.memory.snapshot())
+    assert list(commands.run("print Main.slow.Actual")) == ["Main.slow.Actual = 14"]
+    assert list(commands.run("print main.fast.actual")) == ["Main.fast.Actual = 30"]  # inherited
+    assert bytes(commands.session.memory.snapshot()) == before
+    list(commands.run("break Motor.Start"))
+    list(commands.run("run"))
+    assert list(commands.run("print Actual")) == ["Main.slow.Actual = 14"]
+    with pytest.raises(CommandError, match="is a property, which is computed when it is read"):
+        list(commands.run("why Main.slow.Actual"))
+
+
+def test_a_property_whose_accessor_ends_with_a_trap_says_so_and_leaves_the_memory() -> None:
+    compilation = compile_text(TEXT.replace("Actual := Speed * 2;", "Speed := Speed + 1; Actual := 8 / (Speed - 1);"))
+    image = compilation.image
+    assert image is not None
+    commands = Commands(session := Session.of(lambda: Plc(image)), StopReport(session, {}))
+    with pytest.raises(CommandError, match=r"Main.slow.Actual cannot be computed: R0101 text.st:13"):
+        list(commands.run("print Main.slow.Actual"))
+    assert session.read(session.find("Main.slow.Speed")) == 0
