@@ -13,7 +13,9 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from fbvm.base.version import VERSION as __version__
+from fbvm.base.version import VERSION
+
+__version__ = VERSION
 
 if TYPE_CHECKING:
     from fbvm.base.diagnostics import Diagnostic as Diagnostic

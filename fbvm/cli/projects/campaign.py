@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import fbvm
-from fbvm.cli.shared import status
 from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
+from fbvm.cli.shared import status
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.options import time_ns
 from fbvm.cli.shared.progress import show_progress

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fbvm.cli.shared import status
 from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
+from fbvm.cli.shared import status
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.terminal import say, say_json
 

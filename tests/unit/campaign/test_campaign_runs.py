@@ -182,11 +182,11 @@ PLANTED = ("Failures := Failures + 1;", "Failures := Failures + 1; Level := Want
 
 
 class Interrupted(InThisProcess):
-    """Is interrupted by Ctrl-C after some runs."""
+    """Is interrupted by Ctrl-C after two batches."""
 
     def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
         for number, found in enumerate(super().done(tasks)):
-            if number == 3:
+            if number == 2:
                 raise KeyboardInterrupt
             yield found
 
@@ -200,10 +200,10 @@ def test_what_was_done_before_ctrl_c_is_kept(folder: Path) -> None:
         outcome.add(found)
 
     with closing(store), pytest.raises(KeyboardInterrupt):
-        conduct(bench, outcome, 1, take, Interrupted(bench))
+        conduct(bench, outcome, 5, take, Interrupted(bench))
     with closing(Store(folder / "kept", bench.mark)) as again:
         assert again.known == outcome.rows
-        assert len(again.known) == 4
+        assert 3 <= len(again.known) < 20
 
 
 @pytest.mark.slow
