@@ -128,7 +128,7 @@ class Execution:
 
     def _summed(self, variant: Variant, runs: Mapping[str, Running], failure: Failure | None) -> Result:
         plcs = [run.plc for run in runs.values()]
-        names = PlcNames({name: (run.plc.find, run.plc.read) for name, run in runs.items()}, self.plan.alone)
+        names = PlcNames({name: (run.plc.find, run.plc.reader) for name, run in runs.items()}, self.plan.alone)
         checksum = 0
         for plc in plcs:
             checksum = zlib.crc32(b"%d" % fingerprint(plc.memory.map[:]), checksum)

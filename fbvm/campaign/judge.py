@@ -78,7 +78,7 @@ class Judge:
     def __init__(self, judging: Judging, runs: Mapping[str, Running], alone: bool) -> None:
         self._runs = runs
         self._plcs: dict[str, Plc] = {name: run.plc for name, run in runs.items()}
-        self._names = PlcNames({name: (plc.find, plc.read) for name, plc in self._plcs.items()}, alone)
+        self._names = PlcNames({name: (plc.find, plc.reader) for name, plc in self._plcs.items()}, alone)
         self._forbidden = [(NEVER, self._condition(text)) for text in judging.never]
         self._forbidden += [(ALWAYS, self._condition(text)) for text in judging.always]
         self._waiting = [_Waiting(each, self._condition(each.trigger), self._condition(each.answer))

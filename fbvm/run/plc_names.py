@@ -9,19 +9,20 @@ from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value
 
 Find = Callable[[str], Place | Span]
-Read = Callable[[Place], Value]
+Reader = Callable[[Place], Callable[[], Value]]
 
 
 @dataclass
 class PlcNames:
-    """Finds and reads places of PLCs, each given by how its own names are found and read.
+    """Finds and reads places of PLCs, each given by how its own names are found, and how a place gets its reader.
 
     The name of an only PLC may be left out if `alone` says so."""
 
-    plcs: Mapping[str, tuple[Find, Read]]
+    plcs: Mapping[str, tuple[Find, Reader]]
     alone: bool = False
     _owners: dict[Place, tuple[str, Place]] = field(default_factory=dict)
     """By place with its full name: the PLC, and the place as that PLC has it."""
+    _readers: dict[str, Callable[[], Value]] = field(default_factory=dict)
 
     def find(self, text: str) -> Place:
         """The single place of a name.  Raises UnknownPlace."""
@@ -31,6 +32,7 @@ class PlcNames:
             raise UnknownPlace(f"{text} is a range; name one place")
         made = replace(place, name=text)
         self._owners[made] = owner, place
+        self._readers[text] = self.plcs[owner][1](place)
         return made
 
     def parted(self, text: str) -> tuple[str, str]:
@@ -48,5 +50,4 @@ class PlcNames:
 
     def read(self, place: Place) -> Value:
         """The present value of a place that `find` has returned."""
-        owner, own = self._owners[place]
-        return self.plcs[owner][1](own)
+        return self._readers[place.name]()

@@ -112,7 +112,7 @@ class PlantRig:
         if callable(condition):
             function = condition
             return lambda: bool(function(self))
-        names = PlcNames({name: (rig.find, rig.plc.read) for name, rig in self.rigs.items()})
+        names = PlcNames({name: (rig.find, rig.plc.reader) for name, rig in self.rigs.items()})
         parsed = parse_condition(condition, names.find)
         return lambda: parsed.holds(names.read)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
 from fbvm.base.strings import packed, units
@@ -29,6 +30,19 @@ def read(memory: Memory, place: Place) -> Value:
     if at is None:
         return None
     return _read(memory, place.type, *at)
+
+
+def reader(memory: Memory, place: Place) -> Callable[[], Value]:
+    """A function that returns what `read` does; of a single number or BOOL without looking at its type again."""
+    plain = base(place.type)
+    form = machine(plain)
+    if place.hops or form not in STRUCTS or form == "ref" or as_read(plain) is not plain or "ANY_CHAR" in families(plain):
+        return partial(read, memory, place)
+    offset, buffer, unpack = place.offset, memory.map, STRUCTS[form].unpack_from
+    if place.bit is not None and form == "b":
+        mask = 1 << place.bit
+        return lambda: buffer[offset] & mask != 0
+    return (lambda: buffer[offset] != 0) if form == "b" else lambda: unpack(buffer, offset)[0]
 
 
 def write(memory: Memory, place: Place, value: object) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from functools import cache
 
 from fbvm.wire.modbus_server import ModbusServer
 
@@ -29,11 +30,13 @@ def input_registers() -> list[int]:
     return [2000 + number & 0xFFFF for number in range(COUNT)]
 
 
+@cache
+def _contents() -> tuple[bytes, bytes, array[int], array[int]]:
+    return (bytes(coils()), bytes(discrete_inputs()), array("H", holding_registers()), array("H", input_registers()))
+
+
 def server() -> ModbusServer:
     """A server in memory with these contents."""
     made = ModbusServer()
-    made.coils[:] = bytes(coils())
-    made.discrete_inputs[:] = bytes(discrete_inputs())
-    made.holding_registers[:] = array("H", holding_registers())
-    made.input_registers[:] = array("H", input_registers())
+    made.coils[:], made.discrete_inputs[:], made.holding_registers[:], made.input_registers[:] = _contents()
     return made

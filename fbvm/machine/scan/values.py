@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.net.journal import Journal
@@ -29,6 +31,10 @@ class NamedValues:
     def read(self, where: str | Place | Span) -> Value:
         """The value of a variable, address or range.  Raises UnknownPlace."""
         return places.read_found(self.memory, self.find(where) if isinstance(where, str) else where)
+
+    def reader(self, place: Place) -> Callable[[], Value]:
+        """What reads a place again and again, several times as fast as `read`."""
+        return places.reader(self.memory, place)
 
     def write(self, where: str | Place | Span, value: object) -> None:
         """Writes a variable, an address, or a range (a list).  Raises UnknownPlace, ValueError (range), TypeError."""

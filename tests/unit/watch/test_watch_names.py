@@ -7,6 +7,7 @@ import pytest
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.watch.names import Names, is_single
+from fbvm.watch.paths import Place
 from fbvm.watch.places import parse_for, read_found, write_found
 from fbvm.watch.values import parse_time_ns
 
@@ -61,3 +62,28 @@ def test_the_longest_time_has_64_bits() -> None:
     assert parse_time_ns("9223372036854775807ns") == (1 << 63) - 1
     with pytest.raises(ValueError, match="64 bits of nanoseconds"):
         parse_time_ns("9223372036854775808ns")
+
+
+def test_a_reader_reads_what_read_does_now_and_later() -> None:
+    """Of every kind of place: numbers, bits of words, characters, texts, members behind references, whole structures."""
+    image = compile_text("""TYPE Pair : STRUCT a : INT; b : BOOL; END_STRUCT END_TYPE
+        PROGRAM Main VAR
+            b : BOOL; bit AT W5.03 : BOOL; s : SINT; ui : UINT; d : DINT; ul : ULINT; r : REAL; lr : LREAL; t : TIME; w : WORD := 5;
+            c : CHAR; text : STRING[5]; pair : Pair; list : ARRAY[1..3] OF DINT; point : REF_TO Pair; one : (Off, On);
+        END_VAR
+            b := NOT b; bit := b; s := s - 1; ui := ui - 1; d := d - 1; ul := ul - 1;
+            r := r + REAL#0.1; lr := lr - 0.1; t := t + T#1s;
+            w := ROL(w, 1); c := 'x'; text := 'abc'; pair.a := DINT_TO_INT(d); pair.b := b; list[2] := d;
+            point := REF(pair); one := On;
+        END_PROGRAM""").image
+    assert image is not None
+    plc = Plc(image)
+    names = ["b", "bit", "s", "ui", "d", "ul", "r", "lr", "t", "w", "c", "text", "pair", "pair.a", "pair.b", "list", "list[2]",
+             "point", "point^.a", "one"]  # fmt: skip
+    places = [plc.find(f"Main.{name}") for name in names]
+    readers = [plc.reader(place) for place in places if isinstance(place, Place)]
+    assert len(readers) == len(names)
+    for _ in range(3):
+        found = [(type(value), value) for value in (read() for read in readers)]
+        assert found == [(type(value), value) for value in map(plc.read, places)]
+        plc.scan()
