@@ -15,6 +15,7 @@ HERE = Path(__file__).resolve().parent
 FILES = ("package.json", "extension.js", "client.js", "debugging.js", "features.js", "tests.js",
          "language-configuration.json", "snippets.json",
          "README.md", "syntaxes/st.tmLanguage.json", "syntaxes/mnemonics.tmLanguage.json", "syntaxes/drawing.tmLanguage.json",
+         "syntaxes/twincat.tmLanguage.json",
          "walkthrough/install.md", "walkthrough/write.md", "walkthrough/run.md", "walkthrough/debug.md", "walkthrough/test.md")
 """What the extension consists of."""
 TYPES = {".json": "application/json", ".js": "application/javascript", ".md": "text/markdown", ".txt": "text/plain",

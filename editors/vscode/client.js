@@ -154,7 +154,7 @@ class Client {
         contentChanges: event.contentChanges.map((change) => ({ range: plain(change.range), text: change.text })),
       });
     };
-    const watcher = vscode.workspace.createFileSystemWatcher('**/{*.st,fbvm.toml}');
+    const watcher = vscode.workspace.createFileSystemWatcher('**/{*.st,fbvm.toml,*.{TcPOU,TcDUT,TcGVL,TcIO,TcTTO,plcproj,cxt,cxp}}');
     const told = (type) => (uri) => this.notify('workspace/didChangeWatchedFiles', { changes: [{ uri: uri.toString(), type }] });
     this.subscriptions.push(
       vscode.workspace.onDidOpenTextDocument(open),

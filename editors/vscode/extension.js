@@ -11,7 +11,8 @@ const features = require('./features');
 const tests = require('./tests');
 
 const OLDEST = [0, 2];
-const SELECTOR = [{ language: 'iecst' }, { language: 'st' }, { language: 'structured-text' }, { language: '61131-3-st' }, { pattern: '**/fbvm.toml' }];
+const SELECTOR = [{ language: 'iecst' }, { language: 'st' }, { language: 'structured-text' }, { language: '61131-3-st' }, { language: 'twincat' },
+  { pattern: '**/fbvm.toml' }, { pattern: '**/*.{plcproj,cxt,cxp}' }];
 const FLAVOURS = new Set(SELECTOR.map((each) => each.language).filter(Boolean));
 
 let client = null;
@@ -67,7 +68,7 @@ async function startServer() {
     const capabilities = await begun.start();
     provided = features.register(begun, capabilities, SELECTOR);
     begun.synchronize((document) => document.uri.scheme === 'file'
-      && (FLAVOURS.has(document.languageId) || path.basename(document.uri.fsPath) === 'fbvm.toml'));
+      && vscode.languages.match(SELECTOR, document) > 0);
     begun.ended = (code) => vscode.window.showErrorMessage(`The server of fbvm ended with status ${code}.`, 'Restart')
       .then((answer) => answer && restart());
     client = begun;
@@ -97,12 +98,17 @@ function target(given) {
   return given instanceof vscode.Uri ? given : vscode.window.activeTextEditor?.document.uri;
 }
 
-function projectOf(uri) {
+// The nearest file in the folder of a file or above whose name is accepted.
+function fileAbove(uri, accepts) {
   for (let at = path.dirname(uri.fsPath); ; at = path.dirname(at)) {
-    if (fs.existsSync(path.join(at, 'fbvm.toml'))) return path.join(at, 'fbvm.toml');
+    const found = fs.existsSync(at) && fs.readdirSync(at).find(accepts);
+    if (found) return path.join(at, found);
     if (at === path.dirname(at)) return null;
   }
 }
+
+const projectOf = (uri) => fileAbove(uri, (name) => name === 'fbvm.toml');
+const twincatProjectOf = (uri) => fileAbove(uri, (name) => name.toLowerCase().endsWith('.plcproj'));
 
 function execute(uri, name, parts) {
   const where = vscode.workspace.getWorkspaceFolder(uri) || vscode.TaskScope.Workspace;
@@ -216,8 +222,9 @@ const configurations = {
     const document = vscode.window.activeTextEditor?.document;
     if (!document || !FLAVOURS.has(document.languageId)) return undefined;
     const project = projectOf(document.uri);
+    const program = (document.languageId === 'twincat' && twincatProjectOf(document.uri)) || document.uri.fsPath;
     return { type: 'fbvm', request: 'launch', name: path.basename(document.uri.fsPath), cwd: where?.uri.fsPath,
-      ...(project ? { project } : { program: document.uri.fsPath }) };
+      ...(project ? { project } : { program }) };
   },
   provideDebugConfigurations() {
     return [{ type: 'fbvm', request: 'launch', name: 'Debug this program', program: '${file}' }];

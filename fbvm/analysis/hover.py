@@ -11,6 +11,7 @@ from fbvm.analysis.program import Program
 from fbvm.analysis.references import use_at
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.pages import page
+from fbvm.base.types import fold
 from fbvm.check import block_pages, instructions
 from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
@@ -37,6 +38,22 @@ def hover(program: Program, name: str, offset: int) -> Hover | None:
     pages = [page(code).partition("\n## See also")[0].rstrip() for code in dict.fromkeys(each.code for each in wrong)]
     start, end = (known.start, known.end) if known is not None else (wrong[0].start, wrong[0].end)
     return Hover(start, end, "\n\n---\n\n".join([*([known.markdown] if known is not None else []), *pages]))
+
+
+def hover_of_word(program: Program, text: str, offset: int) -> Hover | None:
+    """What is known about a word of a text that is no source of the program: an address, a global name, an instruction."""
+    found = next((each for each in _WORD.finditer(text) if each.start() <= offset <= each.end()), None)
+    if found is None or program.checked is None:
+        return None
+    word, checker = found[0], program.checked.checker
+    known = describe.address(word, [describe.variable(each) for each in located(program, word)])
+    for key in (("global", "", fold(word)), ("pou", "", fold(word)), ("type", "", fold(word))) if not known else ():
+        declared = find(checker, key)
+        known = describe.markdown(declared) if declared is not None else known
+    if not known:
+        row = instructions.find(word)
+        known = f"```\n{instructions.page(row)}\n```" if row is not None else block_pages.page(word) or ""
+    return Hover(found.start(), found.end(), known) if known else None
 
 
 def _name(program: Program, name: str, offset: int) -> Hover | None:

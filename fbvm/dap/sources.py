@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from fbvm.code.image import Site
+from fbvm.interchange.twincat import OBJECT_SUFFIXES
 from fbvm.step.statement_ends import StatementEnds
 
 
@@ -46,7 +47,7 @@ class Sources:
             found["sourceReference"] = self._numbered.index(name) + 1
             found["path"] = name
             found["origin"] = "library or recording"
-        if text is not None:
+        if text is not None and not name.lower().endswith(OBJECT_SUFFIXES):  # of these the text is only a part of the file
             found["checksums"] = [{"algorithm": "SHA256", "checksum": hashlib.sha256(text.encode("utf-8")).hexdigest()}]
         return found
 

@@ -16,7 +16,7 @@ from fbvm.analysis.parts import File, common_beginning
 from fbvm.analysis.references import Refusal, rename, use_at
 from fbvm.base.diagnostics import Source
 from fbvm.check.spelling import OUTSIDE
-from fbvm.lsp import project_file
+from fbvm.lsp import foreign, project_file
 from fbvm.lsp.navigation import location, offset_of
 from fbvm.lsp.projects import path_of
 from fbvm.lsp.server import Server
@@ -104,6 +104,8 @@ async def prepare_rename(server: Server, params: types.PrepareRenameParams) -> t
     if known is None:
         return None
     project, file = known
+    if foreign.is_foreign(path_of(params.text_document.uri)):
+        return None
     used = use_at(project.program, file.name, offset_of(server, file, params.position))
     if used is None or used[1].key[1] or used[1].key[0] == "standard":
         return None
@@ -120,6 +122,10 @@ async def rename_symbol(server: Server, params: types.RenameParams) -> types.Wor
         places = rename(project.program, file.name, offset_of(server, file, params.position), params.new_name)
     except Refusal as refusal:
         raise JsonRpcInvalidParams(str(refusal)) from None
+    for place in places:
+        path = foreign.container_of(place.file.name) or Path(place.file.name)
+        if foreign.is_foreign(path):
+            raise JsonRpcInvalidParams(f"{path.name} uses the name, which another tool writes: rename it there")
     changes: dict[str, list[types.TextEdit]] = {}
     for place in places:
         there = location(server, place)
@@ -142,7 +148,7 @@ def _formatted(server: Server, uri: str, only: types.Range | None) -> list[types
     """The change of a text to its canonical form, or of the declarations that a range touches; none with syntax errors."""
     path = path_of(uri)
     file = next((each.program.files[str(path)] for each in server.projects.of(path) if str(path) in each.program.files), None)
-    if file is None:
+    if file is None or foreign.is_foreign(path):
         return []
     positions = server.positions(file.source)
     start, end = 0, len(file.text)
@@ -171,7 +177,7 @@ async def code_actions(server: Server, params: types.CodeActionParams) -> list[t
     if wanted is not None and not any(each in ("", types.CodeActionKind.QuickFix) for each in wanted):
         return []
     known = await server.ready(uri)
-    if known is None or not params.context.diagnostics:
+    if known is None or not params.context.diagnostics or foreign.is_foreign(path_of(uri)):
         return []
     project, file = known
     positions = server.positions(file.source)

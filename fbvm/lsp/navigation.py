@@ -10,6 +10,7 @@ from lsprotocol import types
 
 from fbvm.analysis.declarations import Declared, find
 from fbvm.analysis.hover import hover as hover_at
+from fbvm.analysis.hover import hover_of_word
 from fbvm.analysis.names import Key
 from fbvm.analysis.outline import Symbol, outline
 from fbvm.analysis.parts import File
@@ -17,7 +18,7 @@ from fbvm.analysis.program import Program
 from fbvm.analysis.references import Place, called, callers, declared_at, highlights, references, use_at
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import StructType
-from fbvm.lsp import project_file
+from fbvm.lsp import foreign, project_file
 from fbvm.lsp.projects import path_of
 from fbvm.lsp.server import Server
 from fbvm.run.project import FILE
@@ -41,7 +42,7 @@ def offset_of(server: Server, file: File, position: types.Position) -> int:
 
 def location(server: Server, place: Place) -> types.Location:
     """A place in the form of the protocol."""
-    return types.Location(server.uri(Path(place.file.name)), server.positions(place.file.source).range(place.start, place.end))
+    return types.Location(server.uri(Path(place.file.name)), server.range(place.file.source, place.start, place.end))
 
 
 def declared_location(server: Server, program: Program, declared: Declared) -> types.Location | None:
@@ -62,6 +63,8 @@ async def hover(server: Server, params: types.HoverParams) -> types.Hover | None
         source = Source(FILE, server.workspace.get_text_document(uri).source)
         said = project_file.meaning_at(source.text, server.positions(source).offset(params.position))
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
+    if foreign.is_container(path_of(uri)):
+        return _hover_in_container(server, uri, params.position)
     known = await server.ready(uri)
     if known is None:
         return None
@@ -71,6 +74,17 @@ async def hover(server: Server, params: types.HoverParams) -> types.Hover | None
         return None
     return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, found.markdown),
                        server.positions(file.source).range(found.start, found.end))
+
+
+def _hover_in_container(server: Server, uri: str, position: types.Position) -> types.Hover | None:
+    """What is known about a word of a container: an address, an instruction, a global name."""
+    source = Source("", server.workspace.get_text_document(uri).source)
+    at = server.positions(source).offset(position)
+    for project in server.projects.of(path_of(uri)):
+        if found := hover_of_word(project.program, source.text, at):
+            return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, found.markdown),
+                               server.positions(source).range(found.start, found.end))
+    return None
 
 
 async def definition(server: Server, params: types.DefinitionParams) -> types.Location | None:
@@ -131,15 +145,19 @@ def file_of(server: Server, uri: str) -> File | None:
 
 
 def document_symbols(server: Server, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
-    file = file_of(server, params.text_document.uri)
-    return [_symbol(server, file, each) for each in outline(file)] if file is not None else []
+    path = path_of(params.text_document.uri)
+    if foreign.is_container(path):
+        files = [each.program.files[name] for each in server.projects.of(path)
+                 for name in each.held if path in Path(name).parents]  # fmt: skip
+    else:
+        files = [file for file in (file_of(server, params.text_document.uri),) if file is not None]
+    return [_symbol(server, file, each) for file in files for each in outline(file)]
 
 
 def _symbol(server: Server, file: File, symbol: Symbol) -> types.DocumentSymbol:
-    positions = server.positions(file.source)
     return types.DocumentSymbol(
-        symbol.name or "?", _KINDS[symbol.kind], positions.range(symbol.start, symbol.end),
-        positions.range(symbol.name_start, symbol.name_end), symbol.detail or None,
+        symbol.name or "?", _KINDS[symbol.kind], server.range(file.source, symbol.start, symbol.end),
+        server.range(file.source, symbol.name_start, symbol.name_end), symbol.detail or None,
         children=[_symbol(server, file, each) for each in symbol.children])
 
 

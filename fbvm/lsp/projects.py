@@ -1,4 +1,5 @@
-"""Which files are one program: those of a PLC in `fbvm.toml`, else a file with those of its folder that declare what it names."""
+"""Which files are one program: those of a PLC in `fbvm.toml`, those of a project of another tool, else a file with those of its
+folder that declare what it names."""
 
 from __future__ import annotations
 
@@ -13,6 +14,8 @@ from fbvm.analysis.program import Program
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import fold
 from fbvm.check.symbols.library import LibraryError
+from fbvm.interchange.formats.given import usual_dialect
+from fbvm.lsp import foreign
 from fbvm.run.project import FILE, read_project
 from fbvm.syntax.text import read
 
@@ -45,7 +48,12 @@ class Project:
     paths: list[Path]
     """Its files, which the program knows by `str(path)`."""
     named: list[Path]
-    """The files that its project file names, there or not; without one the file with which it was begun."""
+    """The files that its project file names, there or not; without one the file with which it was begun, or its container."""
+    said: dict[Path, list[Diagnostic]] = field(default_factory=dict)
+    """What is said about files of other tools by those who read them."""
+    held: tuple[str, ...] = ()
+    """Names of sources that lie within files of other tools."""
+    resource: str | None = None
     file: Path | None = None
     """The project file, None without one."""
     plc: str = ""
@@ -74,8 +82,17 @@ def _test_libraries(path: Path) -> Iterator[Path]:
     for folder in path.parents:
         if (folder / SOURCES).is_dir():
             yield folder / SOURCES
-        if any((folder / name).exists() for name in ROOTS):
+        if _is_root(folder):
             return
+
+
+def _is_root(folder: Path) -> bool:
+    return any((folder / name).exists() for name in ROOTS)
+
+
+def _goes_with(other: Path, path: Path) -> bool:
+    """True for a file that may be of one program with another one: both are texts, or both are objects of TwinCAT."""
+    return foreign.is_object(other) if foreign.is_object(path) else other.suffix == foreign.STRUCTURED_TEXT
 
 
 class Projects:
@@ -117,6 +134,13 @@ class Projects:
         self.all = [each for each in self.all if each not in gone]
         return gone
 
+    def forget_container(self, path: Path) -> list[Project]:
+        """Forget the programs that have sources out of a container, of which a file has changed."""
+        gone = [each for each in self.all if path in each.paths
+                or any(foreign.is_container(named) and named.parent in path.parents for named in each.named)]  # fmt: skip
+        self.all = [each for each in self.all if each not in gone]
+        return gone
+
     def forget_regrouped(self, path: Path) -> list[Project]:
         """Forget the programs that consist of other files now that a file has come or gone on disk."""
         gone = [each for each in self.all if path in each.paths or self._concerns(each, path)]
@@ -125,12 +149,16 @@ class Projects:
         return gone
 
     def _concerns(self, project: Project, path: Path) -> bool:
-        return path in project.named if project.file is not None else path.parent == project.named[0].parent
+        if project.file is not None:
+            return path in project.named
+        begun = project.named[0]
+        return begun.parent in path.parents if foreign.is_container(begun) else path.parent == begun.parent
 
     def _files(self, project: Project) -> list[Path]:
         """The files of which a program consists as the disk is now."""
         paths = project.named if project.file is not None else self._together(project.named[0])
-        return [known for path in paths if self.text(known := path.absolute()) is not None]
+        return [path for path in foreign.gathered(paths, project.resource).paths
+                if foreign.is_container(path) or self.text(path) is not None]
 
     def _is_begun(self, described: Path) -> bool:
         return any(each.file == described for each in self.all)
@@ -153,7 +181,9 @@ class Projects:
 
     def _undescribed(self, path: Path) -> list[Project]:
         libraries = (*self.settings.libraries, *(_test_libraries(path) if _TEST.match(path.name) else ()))
-        project = self._project(self._together(path), self.settings.dialect, libraries, None, None)
+        begun = self._begun_with(path)
+        dialect = self.settings.dialect if self.settings.dialect != "standard" else usual_dialect([begun])
+        project = self._project(self._together(begun), dialect, libraries, None, None)
         return [project] if project is not None else []
 
     def _project(self, paths: Iterable[Path], dialect: str, libraries: tuple[Path, ...], program: str | None,
@@ -163,26 +193,52 @@ class Projects:
         except LibraryError as error:
             self.wrong[Path(error.described)] = [error.diagnostic]
             made = Program(dialect=dialect, program=program, resource=resource)
-        known = [path.absolute() for path in paths]
-        for path in known:
-            text = self.text(path)
-            if text is not None:
-                made.replace(str(path), text)
-        return Project(made, [path for path in known if str(path) in made.files], known[:1])
+        paths = list(paths)
+        gathered = foreign.gathered(paths, resource)
+        project = Project(made, [], [path.absolute() for path in paths[:1]], gathered.said, tuple(gathered.held), resource)
+        for name, text in gathered.held.items():
+            made.replace(name, text)
+        project.paths = [path for path in gathered.paths if self.take(project, path) or foreign.is_container(path)]
+        return project
+
+    def take(self, project: Project, path: Path) -> bool:
+        """Gives a program the present text of a file; returns False if there is none.  Containers stay as they were read."""
+        if foreign.is_container(path):
+            return False
+        text, said = self._read(path)
+        if foreign.is_object(path):
+            project.said[path] = said
+        if text is None:
+            project.program.remove(str(path))
+        else:
+            project.program.replace(str(path), text)
+        return text is not None
 
     def text(self, path: Path) -> str | None:
-        """The text of a file, unsaved or on disk; None for one that cannot be read."""
-        opened = self._text_of(path)
-        if opened is not None:
-            return opened
-        found = read(path, str(path))
-        return found.text if isinstance(found, Source) else None
+        """The Structured Text of a file, unsaved or on disk; None for one that cannot be read."""
+        return self._read(path)[0]
+
+    def _read(self, path: Path) -> tuple[str | None, list[Diagnostic]]:
+        """The Structured Text of a file, and what is said about a file of another tool."""
+        text = self._text_of(path)
+        if text is None:
+            found = read(path, str(path))
+            text = found.text if isinstance(found, Source) else None
+        return foreign.structured_text(path, text) if text is not None and foreign.is_object(path) else (text, [])
+
+    def _begun_with(self, path: Path) -> Path:
+        """The file with which the program of a file begins: of an object of TwinCAT the project that lists it, if one does."""
+        project = foreign.project_with(path, _is_root) if foreign.is_object(path) else None
+        return project or path
 
     def _together(self, path: Path) -> list[Path]:
         """A file, and the files of its folder that declare what it or one of these names.
 
         A file that declares a name again is left out: a folder may hold many programs that have nothing to do with each other."""
-        texts = {other: text for other in sorted(path.parent.glob("*.st"))[:MOST_FILES]
+        if foreign.is_container(path):
+            return [path]
+        beside = [each for each in sorted(path.parent.iterdir()) if _goes_with(each, path)] if path.parent.is_dir() else []
+        texts = {other: text for other in beside[:MOST_FILES]
                  if other != path and (text := self.text(other)) is not None}
         declared = {other: {fold(found[1]) for found in _DECLARES.finditer(text)} for other, text in texts.items()}
         own = self.text(path) or ""

@@ -14,7 +14,8 @@ from pygls.lsp.server import LanguageServer
 
 from fbvm.analysis.parts import File
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.lsp import project_file
+from fbvm.interchange.twincat import TASK_SUFFIX
+from fbvm.lsp import foreign, project_file
 from fbvm.lsp.positions import Positions
 from fbvm.lsp.projects import Project, Projects, Settings, path_of
 from fbvm.run.project import FILE
@@ -27,6 +28,7 @@ TRIES = 5
 """How often a request waits for the check of texts that change meanwhile."""
 COLLECTED_AFTER_S = 10.0
 """How long nobody types before Python's garbage is collected, which takes tenths of a second."""
+START = types.Range(types.Position(0, 0), types.Position(0, 0))
 UNUSED = ("S0290", "S0291", "S0293")
 """Warnings of names that nobody uses, which editors show faded."""
 _SEVERITY = {"error": types.DiagnosticSeverity.Error, "warning": types.DiagnosticSeverity.Warning}
@@ -52,7 +54,8 @@ class Server(LanguageServer):
         return self.workspace.get_text_document(uri).source if uri is not None else None
 
     def uri(self, path: Path) -> str:
-        """The URI of a file, as the editor writes it if it has it open."""
+        """The URI of a file, as the editor writes it if it has it open; of a source within a container, that of the container."""
+        path = foreign.container_of(str(path)) or path
         return self.open_paths.get(path) or path.as_uri()
 
     def positions(self, source: Source) -> Positions:
@@ -91,6 +94,9 @@ class Server(LanguageServer):
         """A file was written, made or removed by somebody."""
         if path.name == FILE:
             self.project_file_changed(path)
+        elif foreign.is_container(path) or path.suffix.lower() == TASK_SUFFIX:
+            self._forgotten(self.projects.forget_container(path))
+            self._open_again()
         elif path not in self.open_paths:
             self._forgotten(self.projects.forget_regrouped(path))
             for project in self.projects.of(path):
@@ -126,11 +132,7 @@ class Server(LanguageServer):
 
     def changed(self, project: Project, path: Path) -> None:
         """Take the present text of a file into a program, and check it soon."""
-        text = self.projects.text(path)
-        if text is None:
-            project.program.remove(str(path))
-        else:
-            project.program.replace(str(path), text)
+        self.projects.take(project, path)
         if isinstance(project.task, asyncio.Task):
             project.task.cancel()
         project.task = asyncio.ensure_future(self._check(project))
@@ -178,16 +180,31 @@ class Server(LanguageServer):
     def tell(self, project: Project) -> None:
         """Tell the editor what is wrong with the files of a program, as far as that has changed."""
         for path in project.paths:
-            if str(path) not in project.program.files:
-                self._tell(self.uri(path), [])
-                continue
             found: dict[tuple[str, int, int, str], types.Diagnostic] = {}
             for other in self.projects.of(path):
-                source = other.program.files[str(path)].source
-                for each in other.program.diagnostics(str(path)):
+                file = other.program.files.get(str(path))
+                rows = [(each, file.source) for each in other.program.diagnostics(file.name)] if file is not None else []
+                for each, source in [*((each, each.source) for each in other.said.get(path, ())), *rows]:
                     found.setdefault((each.code, each.start, each.end, each.message), self.diagnostic(each, source))
-            self._tell(self.uri(path), list(found.values()))
+            held = self._within(project, path) if foreign.is_container(path) else []
+            self._tell(self.uri(path), [*found.values(), *held])
         self._tell_libraries(project)
+
+    def _within(self, project: Project, container: Path) -> list[types.Diagnostic]:
+        """What is wrong with the sources within a container, at its beginning: their places are none of its own."""
+        found = []
+        for name in project.held:
+            for each in project.program.diagnostics(name) if container in Path(name).parents else ():
+                line, column = each.source.place(each.start)
+                made = self.diagnostic(each, each.source)
+                made.message = f"{Path(name).relative_to(container)}:{line}:{column}: {made.message}"
+                made.range = START
+                found.append(made)
+        return found
+
+    def range(self, source: Source, start: int, end: int) -> types.Range:
+        """A piece of a source; of one within a container its beginning."""
+        return START if foreign.container_of(source.name) else self.positions(source).range(start, end)
 
     def _tell_libraries(self, project: Project) -> None:
         """Tell what is wrong with the files of libraries that a program uses."""
@@ -222,7 +239,7 @@ class Server(LanguageServer):
         related = []
         if found.related is not None and Path(found.related[0].name).is_absolute():
             other, at, said = found.related
-            place = self.positions(other).range(at, at + 1)
+            place = self.range(other, at, at + 1)
             related = [types.DiagnosticRelatedInformation(types.Location(self.uri(Path(other.name)), place), said)]
         return types.Diagnostic(
             self.positions(source).range(start, end), message, _SEVERITY[found.severity], found.code, None, "fbvm",

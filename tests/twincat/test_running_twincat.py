@@ -14,6 +14,8 @@ from fbvm.interchange.formats.given import inputs
 from fbvm.machine.plc import Plc
 from fbvm.run.project import Project, read_project
 
+HOUSE = Path(__file__).resolve().parents[2]
+
 
 def test_a_project_runs_with_its_task(tmp_path: Path) -> None:
     sources, said = inputs([write_project(tmp_path)])
@@ -93,3 +95,8 @@ def test_an_object_is_exported_and_what_plcopen_has_no_place_for_is_named(tmp_pa
         done = CliRunner().invoke(main, ["export", str(file), "-o", str(out)])
         assert (done.exit_code, said in done.output) == (status, True)
     assert '<pou name="FB_Counter"' in out.read_text(encoding="utf-8")
+
+
+def test_what_the_system_calls_before_the_first_cycle_is_not_warned_of() -> None:
+    found = compile_files(inputs([HOUSE / "examples" / "twincat" / "Conveyor.plcproj"])[0], dialect="twincat", runnable=True)
+    assert [message.code for message in found.diagnostics] == ["S0692"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fbvm.base.areas import AREAS, FLAG_AREAS, Address
-from fbvm.base.types import BOOL, ArrayType, Type, base
+from fbvm.base.types import BOOL, ArrayType, Type, base, fold
 from fbvm.check.expressions.values import is_any
 from fbvm.check.lint.body import Body
 from fbvm.check.symbols.facts import Facts, Pou, PouCall, Variable, is_block
@@ -90,9 +90,15 @@ def _instance(kind: Type) -> str:
     return kind.name if is_block(kind) else ""
 
 
+UNREAD = ("FB_INIT", "FB_REINIT", "FB_EXIT")
+"""Methods that the system calls, by folded name."""
+
+
 def result(body: Body) -> None:
-    """Warn of a function that never sets its result."""
+    """Warn of a function that never sets its result; nobody reads that of FB_init and its like, which have to declare one."""
     pou = body.pou
+    if pou.kind == "METHOD" and fold(pou.tree.name.text) in UNREAD:
+        return
     if pou.result is None or pou.result.written or not any(not isinstance(s, tree.Empty) for s in pou.tree.body):
         return
     if not any(isinstance(node, tree.Return) and node.value is not None for node in body.nodes):

@@ -99,6 +99,12 @@ def sources_by_name(found: Mapping[Path, Imported | None]) -> dict[str, Path | s
     return sources
 
 
+def source_files(sources: Mapping[str, Path | str]) -> dict[str, Path]:
+    """The files of sources by name: source texts, and objects of TwinCAT, whose lines are those of their files."""
+    return {name: Path(name) if isinstance(one, str) else one for name, one in sources.items()
+            if isinstance(one, Path) or Path(name).suffix.lower() in OBJECT_SUFFIXES}
+
+
 def inputs(paths: Sequence[Path], resource: str | None = None,
            memory: bool = False) -> tuple[list[Path | Source], list[Diagnostic]]:
     """What the compiler takes for these files, and what is said about projects among them; see `within`.  Raises OSError if a

@@ -18,7 +18,7 @@ from fbvm.cli.shared.options import mapping
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.dap.target import LaunchError, Target, checked
-from fbvm.interchange.formats.given import given_sources, inputs, usual_dialect
+from fbvm.interchange.formats.given import given_sources, inputs, source_files, usual_dialect
 from fbvm.machine.plc import Plc
 from fbvm.record.recording.container import RecordingError
 from fbvm.record.recording.file_reader import RecordingFile
@@ -111,9 +111,9 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     packets = NetworkPackets()
     world = program_world(image, cycle_ns, mappings, timing, seed, packets, given.get("engine", "auto"),
                           lambda name, plc: [row.of_plc(plc) for row in sets])  # fmt: skip
-    paths = {str(path): path for path in files}
-    texts = source_texts(image, given_sources(files, given.get("resource")), libraries)
-    return _target(given, world, "plc", texts, paths, packets, _said([*said, *compilation.diagnostics]))
+    named = given_sources(files, given.get("resource"))
+    texts = source_texts(image, named, libraries)
+    return _target(given, world, "plc", texts, source_files(named), packets, _said([*said, *compilation.diagnostics]))
 
 
 def _recording(path: Path, libraries: Sequence[Path]) -> Target:

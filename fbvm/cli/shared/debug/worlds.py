@@ -10,7 +10,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import Mapping as Mapped
 from fbvm.code.image import Image
-from fbvm.interchange.formats.given import given_sources
+from fbvm.interchange.formats.given import given_sources, source_files
 from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
@@ -52,8 +52,8 @@ def plant_sources(plant: Plant) -> DebugSources:
     paths: dict[str, Path] = {}
     texts: dict[str, str] = {}
     for kind in plant.kinds:
-        paths |= {str(path): path for path in kind.row.sources}
         given = given_sources(kind.row.sources, kind.row.resource)
+        paths |= source_files(given)
         texts |= source_texts(kind.runs[0].plc.image, given, kind.row.libraries)
     return DebugSources(paths, texts)
 
