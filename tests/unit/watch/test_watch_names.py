@@ -69,7 +69,8 @@ def test_a_reader_reads_what_read_does_now_and_later() -> None:
     image = compile_text("""TYPE Pair : STRUCT a : INT; b : BOOL; END_STRUCT END_TYPE
         PROGRAM Main VAR
             b : BOOL; bit AT W5.03 : BOOL; s : SINT; ui : UINT; d : DINT; ul : ULINT; r : REAL; lr : LREAL; t : TIME;
-            w : WORD := 5; c : CHAR; text : STRING[5]; pair : Pair; list : ARRAY[1..3] OF DINT; point : REF_TO Pair; one : (Off, On);
+            w : WORD := 5; c : CHAR; text : STRING[5]; pair : Pair; list : ARRAY[1..3] OF DINT; point : REF_TO Pair;
+            one : (Off, On);
         END_VAR
             b := NOT b; bit := b; s := s - 1; ui := ui - 1; d := d - 1; ul := ul - 1;
             r := r + REAL#0.1; lr := lr - 0.1; t := t + T#1s;
