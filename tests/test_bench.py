@@ -245,6 +245,16 @@ def test_the_script_objects(load: Load, capsys: pytest.CaptureFixture[str]) -> N
     assert len(script.in_cpp(200)) in (0, 2)
 
 
+def test_the_script_campaigns(load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    script = load("campaigns")
+    monkeypatch.setattr(script, "find_spec", lambda name: None)  # a cluster takes seconds to begin, and has a test of its own
+    monkeypatch.setattr(sys, "argv", ["campaigns.py", "12"])
+    script.main()
+    assert [line.split("  ")[0] for line in capsys.readouterr().out.splitlines()] == [
+        "12 runs by one process", "12 runs by 2 processes", "", ]
+    assert script.demo(12).plan.count == 12
+
+
 def test_the_script_llvmlite_range(load: Load) -> None:
     script = load("llvmlite_range")
     assert all(end.startswith("llvmlite==") for end in script.ends())

@@ -39,6 +39,10 @@ class Mismatch(Exception):
     """A process has another version of fbvm, or has received another program than was sent."""
 
 
+class Unreachable(Exception):
+    """There is no such cluster, it has no workers, or it has gone; the message says which."""
+
+
 @dataclass(frozen=True)
 class Bench:
     """All that a process needs: the plan, the programs as bytes with their fingerprints by name, and the version of fbvm."""

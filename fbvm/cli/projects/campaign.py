@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from fbvm.cli.shared.terminal import named, say, say_json
 
 if TYPE_CHECKING:
     from fbvm.campaign.execution import Execution, Result
+    from fbvm.campaign.executors import Executor
     from fbvm.campaign.groups import Group
     from fbvm.campaign.plan_file import Written
     from fbvm.campaign.runs import Outcome
@@ -47,6 +49,8 @@ FOLDER = Path("campaign-results")
 @click.option("--cuts", type=click.IntRange(min=0), default=0, metavar="N", help="Power cuts in each run.")
 @click.option("--timing", type=click.Choice(["exact", "real"]), default=None,
               help="How units answer: real, late and out of step by the seed of the run, is what they do by themselves.")
+@click.option("--cluster", metavar="local|tcp://HOST:PORT",
+              help="Have Dask execute the runs: in processes of this machine, or by the workers of a scheduler.")
 @click.option("--out", "folder", type=click.Path(file_okay=False, path_type=Path), default=FOLDER, show_default=True,
               metavar="DIR", help="Where results and recordings are kept; the same campaign goes on there.")
 @click.option("--fresh", is_flag=True, help="Begin anew, in place of results that are there.")
@@ -60,14 +64,14 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     by a trap, and by what --never, --always, --within and --until, or the campaign file, ask for.  Failing runs are grouped by
     what failed and where, and of each group one run is made as small as possible and recorded.
 
-    Status 0 if all runs were good, 1 if some failed, 3 if the program has errors."""
+    Status 0 if all runs were good, 1 if some failed, 3 if the program has errors, 5 if the cluster cannot be used."""
     check_parquet(options)
     plan, images, home = planned(files, program, libraries, options, lambda written, project: _changed(written, project, options))
     from fbvm.campaign.execution import Wrong
     from fbvm.campaign.planning import unfit_conditions
     from fbvm.campaign.runs import Outcome
     from fbvm.campaign.store import Store
-    from fbvm.campaign.work import Bench
+    from fbvm.campaign.work import Bench, Mismatch, Unreachable
 
     for message in unfit_conditions(plan):
         say(message, fg="yellow", err=True)
@@ -81,12 +85,15 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         store = _open(Store, options["folder"], bench.mark, options["fresh"])
         outcome.add(store.known)
         try:
-            _conduct(bench, outcome, store, processes(options["jobs"]))
+            _conduct(bench, outcome, store, processes(options["jobs"]), options["cluster"])
         finally:
             store.close()
             _finish(bench, outcome, options, as_json)
     except Wrong as error:
         refuse(error.diagnostics)
+    except (Mismatch, Unreachable) as error:
+        say(str(error), fg="red", err=True)
+        sys.exit(status.NETWORK)
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error.args[0] if error.args else error)) from None
     sys.exit(status.FAILED if outcome.failing else status.GOOD)
@@ -123,7 +130,7 @@ def _open(make: type[Store], folder: Path, mark: str, fresh: bool) -> Store:
             raise click.UsageError(f"{named(folder)} {error}: name another folder by --out, or begin anew by --fresh") from None
 
 
-def _conduct(bench: Bench, outcome: Outcome, store: Store, jobs: int) -> None:
+def _conduct(bench: Bench, outcome: Outcome, store: Store, jobs: int, cluster: str | None) -> None:
     """Executes what is left of a campaign, and shows how it goes."""
     from fbvm.campaign.runs import conduct
     from fbvm.run.time_limit import stopwatch
@@ -139,7 +146,16 @@ def _conduct(bench: Bench, outcome: Outcome, store: Store, jobs: int) -> None:
             rate = (done - there) * 1_000_000_000 / max(elapsed(), 1)
             update(f"{done:,} of {known:,} runs, {outcome.failing:,} failing, {rate:.0f} a second,", done, known)
 
-        conduct(bench, outcome, jobs, take)
+        conduct(bench, outcome, jobs, take, _cluster(bench, cluster, jobs) if cluster else None)
+
+
+def _cluster(bench: Bench, address: str, jobs: int) -> Executor:
+    """The cluster at an address.  Raises UsageError if Dask is not installed."""
+    if find_spec("distributed") is None:
+        raise click.UsageError("--cluster needs Dask: pip install 'fbvm[cluster]'")
+    from fbvm.campaign.cluster import InCluster
+
+    return InCluster(bench, address, jobs)
 
 
 # --- what is left behind ----------------------------------------------------------------------------------------------

@@ -1,0 +1,111 @@
+"""Has a Dask cluster execute the tasks of a campaign: processes of this machine, or those of a scheduler somewhere.
+
+The bench, with its Images, travels once to each worker, also to one that comes later.  A worker that goes away loses nothing: the
+scheduler gives its tasks to another one.  A scheduler executes whatever it is sent: it belongs into a network that one trusts."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from itertools import islice
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any, cast
+
+from distributed import Client, LocalCluster, WorkerPlugin, as_completed, get_worker
+from distributed.scheduler import KilledWorker
+
+from fbvm.base.version import VERSION
+from fbvm.campaign.work import Bench, Done, Mismatch, Task, Unreachable
+
+LOCAL = "local"
+"""In place of an address: processes of this machine."""
+TASKS_A_WORKER = 4
+"""Tasks that are with the scheduler at a time, for each thread of its workers: the next ones come with the results."""
+CONNECT_S = 10
+ASK_VERSION = "__import__('fbvm').__version__"
+
+
+class _Prepared(WorkerPlugin):
+    """Keeps the bench of a campaign in each worker."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.name, self.bench = bench.mark, bench
+
+
+def _work(mark: str, task: Task) -> Done:
+    """Does a task in a worker."""
+    return cast(_Prepared, get_worker().plugins[mark]).bench.work(0, task)
+
+
+class InCluster:
+    """Does tasks in a cluster: at `address`, such as tcp://192.168.1.5:8786, or in `jobs` processes of this machine, LOCAL.
+
+    Raises Unreachable, and Mismatch for a worker with another version of fbvm or without it."""
+
+    def __init__(self, bench: Bench, address: str, jobs: int) -> None:
+        self._bench, self._address, self._jobs = bench, address, jobs
+        self._stack = ExitStack()
+        self._threads = jobs
+
+    def __enter__(self) -> InCluster:
+        with ExitStack() as stack:
+            cluster = self._address if self._address != LOCAL else stack.enter_context(self._local(stack))
+            try:
+                client: Any = Client(cluster, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+                self._client = stack.enter_context(client)
+            except (OSError, ValueError) as error:
+                raise Unreachable(f"{self._address} is no Dask scheduler that answers: {error}") from None
+            self._check()
+            self._client.register_plugin(_Prepared(self._bench))
+            self._threads = sum(self._client.nthreads().values())
+            self._stack = stack.pop_all()
+        return self
+
+    def _local(self, stack: ExitStack) -> Any:
+        scratch = stack.enter_context(TemporaryDirectory())
+        return LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=self._jobs, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0,
+            local_directory=scratch, silence_logs=logging.CRITICAL)  # fmt: skip
+
+    def _check(self) -> None:
+        """Asks each worker for its version of fbvm."""
+        found = self._client.run(eval, ASK_VERSION, on_error="return")
+        if not found:
+            raise Unreachable(f"the scheduler {self._address} has no workers: start some by dask worker {self._address}")
+        for worker, version in found.items():
+            if isinstance(version, Exception):
+                raise Mismatch(f"the worker {worker} has no fbvm: {version}")
+            if version != VERSION:
+                raise Mismatch(f"the worker {worker} has fbvm {version}, not {VERSION}")
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stack.close()
+
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
+        """Each task with what came of it, None for one that ends every process that tries it."""
+        left, waiting = iter(tasks), dict[str, Task]()
+
+        def sent(count: int) -> list[Any]:
+            made = []
+            for task in islice(left, count):
+                future = self._client.submit(_work, self._bench.mark, task, pure=False)
+                waiting[future.key] = task
+                made.append(future)
+            return made
+
+        if not (first := sent(TASKS_A_WORKER * self._threads)):
+            return
+        running: Any = as_completed(first, loop=self._client.loop)  # type: ignore[no-untyped-call]
+        for future in running:
+            task = waiting.pop(future.key)
+            if future.status == "finished":
+                yield task, future.result()
+            elif future.status == "error" and isinstance(future.exception(), KilledWorker):
+                yield task, None
+            elif future.status == "error":
+                raise future.exception()
+            else:
+                raise Unreachable(f"{self._address} has gone away; the same command goes on where it was")
+            running.update(sent(1))

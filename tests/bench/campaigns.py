@@ -1,0 +1,78 @@
+"""How many runs a second a campaign executes: python tests/bench/campaigns.py [RUNS].
+
+The client of examples/demo.st under two network faults and a power cut a run, two seconds of virtual time each: in one process,
+in two, and by two Dask workers of this machine; and whether all came to the same results."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+HOUSE = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(HOUSE))
+
+from fbvm.campaign.execution import Result  # noqa: E402
+from fbvm.campaign.executors import Executor, InProcesses, InThisProcess  # noqa: E402
+from fbvm.campaign.plan_file import Written, any_cuts, any_faults, with_about  # noqa: E402
+from fbvm.campaign.planning import images_of, plan_of, program_project  # noqa: E402
+from fbvm.campaign.runs import Outcome, conduct  # noqa: E402
+from fbvm.campaign.work import Bench  # noqa: E402
+from fbvm.wire.link import Peer  # noqa: E402
+
+RUNS, WORKERS = 10_000, 2
+RUN_NS = 2_000_000_000
+
+
+def demo(runs: int) -> Bench:
+    """The campaign."""
+    about = {"for": RUN_NS, "runs": runs, "never": ("Main.Done AND Main.Written <> Main.Quantity",),
+             "servers": (Peer("192.168.250.1", 502),)}  # fmt: skip
+    written = replace(with_about(Written(), **about), faults=(any_faults(2, RUN_NS),), cuts=(any_cuts(1, RUN_NS),))
+    project = program_project([HOUSE / "examples" / "demo.st"], written.about, HOUSE)
+    images, _ = images_of(project)
+    return Bench.of(plan_of(written, project, images), images)
+
+
+def conducted(bench: Bench, executor: Executor, jobs: int) -> tuple[float, Outcome]:
+    """Seconds from the first result to the last one, and what came of it: to start processes takes a second or two."""
+    outcome, times = Outcome(bench.plan), list[float]()
+
+    def take(results: Sequence[Result]) -> None:
+        outcome.add(results)
+        times.append(time.monotonic())
+
+    conduct(bench, outcome, jobs, take, executor, shrinks=False)
+    return times[-1] - times[1], outcome
+
+
+def row(what: str, ours: str, besides: str = "") -> None:
+    print(f"{what:<58} {ours:>16}   {besides}", flush=True)
+
+
+def main() -> None:
+    runs = int(sys.argv[1]) if len(sys.argv) > 1 else RUNS
+    bench = demo(runs)
+    ways: dict[str, tuple[Executor, int]] = {
+        "one process": (InThisProcess(bench), 1), f"{WORKERS} processes": (InProcesses(bench, WORKERS), WORKERS)}  # fmt: skip
+    if find_spec("distributed") is not None:
+        from fbvm.campaign.cluster import LOCAL, InCluster
+
+        ways[f"{WORKERS} Dask workers"] = InCluster(bench, LOCAL, WORKERS), WORKERS
+    first: list[Result] = []
+    alone = 0.0
+    for name, (executor, jobs) in ways.items():
+        took, outcome = conducted(bench, executor, jobs)
+        rate = runs / max(took, 1e-9)
+        alone = alone or rate
+        first = first or outcome.rows
+        row(f"{runs:,} runs by {name}", f"{rate:.0f} a second", f"{rate / alone:.2f} times one process")
+        assert outcome.rows == first, f"{name} came to other results"
+    row("  scans in all, all ways with the same results", f"{sum(result.scans for result in first):,}")
+
+
+if __name__ == "__main__":
+    main()
