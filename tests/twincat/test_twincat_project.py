@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from twincat_files import PROJECT, write_project
 
-from fbvm.interchange.formats.given import given_sources
+from fbvm.interchange.formats.given import given_sources, usual_dialect, within
 from fbvm.interchange.twincat.project import read_project
 
 
@@ -48,3 +48,50 @@ def test_the_first_of_several_projects_runs_its_tasks_and_the_others_are_librari
     plant, core = write_project(tmp_path / "plant"), write_project(tmp_path / "core")
     tasks = [name for name in given_sources([plant, core]) if name.endswith("Tasks.st")]
     assert tasks == [f"{plant}/Tasks.st"]
+
+
+SYSTEM = """<?xml version="1.0"?>
+<TcSmProject><Project><System><Tasks><Task Id="3" Priority="5" CycleTime="40000"><Name>PlcTask</Name></Task></Tasks></System>
+<Plc>{0}</Plc></Project></TcSmProject>
+"""
+PART = '<?xml version="1.0"?><TcSmItem><Project Name="Plant" PrjFilePath="..\\..\\Plant\\Plant.plcproj"/></TcSmItem>'
+
+
+def written_system(folder: Path, *projects: str) -> Path:
+    """A system beside the folder Plant with the usual project."""
+    (folder / "Plant").mkdir()
+    write_project(folder / "Plant")
+    (folder / "_Config" / "PLC").mkdir(parents=True)
+    (folder / "_Config" / "PLC" / "Plant.xti").write_text(PART, encoding="utf-8")
+    path = folder / "Line.tsproj"
+    path.write_text(SYSTEM.format("".join(f"<Project {project}/>" for project in projects)), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("project", ['PrjFilePath="Plant\\Plant.plcproj"', 'File="Plant.xti"'])
+def test_a_system_runs_its_project_with_its_own_cycle(tmp_path: Path, project: str) -> None:
+    path = written_system(tmp_path, project)
+    made = within(path)
+    assert made is not None
+    assert "TASK PlcTask(INTERVAL := T#4000us, PRIORITY := 5);" in made.sources[-1].text
+    assert [(found.code, found.message) for found in made.diagnostics if found.code == "X0292"] == [
+        ("X0292", "the system gives the task PlcTask 4000 us and priority 5, its own file 20000 us and 20")]
+    assert made.errors == []
+    assert usual_dialect([path]) == "twincat"
+
+
+@pytest.mark.parametrize(("projects", "said"), [
+    ((), "the system has no PLC project"),
+    (('PrjFilePath="Plant\\Plant.plcproj"', 'File="Plant.xti"'), "the system has 2 PLC projects: Plant.plcproj Plant.plcproj"),
+    (('PrjFilePath="..\\Plant.plcproj"',), "..\\Plant.plcproj lies outside of the system's folder"),
+    (('PrjFilePath="C:\\Plant.plcproj"',), "C:\\Plant.plcproj lies outside of the system's folder"),
+    (('PrjFilePath="Plant\\Plant.exe"',), "the PLC project has no PrjFilePath with a .plcproj"),
+    (('File="..\\Plant.xti"',), "..\\Plant.xti lies outside of _Config/PLC"),
+    (('File="None.xti"',), "None.xti cannot be read: no such file or directory"),
+])  # fmt: skip
+def test_systems_that_cannot_be_run(tmp_path: Path, projects: tuple[str, ...], said: str) -> None:
+    made = within(written_system(tmp_path, *projects))
+    assert made is not None
+    [found] = made.errors
+    assert found.message.endswith(said)
+    assert made.sources == []

@@ -10,9 +10,9 @@ from typing import Any
 import click
 
 _HEAD_BYTES = 4_000
-_SOURCES = (b"plcopen.org/xml/tc6", b"<tcplcobject", b"developer/msbuild")
-"""What documents in PLCopen XML, objects and projects of TwinCAT have among their first bytes, in lower case: they are taken as
-the sources within them."""
+_SOURCES = (b"plcopen.org/xml/tc6", b"<tcplcobject", b"<tcsmproject", b"developer/msbuild")
+"""What documents in PLCopen XML, objects, systems and projects of TwinCAT have among their first bytes, in lower case: they are
+taken as the sources within them."""
 _FORMS = (
     ((b"fbvmrec",), "a recording", "`fbvm chart`, `table`, `why` and `step` look at it, `fbvm replay` does its run again"),
     ((b"fbvmtrc",), "a trace", "`fbvm chart`, `fbvm table` and `fbvm why` look at it"),

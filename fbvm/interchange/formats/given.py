@@ -13,11 +13,12 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file
 from fbvm.interchange.cx.markup import is_project
 from fbvm.interchange.imported import Imported
-from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX, TASK_SUFFIX, TASKS
+from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX, SYSTEM_SUFFIX, TASK_SUFFIX, TASKS
 
 CX_SUFFIXES = (".cxp", ".cxt")
 TWINCAT_SUFFIXES = (*OBJECT_SUFFIXES, TASK_SUFFIX)
-SUFFIXES = (*CX_SUFFIXES, PROJECT_SUFFIX, *TWINCAT_SUFFIXES)
+PROJECT_SUFFIXES = (PROJECT_SUFFIX, SYSTEM_SUFFIX)
+SUFFIXES = (*CX_SUFFIXES, *PROJECT_SUFFIXES, *TWINCAT_SUFFIXES)
 """Endings, in small letters, of files of other tools; PLCopen XML is known by what it says."""
 DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
 """What a document in PLCopen XML has among its first bytes."""
@@ -25,7 +26,7 @@ DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
 
 def usual_dialect(paths: Iterable[Path]) -> str:
     """The dialect of files for which nobody has named one: that of the tool whose files they are."""
-    return "twincat" if any(path.suffix.lower() in (PROJECT_SUFFIX, *TWINCAT_SUFFIXES) for path in paths) else "standard"
+    return "twincat" if any(path.suffix.lower() in (*PROJECT_SUFFIXES, *TWINCAT_SUFFIXES) for path in paths) else "standard"
 
 
 def is_cx_project(path: Path) -> bool:
@@ -45,6 +46,10 @@ def within(path: Path, resource: str | None = None, memory: bool = False) -> Imp
         from fbvm.interchange.twincat.project import read_project
 
         return read_project(path)
+    if suffix == SYSTEM_SUFFIX:
+        from fbvm.interchange.twincat.system import read_system
+
+        return read_system(path)
     try:
         data = read_file(path, SOURCE_BYTES) if path.is_file() or suffix in SUFFIXES else b""
     except OSError:
@@ -91,11 +96,12 @@ def sources_by_name(found: Mapping[Path, Imported | None]) -> dict[str, Path | s
 
     Of several projects of TwinCAT the first runs its tasks; the others are libraries that it uses."""
     sources: dict[str, Path | str] = {}
-    projects = [path for path in found if path.suffix.lower() == PROJECT_SUFFIX]
+    projects = [path for path in found if path.suffix.lower() in PROJECT_SUFFIXES]
     for path, made in found.items():
         sources.update({str(path): path} if made is None else made.files)
         if path in projects[1:]:
-            sources.pop(f"{path}/{TASKS}", None)
+            for name in [name for name in made.files if name.endswith(f"{PROJECT_SUFFIX}/{TASKS}")] if made else []:
+                sources.pop(name)
     return sources
 
 

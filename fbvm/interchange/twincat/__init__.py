@@ -1,6 +1,7 @@
-"""TwinCAT's files: objects (`.TcPOU`, `.TcDUT`, `.TcGVL`, `.TcIO`, `.TcTTO`) and projects (`.plcproj`), read as sources."""
+"""TwinCAT's files: objects (`.TcPOU`, `.TcDUT`, `.TcGVL`, `.TcIO`, `.TcTTO`) projects (`.plcproj`) and systems
+(`.tsproj`), read as sources."""
 
-PROJECT_SUFFIX = ".plcproj"
+PROJECT_SUFFIX, SYSTEM_SUFFIX = ".plcproj", ".tsproj"
 OBJECT_SUFFIXES = (".tcpou", ".tcdut", ".tcgvl", ".tcio")
 """Endings of files that hold declarations or bodies, in small letters."""
 TASK_SUFFIX = ".tctto"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 from fbvm.base.diagnostics import Diagnostic, Source
@@ -17,8 +19,18 @@ SPACE = "// a name that stands in front of other names\nVAR_GLOBAL\nEND_VAR\n"
 _IDENTIFIER = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 
-def read_project(path: Path) -> Imported:
+@dataclass(frozen=True)
+class TaskSettings:
+    """How a task runs: its cycle in microseconds, and its priority, of which the smallest number comes first."""
+
+    cycle_us: int
+    priority: int
+
+
+def read_project(path: Path, settings: Mapping[str, TaskSettings] | None = None) -> Imported:
     """Reads a project and the objects that it lists, which lie in its folder or below.
+
+    `settings` are those of the system that runs it, by the names of tasks: they hold, in place of what the tasks' files say.
 
     Raises OSError if the file of the project cannot be read; what is wrong with an object is a diagnostic."""
     parsed = parse_markup(read_file(path, SOURCE_BYTES), str(path))
@@ -40,15 +52,32 @@ def read_project(path: Path) -> Imported:
         tasks += [found.task] if found.task else []
     sources += [Source(f"{path}/{space}.st", SPACE) for space in _spaces(root)]
     if tasks:
-        sources.append(task_source(str(path), tasks, _property(root, "Name")))
+        sources.append(task_source(str(path), tasks, _property(root, "Name"), settings))
+        diagnostics += _other_settings(xml, root, tasks, settings or {})
     references = tuple(item.get("Include").partition(",")[0] for item in _references(root))
     return Imported({source.name: source.text for source in sources}, diagnostics, "twincat",
                     f"{path.name} is a project of TwinCAT", references)  # fmt: skip
 
 
-def task_source(name: str, tasks: list[Element], application: str = "") -> Source:
+def task_source(name: str, tasks: list[Element], application: str = "",
+                settings: Mapping[str, TaskSettings] | None = None) -> Source:  # fmt: skip
     """The source that says when the programs run, for tasks out of a file of this name, in the project `application`."""
-    return Source(f"{name}/{TASKS}", configuration(tasks, application))
+    return Source(f"{name}/{TASKS}", configuration(tasks, application, settings))
+
+
+def _own(task: Element) -> TaskSettings:
+    """What the file of a task says."""
+    return TaskSettings(_number(task, "CycleTime", 10_000), _number(task, "Priority", 20))
+
+
+def _other_settings(xml: Source, root: Element, tasks: list[Element],
+                    settings: Mapping[str, TaskSettings]) -> Iterator[Diagnostic]:  # fmt: skip
+    for task in tasks:
+        name, own = task.get("Name"), _own(task)
+        if (held := settings.get(name, own)) != own:
+            yield Diagnostic("X0292", xml, root.at, root.at + 1,
+                             f"the system gives the task {name} {held.cycle_us} us and priority {held.priority}, its own file "
+                             f"{own.cycle_us} us and {own.priority}", "the system's hold")  # fmt: skip
 
 
 def _property(root: Element, name: str) -> str:
@@ -92,16 +121,17 @@ def _object(project: Path, xml: Source, item: Element) -> ImportedObject:
         return refused("X0501", f"{written} cannot be read: {reason(error)}")
 
 
-def configuration(tasks: list[Element], application: str = "") -> str:
+def configuration(tasks: list[Element], application: str = "", settings: Mapping[str, TaskSettings] | None = None) -> str:
     """The text of a CONFIGURATION with these tasks (`Task` of a `.TcTTO`): CycleTime is in microseconds, the smallest Priority
-    comes first, PouCall names the programs in their order.  The configuration is named as the project, `application`."""
+    comes first, PouCall names the programs in their order.  The configuration is named as the project, `application`.
+    `settings` of a task, by its name, hold in place of its own."""
     name = application if _IDENTIFIER.fullmatch(application) and "." not in application else "TwinCAT"
     lines = [f"CONFIGURATION {name}", "RESOURCE PLC ON fbvm"]
     programs: list[str] = []
     for number, task in enumerate(tasks):
         name = task.get("Name") if _IDENTIFIER.fullmatch(task.get("Name")) else f"Task_{number + 1}"
-        cycle_us, priority = _number(task, "CycleTime", 10_000), _number(task, "Priority", 20)
-        lines.append(f"    TASK {name}(INTERVAL := T#{cycle_us}us, PRIORITY := {priority});")
+        held = (settings or {}).get(task.get("Name"), _own(task))
+        lines.append(f"    TASK {name}(INTERVAL := T#{held.cycle_us}us, PRIORITY := {held.priority});")
         calls = [named.text.strip() for call in task.all("PouCall") for named in call.all("Name")]
         programs += [f"    PROGRAM {call} WITH {name} : {call};" for call in calls if _IDENTIFIER.fullmatch(call)]
     return "\n".join([*lines, *programs, "END_RESOURCE", "END_CONFIGURATION", ""])
