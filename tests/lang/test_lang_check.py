@@ -46,6 +46,7 @@ def test_a_program_that_does_what_it_says(tmp_path: Path, line: str) -> None:
     assert checked(tmp_path, line) is None  # type: ignore[func-returns-value]
 
 
+@pytest.mark.slow
 @each_of("line, told", WRONG.values(), ids=WRONG)
 def test_a_program_that_does_anything_else_fails(tmp_path: Path, line: str, told: str) -> None:
     with pytest.raises(AssertionError, match=told):
