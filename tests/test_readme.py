@@ -36,6 +36,7 @@ def test_the_first_program_draws_that_chart(tmp_path: Path, monkeypatch: pytest.
     assert result.output == shown
 
 
+@pytest.mark.slow
 def test_the_crossing_is_drawn_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
@@ -45,6 +46,7 @@ def test_the_crossing_is_drawn_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert result.output == shown
 
 
+@pytest.mark.slow
 def test_stepping_says_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     guide = page("docs/howto/stepping.md")
@@ -56,6 +58,7 @@ def test_stepping_says_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert result.output == shown
 
 
+@pytest.mark.slow
 def test_the_python_example_prints_that(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(HOUSE)
     output = io.StringIO()

@@ -37,6 +37,12 @@ def test_features_on_every_engine(table: list[Program]) -> None:
     go_through((f"{p.path.stem}:{p.line} {p.title}", partial(check, p, builds)) for p in table)
 
 
+def test_every_program_expects_something() -> None:
+    """A program without an expectation would show no more than that it compiles."""
+    everything = (p for table in TABLES.values() for p in table)
+    assert [f"{p.name}:{p.line}" for p in everything if not (p.expected or p.diagnostics or p.trap)] == []
+
+
 def test_every_table_is_there() -> None:
     covered = {number for path in HERE.glob("*.st") for number in numbers(path)} | set(GRAPHIC)
     assert covered == set(titles()) == set(range(1, 77))

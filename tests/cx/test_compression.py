@@ -17,6 +17,7 @@ def test_plain_and_coded_literals_and_copies_that_overlap() -> None:
         assert decompress(bytes.fromhex(stream)) == plain, stream
 
 
+@pytest.mark.slow
 def test_what_was_compressed_comes_back() -> None:
     seeded = random.Random(7)
     texts = [b"", b"A", b"ab", b"abc" * 700, bytes(10_000), seeded.randbytes(3_000),
@@ -33,6 +34,7 @@ def test_a_stream_that_is_cut_says_so_at_every_byte() -> None:
             decompress(stream[:length])
 
 
+@pytest.mark.slow
 def test_damage_is_told_and_a_flood_is_stopped() -> None:
     for stream, words in ((b"\x02\x06", "first two bytes"), (b"\x00\x07", "first two bytes"), (b"", "first two bytes"),
                           (bytes.fromhex("0006") + b"\xff" * 8, "before the beginning")):  # fmt: skip
@@ -42,6 +44,7 @@ def test_damage_is_told_and_a_flood_is_stopped() -> None:
         decompress(compress(bytes(100_000)), 1000)
 
 
+@pytest.mark.slow
 def test_any_bytes_are_decompressed_or_refused() -> None:
     seeded, most = random.Random(11), 5_000
     whole = compress("".join(f"LD {n % 7}.{n % 16:02}\nOUT W{n}.00\n" for n in range(20)).encode())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 from cx_text import SAMPLE
 
@@ -51,6 +52,7 @@ def test_a_changed_rung_is_drawn_beside_the_one_before() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_added_and_removed_rungs_stand_on_their_side() -> None:
     more = OLD.replace("END_LADDER", "RUNG 2\nLD P_On\nOUT 1.01\nEND_LADDER")
     assert shown(OLD, more)[0] == "Main: 1 rung added"
@@ -77,6 +79,7 @@ def test_symbols_comments_and_texts_differ_too() -> None:
         "@@ -2,3 +2,3 @@", " VAR_INPUT x : INT; END_VAR", "-Twice := 2 * x;", "+Twice := 3 * x;", " END_FUNCTION"]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_projects_differ_by_their_status_and_quietly(tmp_path: Path) -> None:
     one, other = tmp_path / "a.cxp", tmp_path / "b.cxt"
     one.write_bytes(compress(SAMPLE.bytes()))

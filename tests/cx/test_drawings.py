@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 from cx_text import SAMPLE
 
@@ -18,6 +19,7 @@ def drawn(tmp_path: Path, old: bytes = b"", new: bytes = b"") -> list[str]:
     return [" ".join(line.split()) for line in done.output.splitlines()]
 
 
+@pytest.mark.slow
 def test_names_addresses_and_comments_stand_below_the_rung(tmp_path: Path) -> None:
     lines = drawn(tmp_path)
     at = lines.index("RUNG 0 self hold")

@@ -54,6 +54,7 @@ def again(made: ExportedProject) -> dict[str, str]:
     return found.files
 
 
+@pytest.mark.slow
 def test_sources_that_say_the_same_change_no_byte() -> None:
     for cxt in (SAMPLE, LATER):
         made = exported(cxt)
@@ -67,6 +68,7 @@ def test_one_rung_that_changes_changes_that_rung_only() -> None:
     assert made.changed == ["NewProgram1, section One: 1 rung changed"]
 
 
+@pytest.mark.slow
 def test_a_new_rung_moves_numbers_of_rungs_and_markers() -> None:
     made = exported(
         LATER,
@@ -90,6 +92,7 @@ def test_a_new_rung_moves_numbers_of_rungs_and_markers() -> None:
         "RUNG 0", 'RUNG 1 the "new" one', "RUNG 2 alone", "RUNG 3", "RUNG 4"]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_rung_that_goes_takes_its_marker_along() -> None:
     made = exported(LATER, ("RUNG 1 alone\n", ""))
     assert made.data is not None

@@ -40,6 +40,7 @@ def parsed(data: bytes, encoding: str = "") -> CxText:
 # --- the text ---
 
 
+@pytest.mark.slow
 def test_text_and_compressed_text_are_the_same_project() -> None:
     plain, packed = imported(SAMPLE), import_project(compress(SAMPLE.bytes()), "line.cxp")
     assert plain.files == packed.files
@@ -147,6 +148,7 @@ def test_a_symbol_of_no_known_type_or_address_is_named() -> None:
 # --- rungs ---
 
 
+@pytest.mark.slow
 def test_the_sample_runs() -> None:
     plc = started(imported(SAMPLE))
     plc.write("Start_PB", True)
@@ -170,6 +172,7 @@ def test_sections_comments_and_notes_stand_where_they_stood() -> None:
         "SECTION END", "RUNG 2", "END(001)", "END_LADDER", "END_PROGRAM"]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_operands_of_any_width_and_decimal_commas() -> None:
     made = with_rung("LD P_On\nMOV(021) *Pointer D50\n+F(454) Level +1,5E+0 D60\nMOVL(498) #10002 Level",
                      "Pointer,D10,CHANNEL,,,", "Level,D40,CHANNEL,,,")  # fmt: skip
@@ -275,6 +278,7 @@ END;
 END;"""
 
 
+@pytest.mark.slow
 def test_a_timer_of_a_block_is_one_of_each_instance() -> None:
     def call(name: str, entering: str, leaving: str) -> tuple[str, ...]:
         return ("0|1|1|1|1|LD|P_On|1", f"1|0|7|1|1|FBCALL|{name}|9", f"0|2|8|1|1|FB_INPUT|{entering}|10",
@@ -313,6 +317,7 @@ def test_elements_that_are_not_known_are_named_with_their_rung() -> None:
 # --- programs ---
 
 
+@pytest.mark.slow
 def test_what_is_no_ladder_protected_or_in_no_task_is_told() -> None:
     text = SAMPLE.text
     for changed, code, words in (
@@ -334,6 +339,7 @@ def test_one_of_several_plcs_is_chosen_by_name() -> None:
     assert "no PLC Third" in import_project(data, "two.cxt", plc="Third").diagnostics[0].message
 
 
+@pytest.mark.slow
 def test_the_memory_window_gives_initial_values_on_request() -> None:
     lines = "[OMRON.Data Monitor.Component]\nCIO=0:7\nD=0:0,1:7789,2:24aa,3048-3050:5\nE0_=4:1\n"
     dump = " ".join(f"{byte:02X}" for byte in lines.encode())
@@ -344,6 +350,7 @@ def test_the_memory_window_gives_initial_values_on_request() -> None:
     assert [plc.read(word) for word in ("D0", "D1", "D2", "D3049", "E0_4")] == [0, 0x7789, 0x24AA, 5, 1]
 
 
+@pytest.mark.slow
 def test_the_same_definition_serves_several_instances() -> None:
     assert DOUBLE.count("FBR[") == 1
     calls = tuple(

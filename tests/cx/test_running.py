@@ -18,6 +18,7 @@ from fbvm.testing.rig import Rig
 from fbvm.testing.subject import SubjectError, subject
 
 
+@pytest.mark.slow
 def test_a_project_runs_and_its_recording_has_its_rungs(tmp_path: Path) -> None:
     file, trace = tmp_path / "line3.cxp", tmp_path / "line3.fbtrace"
     file.write_bytes(compress(SAMPLE.bytes()))
@@ -45,6 +46,7 @@ def saved(folder: Path, cut: int | None = None) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_a_plc_of_an_fbvm_toml_runs_a_project(tmp_path: Path) -> None:
     saved(tmp_path)
     toml = tmp_path / "fbvm.toml"
@@ -63,6 +65,7 @@ def test_a_plc_of_an_fbvm_toml_runs_a_project(tmp_path: Path) -> None:
         PlantRig(toml)
 
 
+@pytest.mark.slow
 def test_a_test_takes_a_project_and_each_of_its_programs(tmp_path: Path) -> None:
     file = saved(tmp_path)
     for name in (None, "NewProgram1"):
@@ -76,6 +79,7 @@ def test_a_test_takes_a_project_and_each_of_its_programs(tmp_path: Path) -> None
         subject([tmp_path / "none.cxp"], None)
 
 
+@pytest.mark.slow
 def test_a_debugger_opens_a_project_with_the_texts_of_its_programs(tmp_path: Path) -> None:
     file = saved(tmp_path)
     target = open_launch({"program": str(file)})
@@ -88,6 +92,7 @@ def test_a_debugger_opens_a_project_with_the_texts_of_its_programs(tmp_path: Pat
     assert "it is cut" in told.value.output
 
 
+@pytest.mark.slow
 def test_a_run_begins_with_the_memory_window_if_asked_to(tmp_path: Path) -> None:
     dump = " ".join(f"{byte:02X}" for byte in b"[OMRON.Data Monitor.Component]\nD=200:1f4\n")
     keys = f"  Memory:=\n  BEGIN\n   Data:=\n$?St$Bk?_#[900]\n{dump}\n$?St$Bk?_#[900]\n  END;"

@@ -50,6 +50,7 @@ def requests(plc: Plc, peer: ModbusPeer, en: str, command: str, steps: list[Step
     return counts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", ALL)
 def test_blocks_of_mtcp_etn(block: str) -> None:
     for steps, expected in ((RISES_AND_STAYS, [0, 0, 1]), (RISES_AND_FALLS, [0] * 4), (FALLS_AND_RISES, [1] * 5)):

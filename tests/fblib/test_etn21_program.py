@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 from fbvm.base.data import data_folder
 
 FOLDER = data_folder("fblib") / "omron" / "etn21"
@@ -98,6 +100,7 @@ def wrong_with(path: Path) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 def test_a_function_names_only_what_its_head_declares() -> None:
     assert {path.stem: wrong for path in FUNCTIONS if (wrong := wrong_with(path))} == {}
 

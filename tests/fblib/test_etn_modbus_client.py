@@ -100,6 +100,7 @@ def answering(reply: Callable[[bytes], list[Action]]) -> ModbusPeer:
     return ModbusPeer(None, reply)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing", ["exact", "real"])
 def test_the_sheets_own_request(timing: str) -> None:
     """03 for several D registers, byte for byte on the wire."""
@@ -311,6 +312,7 @@ def test_a_server_that_misbehaves(misdeed: str, timing: str) -> None:
     recovers(rig)
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize(
     "rude", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK_RUDE)) for name in RUDE_PEERS]

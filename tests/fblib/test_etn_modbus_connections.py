@@ -36,6 +36,7 @@ def drawn(rig: Rig, scans: int, *signals: str) -> str:
     return chart(rig.plc, scans, [(signal, NAMES.get(signal, "")) for signal in signals])
 
 
+@pytest.mark.slow
 def test_the_program_in_the_readme() -> None:
     readme = (data_folder("fblib") / "omron" / "etn_modbus" / "README.md").read_text(encoding="utf-8")
     text = re.search(r"```\n(PROGRAM.*?)```", readme, re.S)
@@ -55,6 +56,7 @@ def test_the_port_may_be_set_by_a_declaration() -> None:
     assert plc.read("D30019") == 1502
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sockets", [1, 3])
 def test_words_that_another_program_has_left_hold_nobody_up(sockets: int) -> None:
     """W485 to W487 say which socket listens, receives and sends."""
@@ -69,6 +71,7 @@ def test_words_that_another_program_has_left_hold_nobody_up(sockets: int) -> Non
 # --- scan by scan -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_it_closes_first_and_listens_then() -> None:
     assert drawn(Rig(), 5, "CIO 1519.01", "CIO 1519.05", "CIO 1509.15", "D30019", "D30009", "W496") == """
         CIO1519.01  ..###      TCP Passive Open Request Switch
@@ -122,6 +125,7 @@ def test_the_next_client_is_let_in_three_scans_after_the_last_has_left() -> None
 # --- one client after the other ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize("reset", [False, True])
 def test_many_clients_in_turn(timing: str, reset: bool) -> None:
@@ -247,6 +251,7 @@ def test_a_configured_port_is_the_only_one() -> None:
     assert rig.client(port=502).ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pins", first_quick(["IP_Address2 := 256", "Sockets := 0", "Sockets := 9", "IP_Address4 := 65535"]))
 def test_settings_that_cannot_be(pins: str) -> None:
     rig = Rig(pins)
@@ -285,6 +290,7 @@ def test_several_clients_at_once(timing: str, sockets: int) -> None:
     assert clients[0].ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 def test_the_areas_go_from_socket_to_socket() -> None:
     """While the reply to one is sent, the request of the other is received."""
     rig = Rig("Sockets := 2")

@@ -24,6 +24,7 @@ EXAMPLES = {  # section of the sheet: words before, request, reply, words after
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @each_of("timing", ["exact", "real"])
 @each_of("section", EXAMPLES)
 def test_the_examples_of_the_sheet(section: str, timing: str) -> None:
@@ -186,6 +187,7 @@ def test_0f_where_it_is_switched_on(address: int, quantity: int) -> None:
     assert model.agrees(rig)
 
 
+@pytest.mark.slow
 def test_the_standard_order_of_checks() -> None:
     """Function, then structure and value, then address."""
     client = Rig("Fn0F := TRUE").client()

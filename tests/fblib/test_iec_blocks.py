@@ -99,6 +99,7 @@ def test_edges(block: str, table: str) -> None:
 # --- counters (table 45) ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("suffix", COUNTERS)
 def test_ctu(suffix: str) -> None:
     plays("CTU" + suffix, "CU R PV", "Q CV", """
@@ -131,6 +132,7 @@ def test_ctd(suffix: str) -> None:
     """)  # fmt: skip
 
 
+@pytest.mark.slow
 @each_of("suffix", COUNTERS)
 def test_ctud(suffix: str) -> None:
     plays("CTUD" + suffix, "CU CD R LD PV", "QU QD CV", """

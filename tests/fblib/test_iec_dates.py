@@ -57,6 +57,7 @@ def test_a_moment_is_put_together_and_taken_apart(moment: datetime) -> None:
     assert [machine.read(f"Main.{name}2") for name in ("y", "m", "d", "h", "n", "s", "ms")] == parts
 
 
+@pytest.mark.slow
 @each_of("year", [1900, 2000, 2023, 2024])
 @each_of("month", range(1, 13))
 def test_each_month_ends_with_its_last_day(year: int, month: int) -> None:

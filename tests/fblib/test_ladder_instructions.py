@@ -48,6 +48,7 @@ def words(text: str) -> dict[int, int]:
     return {int(number): int(value, 16) for number, value in pairs}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("table", first_quick(TABLES), ids=lambda table: table.stem)
 def test_results_and_flags(table: Path) -> None:
     """Each row is a rung of one program, and each scan executes one of them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 from rows import each_of
 
@@ -38,6 +39,7 @@ def listed() -> str:
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.slow
 def test_the_list_is_as_the_table_and_the_library() -> None:
     text = listed()
     if os.environ.get("FBVM_REWRITE"):
@@ -45,6 +47,7 @@ def test_the_list_is_as_the_table_and_the_library() -> None:
     assert LIST.read_text(encoding="utf-8") == text
 
 
+@pytest.mark.slow
 def test_everything_says_what_it_does_or_why_it_is_refused() -> None:
     for row in instruction_set().rows.values():
         assert len(meaning(row)) > 10, row.mnemonic

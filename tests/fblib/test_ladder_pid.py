@@ -29,6 +29,7 @@ def step(plc: Plc, value: int, scans: int = 1) -> list[int]:
     return seen
 
 
+@pytest.mark.slow
 def test_off_does_nothing_and_on_is_proportional_to_the_deviation() -> None:
     plc = loop()
     assert step(plc, 0, 2) == [0, 0]
@@ -41,6 +42,7 @@ def test_off_does_nothing_and_on_is_proportional_to_the_deviation() -> None:
     assert step(plc, 0) == [0]
 
 
+@pytest.mark.slow
 def test_forward_action_the_half_output_and_a_narrow_band() -> None:
     for settings, band, value, expected in ((1, P_100, 0xA0, 0x20), (8, P_100, 0x80, 0x80), (0, P_100 // 2, 0x60, 0x40),
                                             (1, P_100, 0x40, 0)):  # fmt: skip
@@ -86,6 +88,7 @@ def test_ranges_of_twelve_bits_in_and_sixteen_out() -> None:
     assert step(plc, 0)[0] == round(0x800 / 0xFFF * 0xFFFF)
 
 
+@pytest.mark.slow
 def test_settings_out_of_range_are_an_error_and_nothing_is_written() -> None:
     for wrong in ({"band": 0}, {"ti": 0}, {"ti": 8192}, {"td": 8192}, {"period": 0}, {"settings": 0x0990}, {"ranges": 0x0020},
                   {"ranges": 0x0990}, {"wanted": 0x100}):  # fmt: skip
@@ -163,6 +166,7 @@ def tuned(gain: int = 0, hysteresis: int = 0, forward: bool = False) -> Plc:
     return plc
 
 
+@pytest.mark.slow
 def test_autotuning_finds_constants_with_which_the_loop_comes_to_rest() -> None:
     plc = tuned()
     heater = Heater(plc)
@@ -178,6 +182,7 @@ def test_autotuning_finds_constants_with_which_the_loop_comes_to_rest() -> None:
     assert heater.warmth == pytest.approx(150, abs=3)
 
 
+@pytest.mark.slow
 def test_the_gain_of_autotuning_widens_the_band() -> None:
     bands = []
     for gain in (100, 200):

@@ -20,11 +20,13 @@ def run_bits(rungs: str, rows: list[dict[str, bool]], shown: str) -> list[list[i
     return seen
 
 
+@pytest.mark.slow
 def test_tim_counts_down_and_starts_again() -> None:
     rows = [{"CIO 0.00": True}, {}, {}, {}, {"CIO 0.00": False}, {"CIO 0.00": True}]
     assert run_bits("LD 0.00\nTIM 0 #0002", rows, "T0 TF0") == [[2, 0], [1, 0], [0, 1], [0, 1], [2, 0], [2, 0]]
 
 
+@pytest.mark.slow
 def test_tim_of_zero_is_over_at_once_and_a_set_value_that_is_no_bcd_is_refused() -> None:
     assert run_bits("LD 0.00\nTIM 0 #0000", [{"CIO 0.00": True}], "TF0") == [[1]]
     rows = [{"CIO 0.00": True, "D0": 10}]  # type: ignore[dict-item]
@@ -36,11 +38,13 @@ def test_timx_is_binary_and_an_interlock_resets_it() -> None:
     assert run_bits("LD 0.00\nIL\nLD P_On\nTIMX 3 &20\nILC", rows, "T3") == [[20], [19], [20], [20]]
 
 
+@pytest.mark.slow
 def test_ttim_keeps_what_has_passed() -> None:
     rows = [{"CIO 0.00": True}, {}, {"CIO 0.00": False}, {"CIO 0.00": True}, {}, {"CIO 0.01": True}]
     assert run_bits("LD 0.00\nLD 0.01\nTTIM 1 #0002", rows, "T1 TF1") == [[0, 0], [1, 0], [1, 0], [1, 0], [2, 1], [0, 0]]
 
 
+@pytest.mark.slow
 def test_cnt_counts_rises_down_and_reset_comes_first() -> None:
     up = {"CIO 0.00": True}
     rows = [up, {"CIO 0.00": False}, up, {"CIO 0.00": False}, up, {"CIO 0.01": True}, {"CIO 0.01": False}]
@@ -48,6 +52,7 @@ def test_cnt_counts_rises_down_and_reset_comes_first() -> None:
         [2, 0], [2, 0], [1, 0], [1, 0], [0, 1], [2, 0], [2, 0]]
 
 
+@pytest.mark.slow
 def test_cntr_goes_round() -> None:
     up, down, off = {"CIO 0.00": True}, {"CIO 0.01": True}, {"CIO 0.00": False, "CIO 0.01": False}
     rows = [up, off, up, off, down, off, {**up, **down}]
@@ -55,6 +60,7 @@ def test_cntr_goes_round() -> None:
         [1, 0], [1, 0], [0, 1], [0, 1], [1, 1], [1, 1], [1, 1]]
 
 
+@pytest.mark.slow
 def test_sft_moves_on_the_rise_of_its_clock() -> None:
     rows = [{"CIO 0.00": True, "CIO 0.01": True}, {}, {"CIO 0.01": False}, {"CIO 0.01": True}, {"CIO 0.02": True}]
     assert run_bits("LD 0.00\nLD 0.01\nLD 0.02\nSFT W0 W1", rows, "W0") == [[1], [1], [1], [3], [0]]
@@ -104,6 +110,7 @@ def test_a_timer_that_adds_up_counts_the_time_in_which_it_is_on(cycle_ns: int) -
     assert 1_400 * MS <= on_ns < 1_500 * MS + 2 * cycle_ns
 
 
+@pytest.mark.slow
 def test_a_timer_with_eight_digits_outlasts_the_others() -> None:
     plc = Plc(plc_of("LD 0.00\nTIML D0 D2 #00012345").image, 100 * MS)
     plc.write("CIO 0.00", True)
@@ -115,6 +122,7 @@ def test_a_timer_with_eight_digits_outlasts_the_others() -> None:
     assert [plc.read(name) for name in ("D0", "D2", "D3")] == [1, 0, 0]
 
 
+@pytest.mark.slow
 def test_a_timer_with_eight_set_values_assumed() -> None:
     plc = Plc(plc_of("LD 0.00\nMTIMX D0 D1 D10").image, 100 * MS)
     for place, value in (("D10", 1), ("D11", 3), ("D13", 1), ("CIO 0.00", True)):
@@ -135,6 +143,7 @@ def test_a_timer_with_eight_set_values_assumed() -> None:
 # --- what else happens to timers --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_timer_that_is_jumped_over_counts_on_below_t2048_assumed() -> None:
     rungs = "LD 0.00\nJMP 1\nLD P_On\nTIM 5 #0003\nLD P_On\nTIM 2048 #0003\nJME 1"
     rows = [{"CIO 0.00": True}, {"CIO 0.00": False}, {}, {}, {"CIO 0.00": True}]
@@ -142,17 +151,20 @@ def test_a_timer_that_is_jumped_over_counts_on_below_t2048_assumed() -> None:
         [3, 0, 3, 0], [2, 0, 3, 0], [1, 0, 3, 0], [0, 1, 3, 0], [0, 1, 0, 1]]
 
 
+@pytest.mark.slow
 def test_a_present_value_that_somebody_writes_is_where_a_timer_goes_on() -> None:
     rungs = "LD P_On\nTIMX 5 &9\nLD 0.00\n@MOV &3 T5"
     rows = [{}, {"CIO 0.00": True}, {}, {}, {}]
     assert run_bits(rungs, rows, "T5 TF5") == [[9, 0], [3, 0], [3, 0], [2, 0], [1, 0]]
 
 
+@pytest.mark.slow
 def test_trset_begins_a_timer_again_assumed() -> None:
     rungs = "LD P_On\nTIMX 5 &9\nLD 0.00\n@TRSET 5"
     assert run_bits(rungs, [{}, {}, {"CIO 0.00": True}, {}, {}], "T5") == [[9], [8], [9], [9], [8]]
 
 
+@pytest.mark.slow
 def test_cnr_on_a_timer_that_has_ended() -> None:
     rungs = "LD P_On\nTIM 5 #0001\nLD 0.00\n@CNR T0005 T0005"
     rows = [{}, {}, {"CIO 0.00": True}, {}, {}]
@@ -170,10 +182,12 @@ def test_a_set_value_that_changes_is_taken_at_the_next_start_assumed() -> None:
     assert run_bits(rungs, rows, "T5") == [[3], [2], [1], [9], [9]]
 
 
+@pytest.mark.slow
 def test_cntx_of_zero_is_over_at_once_assumed() -> None:
     assert run_bits("LD 0.00\nLD 0.01\nCNTX 5 &0", [{}, {"CIO 0.01": True}, {"CIO 0.01": False}], "CNF5") == [[1], [0], [1]]
 
 
+@pytest.mark.slow
 def test_cntrx_is_binary() -> None:
     down = {"CIO 0.01": True}
     assert run_bits("LD 0.00\nLD 0.01\nLD 0.02\nCNTRX 2 &300", [{}, down, {"CIO 0.01": False}, down], "C2 CNF2") == [

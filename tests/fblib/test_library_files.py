@@ -38,6 +38,7 @@ def wrong_with(path: Path) -> list[str]:
     return [rule for rule, keeps in kept.items() if not keeps]
 
 
+@pytest.mark.slow
 def test_each_file_holds_one_pou_and_says_what_it_is_for() -> None:
     assert {path.name: wrong for path in FILES if (wrong := wrong_with(path))} == {}
 
@@ -85,6 +86,7 @@ def signals(drawn: str, unit: Etn21) -> list[tuple[str, str]]:
     return [(name, unit.descriptions.get(name, "")) for name in shown]
 
 
+@pytest.mark.slow
 def test_the_time_limits_may_be_set_by_a_declaration() -> None:
     made = compile_text(
         "PROGRAM Main VAR rd : MTCP_ETN_Fn03 := (Reply_Time := T#2s); "

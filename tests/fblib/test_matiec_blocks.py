@@ -42,6 +42,7 @@ def test_ramp_up_and_back() -> None:
     assert seen == [(2.0, False), (2.0, True), (4.0, True), (6.0, True), (8.0, True), (10.0, False), (2.0, False), (2.0, False)]
 
 
+@pytest.mark.slow
 def test_integral_begins_where_it_is_set() -> None:
     seen = [(block["XOUT"], block["Q"]) for block in scans(
         "INTEGRAL", "RUN := n <> 4, R1 := n = 2, XIN := 5.0, X0 := 100.0, CYCLE := T#200ms", 5)]

@@ -65,6 +65,7 @@ def test_the_call_of_the_sheet(text: str) -> None:
 # --- function codes -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_each_function_code() -> None:
     rig = Rig()
     for number in (0, 2, 3, 9, 99):
@@ -282,6 +283,7 @@ def test_a_connection_that_breaks() -> None:
 # --- data areas ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "value", "registers"), first_quick([
     ("ARRAY[5..6] OF INT", "holding[5]", [0x8001, 0]), ("UINT", "holding", [0x8001]), ("WORD", "holding", [0x8001]),
     ("DINT", "holding", [0x8001, 0]), ("ARRAY[0..3] OF BYTE", "holding[0]", [0x0001, 0]), ("LINT", "holding", [0x8001, 0, 0, 0]),
@@ -296,6 +298,7 @@ def test_registers_of_any_type_the_low_half_first(kind: str, value: str, registe
     assert client.ask(f"03 0000 {count + 1:04X}") == "83 02"
 
 
+@pytest.mark.slow
 def test_a_real_a_structure_and_an_odd_number_of_bytes() -> None:
     text = """
     TYPE Tank : STRUCT level : REAL; full : BOOL; END_STRUCT END_TYPE
@@ -331,6 +334,7 @@ def test_bits_of_what_is_not_bool_are_packed(kind: str) -> None:
     assert client.ask("01 0010 0001") == "81 02"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("passed", "overlaps"), first_quick([
     ({"coils": "holding"}, True), ({"coils": "holding[199]"}, True), ({"inputs": "holding[3]", "coils": "holding[4]"}, True),
     ({"registers": "holding"}, True), ({"registers": "holding[0]", "holding": "holding[1]"}, False),
@@ -360,6 +364,7 @@ def test_located_areas_that_overlap() -> None:
     assert rig.status() == "7002"
 
 
+@pytest.mark.slow
 def test_an_overlap_ends_a_connection() -> None:
     text = SHEET.replace("MB_TCP_SERVER_2(", "MB_TCP_SERVER_2(").replace("aa : BOOL;", "aa, same : BOOL;")
     both = text.replace("MB_TCP_SERVER_2(", "IF NOT same THEN MB_TCP_SERVER_2(").replace(");\nEND_PROGRAM", """);
@@ -486,6 +491,7 @@ def test_the_same_on_both_engines() -> None:
     assert plcs[0] == plcs[1]
 
 
+@pytest.mark.slow
 def test_the_program_and_the_chart_of_the_readme() -> None:
     readme = (data_folder("fblib") / "tianxing" / "mb_tcp_server" / "README.md").read_text(encoding="utf-8")
     text = re.findall(r"```\n(PROGRAM.*?)```", readme, re.S)[0]

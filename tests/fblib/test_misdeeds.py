@@ -170,6 +170,7 @@ EXPECTED_OF_REAL = {
 TIMINGS = pytest.mark.parametrize("timing", ["exact", pytest.param("real", marks=pytest.mark.slow)])
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in EXPECTED)) for name in MISDEEDS]
@@ -220,6 +221,7 @@ RUDE_OF_REAL = {
 """The servers for which commands end otherwise with the delays of timing "real"."""
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK_RUDE)) for name in RUDE_PEERS])
 def test_a_rude_server(name: str, timing: str) -> None:

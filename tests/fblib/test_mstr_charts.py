@@ -26,6 +26,7 @@ def begun(rig: Rig, control: tuple[int, ...] = READ) -> Rig:
     return rig
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", [READ, WRITE, BOTH])
 def test_as_long_as_enable_is_true_an_operation_follows_the_other_assumed(control: tuple[int, ...]) -> None:
     """The first connects, which takes a scan more.  SUCCESS is TRUE for one scan."""
@@ -88,6 +89,7 @@ def test_edge_and_hold_are_switches() -> None:
     """
 
 
+@pytest.mark.slow
 def test_held_errors() -> None:
     rig = begun(Rig(options="Edge := TRUE, Hold := TRUE"), (2, 0, 0, 1, 0x0700))
     assert rig.chart(3, *PINS[2:]) == """

@@ -38,11 +38,13 @@ def changed(control: tuple[int, ...], **words: int) -> tuple[int, ...]:
 # --- what is refused before anything is sent ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("operation", [0, 5, 6, 9, 11, 12, 13, 16, 17, 22, 24, 0x7FFF, 0xFFEF, 0xFFF1, 0xFFFF])
 def test_2001_operations_that_there_are_not(operation: int) -> None:
     assert refused(changed(READ, w1=operation)) == "2001"
 
 
+@pytest.mark.slow
 @each_of("control", [
     changed(READ, w3=0), changed(READ, w3=126), changed(READ, w3=0xFFFF), changed(WRITE, w3=0), changed(WRITE, w3=124),
     changed(BOTH, w3=0), changed(BOTH, w3=122), changed(BOTH, w10=0), changed(BOTH, w10=126), changed(LOCAL, w3=0),
@@ -109,6 +111,7 @@ def test_2010_a_control_array_that_is_too_short(length: int, control: tuple[int,
     assert rig.peer.received == []
 
 
+@pytest.mark.slow
 def test_2010_of_one_word_is_told_by_error_alone() -> None:
     rig = Rig(control="ARRAY[1..1] OF INT")
     rig.control(2)
@@ -154,6 +157,7 @@ def test_f001_while_the_module_restarts(control: tuple[int, ...]) -> None:
     assert rig.operate(*control) == "F001"
 
 
+@pytest.mark.slow
 def test_f001_what_is_in_progress_when_the_module_restarts() -> None:
     rig = Rig(ScriptedPeer([]), blocks=2)
     rig.control(*READ)
@@ -255,6 +259,7 @@ def test_a_cold_start_and_an_operation_that_had_ended_are_no_1002() -> None:
     assert rig.outputs() == ""
 
 
+@pytest.mark.slow
 @each_of("word", [1, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 def test_2002_control_changed_while_the_operation_runs(word: int) -> None:
     rig = Rig(ScriptedPeer([]))
@@ -401,6 +406,7 @@ def test_503c_nobody_answers_the_call() -> None:
     assert 10 <= rig.plc.now_ns / 1e9 < 10.2
 
 
+@pytest.mark.slow
 def test_503c_no_reply() -> None:
     rig = Rig(ScriptedPeer([]), options="Reply_Time := T#300ms")
     assert rig.operate(*READ) == "503C"

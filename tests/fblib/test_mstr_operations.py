@@ -85,6 +85,7 @@ def test_the_last_registers_are_read_while_others_are_written() -> None:
     assert rig.databuf(2) == [0x1111, 0x2222]
 
 
+@pytest.mark.slow
 @each_of(("control", "length"), [
     ((WRITE, 0, 123, 65414, 0x07FE), 259),
     ((READ, 0, 125, 65412, 0x07FF), 12),
@@ -212,6 +213,7 @@ def test_local_statistics_end_in_the_same_scan_and_send_nothing() -> None:
     assert rig.peer.received == []
 
 
+@pytest.mark.slow
 @each_of(("length", "first"), [(1, 0), (3, 0), (2, 36), (1, 37), (32, 4), (38, 0)])
 def test_a_part_of_the_table(length: int, first: int) -> None:
     rig = Rig()
@@ -292,6 +294,7 @@ def test_services_in_the_state_asked_for() -> None:
     assert rig.module(noc_words.SERVICES) == BOTH
 
 
+@pytest.mark.slow
 def test_a_second_call_within_2_s_whatever_the_first_one_returned() -> None:
     rig = Rig()
     for first in (BOTH, 0, 4):

@@ -52,6 +52,7 @@ class Station:
 # --- the CPU ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_registers_are_mw() -> None:
     """Register 1, address 0 in the frame, is %MW1."""
     station = Station()
@@ -178,6 +179,7 @@ def test_a_client_that_leaves_gets_its_replies_first() -> None:
     assert len(client.data) == 5 * 11
 
 
+@pytest.mark.slow
 def test_a_client_that_breaks_its_connection() -> None:
     station = Station(pins="Sessions := 1")
     client = station.client().connect()
@@ -187,6 +189,7 @@ def test_a_client_that_breaks_its_connection() -> None:
     assert client.connect().ask("03 0000 0001") == "03 02 00 00"
 
 
+@pytest.mark.slow
 def test_a_client_that_asks_nothing_is_left() -> None:
     station = Station(pins="Idle_Time := T#1s")
     client = station.client().connect()
@@ -212,6 +215,7 @@ def test_another_protocol_is_passed_over() -> None:
     assert client.ask("03 0000 0001") == "03 02 00 00"
 
 
+@pytest.mark.slow
 def test_a_server_of_a_module_that_restarts_comes_back() -> None:
     station = Station()
     client = station.client().connect()
@@ -222,6 +226,7 @@ def test_a_server_of_a_module_that_restarts_comes_back() -> None:
     assert client.connect().ask("03 0000 0001") == "03 02 00 00"
 
 
+@pytest.mark.slow
 def test_there_are_never_more_servers_than_lines() -> None:
     text = """PROGRAM Main VAR s : ARRAY[1..5] OF MSTR_Server; i : INT; END_VAR
         FOR i := 1 TO 5 DO s[i](Sessions := 8); END_FOR; END_PROGRAM"""

@@ -21,6 +21,7 @@ EXCHANGE = (*PINS, "CIO 1519.03", "CIO 1509.02", "CIO 1519.04", "CIO 1509.01", "
 CONNECTION = ("Connect", "conn.ENO", "conn.Waiting_Server", "CIO 1519.02", "CIO 1519.05", "CIO 1509.15")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", first_quick(BLOCKS))
 def test_exact(block: str) -> None:
     rig = Rig(rd=block).connect()

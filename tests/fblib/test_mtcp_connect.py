@@ -281,6 +281,7 @@ def test_an_octet_above_ff(octet: int) -> None:
     assert rig.code("conn") == ""
 
 
+@pytest.mark.slow
 def test_an_octet_that_becomes_wrong_between_two_tries() -> None:
     rig = Rig(refused=True)
     rig.run_until("Main.conn.Error")
@@ -320,6 +321,7 @@ def test_en_falls_and_the_connection_stays() -> None:
     assert rig.get("conn.ENO")
 
 
+@pytest.mark.slow
 def test_en_falls_while_the_socket_opens() -> None:
     rig = Rig()
     rig.scan(3)

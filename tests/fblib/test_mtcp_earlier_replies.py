@@ -108,6 +108,7 @@ def test_a_reply_that_comes_two_requests_later(surplus: int) -> None:
     assert (rig.words(200, 1), rig.words(210, 3)) == ([0], HELD)
 
 
+@pytest.mark.slow
 def test_a_reply_is_taken_in_one_piece_when_nothing_else_can_come() -> None:
     """One receive for the whole frame, two when an earlier reply may still come: first the bytes up to its length."""
 
@@ -152,6 +153,7 @@ class Interrupted(LateRig):
         return [Say(self.kept[0][:self.first]), *rest]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rest_ns", [GAP_NS, REPLY_NS // 2])
 def test_the_rest_of_a_frame_is_taken_before_the_next_request(rest_ns: int) -> None:
     rig = Interrupted(rest_ns)

@@ -40,6 +40,7 @@ def next_command_is_good(rig: Rig) -> None:
 # --- the server ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("exception", range(1, 12))
 def test_an_exception_is_passed_through(exception: int) -> None:
     rig = read_fails(saying(lambda frame: frame[:4] + bytes((0, 3, 255, 0x83, exception))), f"{exception:04X}")
@@ -78,6 +79,7 @@ WRONG: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", WRONG)
 def test_a_reply_in_which_something_does_not_fit_is_no_answer(what: str) -> None:
     rig = read_fails(saying(WRONG[what]), "0080")
@@ -103,6 +105,7 @@ def test_a_wrong_echo_is_no_answer(block: str, echo: int) -> None:
     assert rig.result("rd") == (0, "0080")
 
 
+@pytest.mark.slow
 @each_of(
     "wrong",
     [
@@ -124,6 +127,7 @@ def test_a_stream_out_of_step_is_opened_anew(wrong: Callable[[bytes], bytes]) ->
 # --- time -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_no_reply_in_five_seconds() -> None:
     rig = Rig(ScriptedPeer(), rd=READ).connect()
     rig.set("rd_Cmd", True)
@@ -141,6 +145,7 @@ def test_the_time_is_a_variable_of_the_block() -> None:
     assert rig.run_until("Main.rd.Error") == pytest.approx(0.25)
 
 
+@pytest.mark.slow
 def test_a_late_reply_is_passed_over() -> None:
     """It comes while the next command waits, just before that one's own reply, and in one piece with it."""
     held: list[bytes] = []
@@ -169,6 +174,7 @@ def test_the_previous_reply_again() -> None:
         assert (rig.result("rd"), rig.words(200, 1)) == ((number, ""), [number])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", range(1, 15))
 def test_half_a_reply_and_nothing_more(size: int) -> None:
     """Nobody knows where the next frame would begin, so the connection is opened anew."""
@@ -189,6 +195,7 @@ def test_the_server_closes_in_mid_reply(size: int, end: Action, expected: str) -
     next_command_is_good(rig)
 
 
+@pytest.mark.slow
 def test_a_command_without_connection() -> None:
     rig = Rig(refused=True, rd=READ, wired=False)
     rig.scan(20)
@@ -294,6 +301,7 @@ def test_what_can_be_sent_is_left_to_the_server(block: str) -> None:
     assert (rig.result("rd"), len(rig.peer.received)) == ((1, "0003"), 1)
 
 
+@pytest.mark.slow
 def test_the_longest_request_that_fits_a_frame() -> None:
     rig = Rig(rd="Fn0F(Coil_Address := 0, Coil_Qty := 1976, DataAddress_DM := 200)").connect()
     rig.command("rd")
@@ -301,6 +309,7 @@ def test_the_longest_request_that_fits_a_frame() -> None:
     assert rig.words(32630, 1) == [0]
 
 
+@pytest.mark.slow
 @each_of(
     "block",
     [
@@ -393,6 +402,7 @@ def test_somebody_overwrites_the_parameter_area(word: int, after: int) -> None:
     next_command_is_good(rig)
 
 
+@pytest.mark.slow
 def test_the_socket_kept_busy_by_another_program() -> None:
     """A receive that the program itself requested waits for bytes that never come."""
     rig = Rig(ScriptedPeer(), rd=READ).connect()

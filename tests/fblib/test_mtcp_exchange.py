@@ -45,6 +45,7 @@ def test_fn03() -> None:
     )
 
 
+@pytest.mark.slow
 def test_fn06() -> None:
     rig = Rig(rd=WRITE_ONE).connect()
     rig.set("rd_Cmd", True)
@@ -142,6 +143,7 @@ def adu(transaction: int, pdu: str) -> str:
     return f"{transaction:04X} 0000 {size:04X} FF".replace(" ", "") + pdu.replace(" ", "")
 
 
+@pytest.mark.slow
 @each_of(("block", "request_pdu", "reply_pdu"), EXAMPLES)
 def test_the_examples_of_the_sheet(block: str, request_pdu: str, reply_pdu: str) -> None:
     """The address of the 0F example is 0014: with the sheet's 0013 its bytes do not give its table."""
@@ -206,6 +208,7 @@ def test_the_slave_id(slave: int, sent: int) -> None:
     assert rig.result("rd") == (1, "")
 
 
+@pytest.mark.slow
 def test_inputs_are_taken_at_the_edge() -> None:
     """What the program writes to the pins while a command runs is for the next one."""
     block = "Fn03(Register_Address := 1000, Register_Qty := 1, RespData_DM := Where)"

@@ -31,6 +31,7 @@ def words_of(bits: bytes) -> list[int]:
     return [number >> 16 * place & 0xFFFF for place in range((len(bits) + 15) // 16)]
 
 
+@pytest.mark.slow
 @each_of("quantity", [*BITS, 2000])
 @each_of("code", ["01", "02"])
 def test_bits_read(code: str, quantity: int) -> None:
@@ -87,6 +88,7 @@ def test_one_register_written(value: int) -> None:
     assert (rig.result("wr"), rig.server.holding_registers[65535], rig.all_words()) == ((1, ""), value, before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", ["TRUE", "FALSE"])
 def test_one_coil_written(value: str) -> None:
     rig = filled(1, wr=f"Fn05(Coil_Address := 65535, Value := {value})")
@@ -116,6 +118,7 @@ def test_a_short_request_stays_in_its_area(block: str) -> None:
     assert (rig.words(32507, 3), rig.words(32643, 1)) == ([0xAAAA] * 3, [0xBBBB])
 
 
+@pytest.mark.slow
 def test_the_blocks_use_no_other_memory() -> None:
     """CIO 1500-1524, D30000-30099 and the areas of the sheet."""
     rig = Rig(

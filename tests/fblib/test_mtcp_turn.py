@@ -37,6 +37,7 @@ def both_are_right(rig: Rig) -> bool:
     return rig.words(100, 3) == [1010, 1011, 0] and rig.words(110, 6) == [1020, 1021, 1022, 1023, 1024, 0]
 
 
+@pytest.mark.slow
 def test_two_commands_in_one_scan() -> None:
     """State 1 is waiting, 3 sending, 4 awaiting the reply."""
     rig = two()
@@ -92,6 +93,7 @@ def test_nobody_is_overtaken() -> None:
     assert max(served) - min(served) <= 1
 
 
+@pytest.mark.slow
 @each_of("after", range(1, 10))
 def test_a_block_that_is_no_longer_executed_loses_its_turn(after: int) -> None:
     """EN of the first falls: the second is served; when EN returns, the first one's command has ended with 0081."""
@@ -157,6 +159,7 @@ def test_a_silent_server_does_not_stop_the_others() -> None:
     assert {rig.result("a"), rig.result("b")} == {(0, "0080")}
 
 
+@pytest.mark.slow
 def test_a_stream_out_of_step_hits_only_who_is_served() -> None:
     """The second finds no connection (2210) or is stopped by EN (0081); nobody is stuck."""
     rig = two(peer=answering(lambda frame: [Say(b"\xff" * 20)]), wired=False)

@@ -70,6 +70,7 @@ def test_a_program_that_drives_the_unit_itself(timing: str) -> None:
     assert rig.words(500, 3) == [0x0102, 0x0304, 0]
 
 
+@pytest.mark.slow
 def test_connect_finds_its_socket_open_as_udp() -> None:
     """A program opens socket 1 for UDP in between: MTCP_ETN_Connect says 2606, closes it, and connects at its next try."""
     rig = Rig(
@@ -86,6 +87,7 @@ def test_connect_finds_its_socket_open_as_udp() -> None:
     assert rig.result("rd") == (1, "")
 
 
+@pytest.mark.slow
 def test_connect_finds_its_parameter_area_in_use_by_another_socket() -> None:
     """2607 until the program closes its socket 2, then MTCP_ETN_Connect connects by itself."""
     rig = Rig(
@@ -116,6 +118,7 @@ def test_connect_finds_its_parameter_area_in_use_by_another_socket() -> None:
     assert rig.result("rd") == (1, "")
 
 
+@pytest.mark.slow
 def test_a_block_whose_data_address_a_program_spoils() -> None:
     """The program writes a bit number behind the block that has just set the send switch: 1103, and nothing is sent."""
     rig = Rig(
@@ -149,6 +152,7 @@ def test_a_fault_of_the_unit_while_connecting(switch: Switch, code: int, timing:
     assert rig.result("rd") == (1, "")
 
 
+@pytest.mark.slow
 @each_of("switch", [Switch.SEND, Switch.RECEIVE])
 @each_of("code", [0x0302, 0x2211])
 def test_a_script_of_faults_hits_one_request_each(code: int, switch: Switch) -> None:

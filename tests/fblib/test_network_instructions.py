@@ -69,6 +69,7 @@ class Pair:
         return value
 
 
+@pytest.mark.slow
 def test_send_writes_words_into_another_plc() -> None:
     pair = Pair("@SEND D100 D200 D0")
     pair.control(0, [3, 0, NODE_2, 0x0200, 0])
@@ -79,6 +80,7 @@ def test_send_writes_words_into_another_plc() -> None:
     assert (pair.word(202), pair.word(219), pair.word(205)) == (0x80FF, 0, 0)
 
 
+@pytest.mark.slow
 def test_recv_reads_words_of_another_plc() -> None:
     pair = Pair("@RECV W5 D300 D10")
     pair.control(10, [2, 0, NODE_2, 0x0700, 0])
@@ -88,6 +90,7 @@ def test_recv_reads_words_of_another_plc() -> None:
     assert (pair.word(202), pair.word(219), pair.word(210)) == (0x80FF, 0, 0)
 
 
+@pytest.mark.slow
 def test_cmnd_sends_a_command_and_stores_the_response() -> None:
     """0402 stops the other PLC; its answer is the command's code and 0000."""
     pair = Pair("@CMND D100 D200 D0")
@@ -101,6 +104,7 @@ def test_cmnd_sends_a_command_and_stores_the_response() -> None:
     assert pair.other.read("D9000") == stood
 
 
+@pytest.mark.slow
 def test_flags_of_a_port_over_the_scans() -> None:
     """The chart of W340 p1031: the port is in use from the instruction to the response, and the end code is there with it."""
     pair = Pair("@RECV D9000 D300 D10")
@@ -116,6 +120,7 @@ def test_flags_of_a_port_over_the_scans() -> None:
     assert rows == [(False, 0, 0, False), (True, 0, 0, True)] + [(True, 0, 0, True)] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("limit", "retries", "scans"), [(1, 0, 10), (1, 2, 30), (0, 0, 200), (5, 1, 100)])
 def test_without_a_response_the_command_is_repeated_and_ends_in_0205(limit: int, retries: int, scans: int) -> None:
     pair = Pair("@SEND D100 D200 D0")
@@ -132,6 +137,7 @@ def test_without_a_response_the_command_is_repeated_and_ends_in_0205(limit: int,
     assert len({event.data for event in datagrams}) == 1
 
 
+@pytest.mark.slow
 def test_a_repeated_command_that_is_answered_is_good() -> None:
     pair = Pair("@SEND D100 D200 D0")
     pair.network.faults.append(Fault(silent=True))
@@ -143,6 +149,7 @@ def test_a_repeated_command_that_is_answered_is_good() -> None:
     assert (pair.other.read("D200"), pair.enabled(0), pair.word(203), pair.word(219)) == (77, True, 0, 0)
 
 
+@pytest.mark.slow
 def test_the_end_code_of_the_other_plc_is_an_error_of_send_and_none_of_cmnd() -> None:
     send = Pair("@SEND D100 A0 D0")
     send.control(0, [1, 0, NODE_2, 0, 0])
@@ -156,6 +163,7 @@ def test_the_end_code_of_the_other_plc_is_an_error_of_send_and_none_of_cmnd() ->
     assert cmnd.one.read("D200..D201") == [0x0102, 0x2101]
 
 
+@pytest.mark.slow
 def test_a_response_for_which_there_is_no_room_is_not_stored_assumed() -> None:
     pair = Pair("@CMND D100 D200 D0")
     pair.control(0, [8, 4, 0, NODE_2, 0x0200, 0])
@@ -165,6 +173,7 @@ def test_a_response_for_which_there_is_no_room_is_not_stored_assumed() -> None:
     assert pair.one.read("D200..D201") == [0, 0]
 
 
+@pytest.mark.slow
 def test_an_odd_number_of_bytes_leaves_the_low_byte_of_the_last_word() -> None:
     pair = Pair("@CMND D100 D200 D0")
     pair.other.write("W0", 0x0001)
@@ -175,6 +184,7 @@ def test_an_odd_number_of_bytes_leaves_the_low_byte_of_the_last_word() -> None:
     assert pair.one.read("D200..D202") == [0x0101, 0, 0x01AA]
 
 
+@pytest.mark.slow
 def test_a_broadcast_needs_no_response_and_reaches_every_node() -> None:
     pair = Pair("@SEND D100 D200 D0")
     pair.one.write("D100", 5)
@@ -188,6 +198,7 @@ def test_a_broadcast_needs_no_response_and_reaches_every_node() -> None:
     assert (pair.other.read("D200"), pair.enabled(0), pair.word(203)) == (5, True, 0)
 
 
+@pytest.mark.slow
 def test_without_a_response_wanted_the_port_is_free_at_once() -> None:
     pair = Pair("@SEND D100 D200 D0", other=False)
     pair.control(0, [1, 0, NODE_2, 0x8000, 0])
@@ -195,6 +206,7 @@ def test_without_a_response_wanted_the_port_is_free_at_once() -> None:
     assert (pair.enabled(0), pair.word(203), pair.word(219)) == (True, 0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("node", [0, 1])
 def test_node_0_and_the_own_node_are_this_plc(node: int) -> None:
     pair = Pair("@SEND D100 D200 D0", other=False)
@@ -204,6 +216,7 @@ def test_node_0_and_the_own_node_are_this_plc(node: int) -> None:
     assert (pair.one.read("D200"), pair.enabled(0), pair.word(203)) == (9, True, 0)
 
 
+@pytest.mark.slow
 def test_the_own_unit_echoes_to_cmnd() -> None:
     pair = Pair("@CMND D100 D200 D0", other=False)
     pair.control(0, [4, 40, 0, 0x0010, 0, 0])
@@ -212,6 +225,7 @@ def test_the_own_unit_echoes_to_cmnd() -> None:
     assert pair.one.read("D200..D202") == [0x0801, 0, 0x1234]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("control", "end_code", "fins"), [
     ([1, 3, NODE_2, 0, 0], 0x0502, True), ([1, 0, NODE_2, 0, 0], 0x0101, False), ([1, 0, 0x0011, 0, 0], 0x0202, True),
     ([1, 0, 0x0010, 0, 0], 0x0202, False),
@@ -223,6 +237,7 @@ def test_where_nothing_can_be_sent(control: list[int], end_code: int, fins: bool
     assert (pair.word(203), pair.word(219)) == (end_code, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("control", [[991, 0, NODE_2, 0, 0], [1, 0x80, NODE_2, 0, 0], [1, 0x1000, NODE_2, 0, 0],
                                      [1, 0, NODE_2, 0x0800, 0], [1, 0, NODE_2, 0x0E00, 0]])  # fmt: skip
 def test_control_words_that_cannot_be_set_the_error_flag_assumed(control: list[int]) -> None:
@@ -234,6 +249,7 @@ def test_control_words_that_cannot_be_set_the_error_flag_assumed(control: list[i
     assert pair.other.read("D200") == 0
 
 
+@pytest.mark.slow
 def test_a_port_in_use_sets_the_error_flag_and_goes_on_assumed() -> None:
     pair = Pair("SEND D100 D200 D0", other=False)
     pair.control(0, [1, 0, NODE_2, 0, 100])
@@ -242,6 +258,7 @@ def test_a_port_in_use_sets_the_error_flag_and_goes_on_assumed() -> None:
     assert (pair.enabled(0), pair.word(203), pair.word(219)) == (False, 0, 0)
 
 
+@pytest.mark.slow
 def test_automatic_allotment_takes_a_free_port_and_says_which() -> None:
     pair = Pair("SEND D100 D200 D0", other=False)
     pair.control(0, [1, 0, NODE_2, 0x0F00, 100])
@@ -256,6 +273,7 @@ def test_automatic_allotment_takes_a_free_port_and_says_which() -> None:
     assert pair.one.read("D900.00") is True
 
 
+@pytest.mark.slow
 def test_a_stop_of_the_own_plc_frees_its_ports() -> None:
     pair = Pair("@SEND D100 D200 D0", other=False)
     pair.control(0, [1, 0, NODE_2, 0, 100])
@@ -277,6 +295,7 @@ def test_a_node_elsewhere_is_found_by_the_address_table() -> None:
     assert sent[0] == Peer(THERE, 9600)
 
 
+@pytest.mark.slow
 def test_e_banks_timers_and_indirect_addresses_are_operands() -> None:
     pair = Pair("@SEND T5 E0_7 D0\nLD go\n@SEND @D50 H5 D10")
     pair.control(0, [1, 0, NODE_2, 0, 0])

@@ -60,6 +60,7 @@ def test_limitalarm_says_where_the_value_is() -> None:
         (False, True, False), (False, False, True), (False, False, True), (True, False, False)]  # fmt: skip
 
 
+@pytest.mark.slow
 @each_of(("expression", "type", "value"), [
     ("EXTRACT(16#80000001, 31)", "BOOL", True), ("EXTRACT(16#80000001, 1)", "BOOL", False),
     ("EXTRACT(16#FFFFFFFF, 32)", "BOOL", False), ("EXTRACT(16#FFFFFFFF, 255)", "BOOL", False),
@@ -73,6 +74,7 @@ def test_functions_of_bits(expression: str, type: str, value: object) -> None:
     assert value_of(expression, type) == value
 
 
+@pytest.mark.slow
 @each_of(("block", "whole", "bits"), [
     ("UNPACK", "B", [f"B{n}" for n in range(8)]), ("BYTE_AS_BIT", "B", [f"B{n}" for n in range(8)]),
     ("WORD_AS_BIT", "W", [f"B{n:02}" for n in range(16)]), ("DWORD_AS_BIT", "X", [f"B{n:02}" for n in range(32)]),
@@ -176,6 +178,7 @@ def test_freq_measure_is_the_mean_of_periods() -> None:
 # --- texts --------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of(("expression", "type", "value"), [
     ('WLEN("ab\u20ac")', "INT", 3), ('WLEFT("abcd", 2)', "WSTRING", "ab"), ('WRIGHT("abcd", 1)', "WSTRING", "d"),
     ('WMID("abcd", 2, 2)', "WSTRING", "bc"), ('WCONCAT("ab", "cd")', "WSTRING", "abcd"),

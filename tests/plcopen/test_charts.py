@@ -61,6 +61,7 @@ def test_steps_transitions_and_a_jump_back() -> None:
     assert states(made, "x", ["", "go=1", "go=0", "done=1", ""]) == ["0", "1", "1", "0", "0"]
 
 
+@pytest.mark.slow
 def test_a_selection_goes_by_priority_and_else_from_left_to_right() -> None:
     split = node("selectionDivergence", 2, "1")
     plain = chart(step(1, "s", first=True), split, transition(3, "2", inline("go"), at="90,0"), step(4, "right", "3"),
@@ -73,6 +74,7 @@ def test_a_selection_goes_by_priority_and_else_from_left_to_right() -> None:
     assert states(first, "x y", ["", "go=1"]) == ["0 0", "1 0"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", ["x y,0", "nan,inf", ",1e999"])
 def test_a_transition_at_no_place_counts_as_the_first(at: str) -> None:
     made = chart(step(1, "s", first=True), node("selectionDivergence", 2, "1"), transition(3, "2", inline("go"), at="90,0"),
@@ -106,6 +108,7 @@ def test_conditions_that_are_drawn_with_contacts_and_blocks() -> None:
     assert states(made, "x", ["", "go=1", "", "", ""]) == ["0", "0", "0", "0", "1"]
 
 
+@pytest.mark.slow
 @each_of("body", ["go AND NOT stop", ":= go AND NOT stop;", "leave := go AND NOT stop;",
                   "IF stop THEN leave := FALSE; ELSE leave := go; END_IF;"])
 def test_a_transition_by_its_name(body: str) -> None:
@@ -264,6 +267,7 @@ def test_a_step_calls_an_action_of_an_instance_after_a_time() -> None:
     assert seen == [0, 0, 1, 2, 3]
 
 
+@pytest.mark.slow
 @each_of("text", ["a AND NOT b;", "a AND NOT b ;;", "a\n AND NOT b;\n"])
 def test_a_condition_that_ends_with_a_semicolon(text: str) -> None:
     beside = chart(step(1, "s", first=True), transition(2, "1", wires("9")), step(3, "e", "2"), actions(4, "3", does("x")),

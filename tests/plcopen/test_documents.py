@@ -16,6 +16,7 @@ from fbvm.machine.plc import Plc
 DOCUMENTS = Path(__file__).parent / "documents"
 
 
+@pytest.mark.slow
 def test_a_project_of_beremiz_is_checked_without_a_word_and_runs(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["import", str(DOCUMENTS / "beremiz.xml"), "-o", str(tmp_path / "made")])
     assert done.exit_code == 0, done.output
@@ -50,6 +51,7 @@ def test_a_project_of_codesys_keeps_its_lists_of_globals_and_names_its_method(tm
     assert (plc.read("PLC_PRG.sum"), plc.read("PLC_PRG.full"), plc.read("PLC_PRG.part")["name"]) == (6, True, "new")
 
 
+@pytest.mark.slow
 def test_importing_again_gives_the_same_to_the_letter() -> None:
     data = (DOCUMENTS / "beremiz.xml").read_bytes()
     first, second = import_xml(data), import_xml(data)

@@ -198,6 +198,7 @@ def test_a_loop_through_a_variable_is_cut_there() -> None:
     assert states(made, "n m", ["", ""]) == ["6 6", "7 7"]
 
 
+@pytest.mark.slow
 @each_of(("places", "marks", "wanted"), [
     (("0,0", "0,50"), ("", ""), ["1 1", "0 0", "1 1"]),
     (("0,50", "0,0"), ("", ""), ["1 0", "0 1", "1 0"]),

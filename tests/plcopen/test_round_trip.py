@@ -114,6 +114,7 @@ def test_ladder_of_the_corpus_there_and_back() -> None:
     assert count["unsaid"] <= 3
 
 
+@pytest.mark.slow
 def test_a_call_behind_an_interlock_there_and_back() -> None:
     title = "a number of timers or counters belongs to one instruction in all programs"
     [program] = [program for program in programs(ROOT / "tests" / "lang" / "warnings") if program.title == title]
@@ -212,6 +213,7 @@ def test_rungs_and_statements_between_them_mean_the_same_for_all_inputs() -> Non
         assert same(plcs[0].read("Main"), plcs[1].read("Main")), scan
 
 
+@pytest.mark.slow
 def test_a_rung_comes_back_as_it_was() -> None:
     text = RUNGS[:RUNGS.index("RUNG 3")] + "END_LADDER\nEND_PROGRAM\n"
     again = there_and_back(text).files["Main.st"]
@@ -220,6 +222,7 @@ def test_a_rung_comes_back_as_it_was() -> None:
         ["ORNOT", "d"] if step[:2] == ["OR", "NOT"] else ["".join(step)] if step[1] == "LD" else step for step in steps]
 
 
+@pytest.mark.slow
 def test_exporting_what_was_imported_gives_the_same_document() -> None:
     text = RUNGS[:RUNGS.index("RUNG 3")] + "END_LADDER\nEND_PROGRAM\n"
     first = export_xml([Source("Main.st", text)])
@@ -243,6 +246,7 @@ def test_charts_of_the_corpus_there_and_back() -> None:
     assert count["unsaid"] == 0
 
 
+@pytest.mark.slow
 def test_instructions_come_back_as_they_were() -> None:
     text = "PROGRAM Main\nVAR a : BOOL; n : WORD; END_VAR\nLADDER\n" + "".join(f"RUNG\n{rung}" for rung in (
         "LD a\nAND<> n #5\n@MOV &200 D500\n", "LD a\nLD W0.00\nCNT 0003 #0002\n", "LD>= D1 D2\nOR= n &7\nNOT\nOUT W1.00\n",
@@ -284,6 +288,7 @@ def test_a_source_with_syntax_errors_gives_no_document() -> None:
     assert [d.code for d in made.errors] == ["S0101"]
 
 
+@pytest.mark.slow
 def test_coordinates_of_networks_go_down_and_elements_do_not_lie_on_each_other() -> None:
     root = document(export_xml([Source("Main.st", RUNGS)]))
     [body] = [element for element in root.walk() if element.name == "LD"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from drawings import document, pou
 from rows import each_of
 
@@ -20,6 +21,7 @@ def test_intervals_in_all_their_spellings(written: str, meant: str) -> None:
     assert duration(written) == meant
 
 
+@pytest.mark.slow
 @each_of(("element", "text"), [
     ("<BOOL/>", "BOOL"), ("<bool/>", "BOOL"), ("<string/>", "STRING"), ('<string length="20"/>', "STRING[20]"),
     ('<wstring length="4"/>', "WSTRING[4]"), ('<derived name="TON"/>', "TON"),
@@ -74,6 +76,7 @@ END_CONFIGURATION
 """
 
 
+@pytest.mark.slow
 def test_declarations_tasks_and_texts_survive_the_way_there_and_back() -> None:
     first = export_xml([Source("Main.st", CONFIGURATION)])
     assert first.diagnostics == []

@@ -56,6 +56,7 @@ def test_as_a_rule_programs_are_compiled_and_run_to_their_end() -> None:
     assert sum(image is not None for image in images) > 30
 
 
+@pytest.mark.slow
 def test_a_difference_is_made_small_and_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     """As if the tree walker took MOD for a modulus that is never negative."""
     monkeypatch.setattr(st_programs, "BUILDS", {"python plain": st_programs.BUILDS["python plain"]})

@@ -178,14 +178,12 @@ def may_name(scope: Scope, node: tree.Node, method: Pou) -> bool:
 
 def value_of_property(scope: Scope, expr: tree.NameRef | tree.Member) -> tuple[bool, Type | None]:
     """Whether an expression names a property, and the type that GET yields, None after a diagnostic."""
-    found = find(scope, expr, ("GET {}", "SET {}"))
-    if found is None or _in_accessor(scope, expr):
+    found = _accessors(scope, expr, "GET {}", "SET {}")
+    if found is None:
         return False, None
-    (getter, setter), instance = found
-    name = expr.text if isinstance(expr, tree.NameRef) else expr.name.text
+    getter, setter, instance = found
     if getter is None:
-        assert setter is not None
-        scope.error("S1008", expr, f"the property {name} of {_home(setter)} has no GET and cannot be read")
+        _refuse_access(scope, expr, setter, "GET and cannot be read")
         return True, None
     if not _is_callable(scope, expr, getter, instance):
         return True, None
@@ -204,19 +202,15 @@ def value_of_property(scope: Scope, expr: tree.NameRef | tree.Member) -> tuple[b
 
 def target_property(scope: Scope, expr: tree.Expr) -> tuple[bool, Type | None]:
     """Whether the target of an assignment names a property with SET, and the type that SET takes, None after a diagnostic."""
-    if not isinstance(expr, tree.NameRef | tree.Member):
+    if not isinstance(expr, tree.NameRef | tree.Member) or (found := _accessors(scope, expr, "SET {}", "GET {}")) is None:
         return False, None
-    found = find(scope, expr, ("SET {}", "GET {}"))
-    if found is None or _in_accessor(scope, expr):
-        return False, None
-    (setter, getter), instance = found
-    name = expr.text if isinstance(expr, tree.NameRef) else expr.name.text
+    setter, getter, instance = found
     if setter is None:
         assert getter is not None
         result = getter.result if scope.context.interface(getter, scope.source, expr) else None
         if result is not None and isinstance(result.type, RefType) and result.type.follows:
             return False, None  # what it is bound to is written
-        scope.error("S1008", expr, f"the property {name} of {_home(getter)} has no SET and cannot be written")
+        _refuse_access(scope, expr, getter, "SET and cannot be written")
         return True, None
     if not _is_callable(scope, expr, setter, instance):
         return True, None
@@ -226,6 +220,25 @@ def target_property(scope: Scope, expr: tree.Expr) -> tuple[bool, Type | None]:
     if parameter is not None:
         scope.facts.types[expr] = parameter.type
     return True, parameter.type if parameter is not None else None
+
+
+def _accessors(scope: Scope, expr: tree.NameRef | tree.Member, wanted: str,
+               other: str) -> tuple[Pou | None, Pou | None, tree.Expr | None] | None:
+    """The accessor with the wanted form of key, the other accessor and the instance of the property that is named.
+
+    None if no property is named, or inside its own accessors, where the name means the value."""
+    found = find(scope, expr, (wanted, other))
+    if found is None or _in_accessor(scope, expr):
+        return None
+    (first, second), instance = found
+    return first, second, instance
+
+
+def _refuse_access(scope: Scope, expr: tree.NameRef | tree.Member, accessor: Pou | None, lacks: str) -> None:
+    """The diagnostic for a property of which `accessor` is the only one."""
+    assert accessor is not None, "one of both accessors was found"
+    name = expr.text if isinstance(expr, tree.NameRef) else expr.name.text
+    scope.error("S1008", expr, f"the property {name} of {_home(accessor)} has no {lacks}")
 
 
 def _home(method: Pou) -> str:

@@ -23,6 +23,6 @@ def command(arguments: tuple[str, ...]) -> None:
     What follows goes to pytest.  Status 1 if a test failed, 2 if there is none."""
     if find_spec("pytest") is None:
         raise click.UsageError("tests need pytest: pip install pytest")
-    from fbvm.testing.course.lessons import run_pytest
+    from fbvm.testing.pytest_process import run_pytest
 
     sys.exit(STATUS.get(run_pytest(arguments), status.FAILED))

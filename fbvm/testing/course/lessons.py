@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -24,11 +21,11 @@ from fbvm.base.files import write_file
 from fbvm.testing.course.predictions import ANSWER, LARGEST_BYTES, WrongAnswer, asked, first_wrong, keep_first_wrong
 from fbvm.testing.lesson import FILE as ANSWERS
 from fbvm.testing.pages import FOLDER
+from fbvm.testing.pytest_process import run_pytest
 
 PROGRAM, GIVEN, TEXT, SOLUTION = "program.st", "given.st", "lesson.md", "solution"
 OF_THE_LEARNER = (PROGRAM, ANSWERS)
 DONE = ".done"
-PLUGIN = "fbvm.testing.plugin"
 QUIET = ("-q", "-rN", "--tb=short", "--import-mode=importlib", "-p", "no:cacheprovider", "--fbvm-no-warn", "all")
 PREDICTION = "test_prediction"
 
@@ -86,13 +83,6 @@ def lessons() -> tuple[Lesson, ...]:
     """All lessons in order."""
     folders = sorted(path for path in (data_folder("examples") / "lessons").iterdir() if (path / TEXT).is_file())
     return tuple(Lesson(int(path.name.partition("-")[0]), path.name, path) for path in folders)
-
-
-def run_pytest(arguments: Sequence[str], cwd: Path | None = None, quiet: bool = False) -> int:
-    """Runs pytest with the plugin in a process of its own; its status."""
-    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
-    command = [sys.executable, "-m", "pytest", *([] if installed else ["-p", PLUGIN]), *arguments]
-    return subprocess.run(command, cwd=cwd, check=False, stdout=subprocess.DEVNULL if quiet else None).returncode
 
 
 def prediction_mistake(lesson: Lesson, folder: Path) -> str:

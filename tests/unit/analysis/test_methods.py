@@ -72,6 +72,7 @@ def at_line(line: str) -> tuple[Program, int]:
     return at_mark(PLANT.replace("    n := quick.Level;\n", f"    n := quick.Level;\n    {line}\n"))
 
 
+@pytest.mark.slow
 @each_of("before, word, line, count", [
     ("quick.Turn", "Turn", 30, 9),
     ("some.Turn", "Turn", 2, 9),
@@ -97,6 +98,7 @@ def test_where_it_is_declared_and_where_it_stands(before: str, word: str, line: 
     assert len(references(program, used[1].key)) == count
 
 
+@pytest.mark.slow
 def test_a_method_is_renamed_with_its_overrides_and_its_interface() -> None:
     program, offset = plant("quick.Turn", "Turn")
     made = applied(rename(program, "pump.st", offset, "Rotate"), "Rotate")["pump.st"]
@@ -119,6 +121,7 @@ def test_what_an_instance_has_behind_a_point() -> None:
     assert [each.label for each in complete(program, "pump.st", offset)] == ["Turn"]
 
 
+@pytest.mark.slow
 def test_what_can_be_named_in_a_method() -> None:
     program, offset = plant("held := held + amount", "held")
     labels = [each.label for each in complete(program, "pump.st", offset)]

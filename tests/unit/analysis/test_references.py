@@ -46,6 +46,7 @@ def plant(before: str, word: str) -> tuple[Program, int]:
     return at_mark(PLANT[:at] + "‸" + PLANT[at:])
 
 
+@pytest.mark.slow
 @each_of("before, word, line, count", [
     ("P1(Level", "Level", 12, 3),
     ("T1.Level := Twice", "Level", 3, 3),
@@ -82,6 +83,7 @@ def test_a_pin_of_a_library_leads_into_the_library() -> None:
     assert (declared.source.library, declared.name) == ("iec", "Q")
 
 
+@pytest.mark.slow
 @each_of("before, word, new", [
     ("P1(Level", "Level", "Height"), ("T1.Level := Twice", "Level", "Fuellstand"), ("Twice(x", "Twice", "Double"),
     ("Total := Total", "Total", "TOTAL_2"), ("State := Filling", "Filling", "Fill"), ("P1 : Pump", "Pump", "Motor"),
@@ -106,6 +108,7 @@ def test_all_files_are_renamed() -> None:
     assert ("FUNCTION_BLOCK Motor" in texts["blocks.st"], "P1 : Motor" in texts["main.st"]) == (True, True)
 
 
+@pytest.mark.slow
 @each_of("before, word, new, why", [
     ("P1 : Pump", "P1", "T1", "T1 is declared twice in Main"),
     ("P1 : Pump", "P1", "IF", "`IF` is a word of the language"),

@@ -30,6 +30,7 @@ END_VAR
 """
 
 
+@pytest.mark.slow
 @each_of("line, parts", [
     ("‸P1();", ["VAR P1 : Pump", "the pump at the river"]),
     ("P1(Le‸vel := 3);", ["VAR_INPUT Level : INT := 5"]),
@@ -98,6 +99,7 @@ def test_the_signature_of_a_call_marks_the_present_argument(line: str, label: st
     assert (shown.label, shown.active) == (label, active)
 
 
+@pytest.mark.slow
 @each_of("line, mended", [
     ("On := P1.‸Run;", "On := P1.Runs;"),
     ("On := TRUE‸", "On := TRUE;"),

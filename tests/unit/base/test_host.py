@@ -61,6 +61,7 @@ def test_waiting_comes_back_in_time_for_ctrl_c(windows: None) -> None:
     assert host.LONGEST_WAIT_S < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["SelectSelector", "PollSelector", "DefaultSelector"])
 def test_an_exchange_with_every_selector(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if not hasattr(selectors, kind):

@@ -168,6 +168,7 @@ def test_close_while_somebody_looks_at_a_slice(memory: Memory) -> None:
     assert list(piece) == [0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the host does not tell its memory in /proc")
 def test_a_memory_costs_what_it_touches() -> None:
     def resident_pages() -> int:

@@ -129,17 +129,20 @@ def test_no_page_is_left_over() -> None:
 # --- what its programs do ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("code", source_codes)
 def test_the_wrong_program_gives_this_diagnostic_and_no_other(code: str) -> None:
     compilation = compiled(parts(code)["wrong"])
     assert [diagnostic.code for diagnostic in compilation.diagnostics] == [code], shown(compilation)
 
 
+@pytest.mark.slow
 @each_of("code", [code for code in source_codes if CODES[code].severity == "warning"])
 def test_a_program_with_a_warning_runs(code: str) -> None:
     assert trap_of(compiled(parts(code)["wrong"])) == ""
 
 
+@pytest.mark.slow
 @each_of("code", trap_codes)
 def test_the_wrong_program_compiles_and_traps(code: str) -> None:
     compilation = compiled(parts(code)["wrong"])
@@ -147,6 +150,7 @@ def test_the_wrong_program_compiles_and_traps(code: str) -> None:
     assert trap_of(compilation, limits.get(code, 0)) == code
 
 
+@pytest.mark.slow
 @each_of("code", program_codes)
 def test_the_right_program_compiles_without_a_word_and_runs(code: str) -> None:
     compilation = compiled(parts(code)["right"])
@@ -189,6 +193,7 @@ def found_in(text: str) -> list[Diagnostic]:
     return import_project(saved.encode(), "page.cxt").diagnostics
 
 
+@pytest.mark.slow
 @each_of("code", xml_codes)
 def test_the_wrong_document_gives_this_diagnostic_and_the_right_one_none(code: str) -> None:
     for half, expected in (("wrong", [code]), ("right", [])):

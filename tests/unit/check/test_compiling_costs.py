@@ -29,6 +29,7 @@ def test_what_compilations_leave_is_collected_in_passing() -> None:
     assert counts[-1] < counts[0] + 20_000
 
 
+@pytest.mark.slow
 def test_functions_that_call_the_next_twice_are_looked_at_once() -> None:
     text = "".join(f"FUNCTION F{n} : INT\nVAR_INPUT a : INT; END_VAR\nF{n} := F{n + 1}(a) + F{n + 1}(a);\nEND_FUNCTION\n"
                    for n in range(60))
@@ -91,6 +92,7 @@ def _calls(text: str) -> int:
     return calls
 
 
+@pytest.mark.slow
 def test_instances_in_instances_are_looked_through_once_a_type() -> None:
     """Each of 16 blocks has two of the block before it: 65,536 instances, and 16 types."""
     blocks = ["FUNCTION_BLOCK S0 VAR x : BOOL; END_VAR END_FUNCTION_BLOCK"]

@@ -83,6 +83,7 @@ def ran() -> Plc:
     return plc
 
 
+@pytest.mark.slow
 @each_of("name, lead", LEADS)
 def test_what_a_reference_leads_to(ran: Plc, trace: Trace, name: str, lead: object) -> None:
     names, place = Names.of(ran.image, ran.memory.areas), ran.find(f"Main.{name}")
@@ -107,6 +108,7 @@ def test_each_lead_is_looked_up_once(ran: Plc, monkeypatch: pytest.MonkeyPatch) 
     assert names.read(ran.read, place) == once
 
 
+@pytest.mark.slow
 def test_why_and_stepping_say_it(trace: Trace) -> None:
     place = trace.find("Main.element")
     assert isinstance(place, Place)

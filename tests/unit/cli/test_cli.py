@@ -71,6 +71,7 @@ def values(*arguments: str) -> dict[str, object]:
 # --- run: how it ends -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "stopped", "scans", "status"), [
     (["--scans", "7"], "scans", 7, 0),
     (["--for", "1s"], "time", 100, 0),
@@ -209,6 +210,7 @@ def test_tests_that_cannot_be_collected_have_failed(tmp_path: Path, monkeypatch:
     assert fbvm("test", "-q", "-p", "no:cacheprovider").exit_code == 1
 
 
+@pytest.mark.slow
 def test_what_cannot_be_written_is_said_alike_by_every_verb(counter: str) -> None:
     chart = "PROGRAM Main\nINITIAL_STEP A: END_STEP\nTRANSITION FROM A TO A := TRUE; END_TRANSITION\nEND_PROGRAM\n"
     Path("chart.st").write_text(chart, encoding="utf-8")
@@ -358,6 +360,7 @@ def test_explain_prints_the_page() -> None:
 # --- the command itself -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of("verb", GROUP_OF)
 def test_every_verb_has_help(verb: str) -> None:
     result = fbvm(verb, "--help")
@@ -535,6 +538,7 @@ def test_the_demo_names_the_command_as_it_can_be_called(
     assert command_name() == called_so
 
 
+@pytest.mark.slow
 def test_a_capture_is_flushed_while_a_program_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever opens it before the end sees what has been sent."""
     path = tmp_path / "run.pcapng"
@@ -550,6 +554,7 @@ def test_a_capture_is_flushed_while_a_program_runs(tmp_path: Path, monkeypatch: 
     assert any(0 < size < path.stat().st_size for size in seen)
 
 
+@pytest.mark.slow
 def test_a_run_that_shows_nothing_says_what_ran(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """On a terminal only: scripts get what they asked for."""
     made = compile_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM").image

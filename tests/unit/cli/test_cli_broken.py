@@ -61,6 +61,7 @@ def test_fmt_of_a_comment_without_an_end(fbvm: Fbvm, text: str) -> None:
     assert Path("wrong.st").read_text(encoding="utf-8") == text
 
 
+@pytest.mark.slow
 @each_of("declared", [
     "x AT %DN0 : INT;", "x AT %MWN0 : INT;", "x AT %IX0.N0 : BOOL;", "x AT E0_N0 : INT;",
     "x : STRUCT a AT %BN0 : INT; END_STRUCT;", "x : INT := N0;", "x : TIME := T#N0s;", "x : STRING[N0];",
@@ -85,6 +86,7 @@ def test_numbers_of_many_digits_in_rungs(fbvm: Fbvm, step: str) -> None:
     assert fbvm("export", "wrong.st", "-o", "out.xml").exit_code in (0, 3)
 
 
+@pytest.mark.slow
 @each_of("arguments", [
     ("--show", "DN0"), ("--show", "Main.n.N0"), ("--show", "Main.n[N0]"), ("--set", "Main.n=N0"),
     ("--set", "Main.n=1@N0s"), ("--set", "Main.n=1@1.N0s"), ("--break", "counter.st:N0"), ("--ladder", "N0"),
@@ -96,6 +98,7 @@ def test_numbers_of_many_digits_in_options(fbvm: Fbvm, arguments: tuple[str, str
     assert "int_max_str_digits" not in result.output
 
 
+@pytest.mark.slow
 def test_numbers_of_many_digits_as_arguments(fbvm: Fbvm) -> None:
     assert fbvm("map", f"D{DIGITS}").exit_code == 2
     assert fbvm("explain", DIGITS).exit_code == 2
@@ -104,6 +107,7 @@ def test_numbers_of_many_digits_as_arguments(fbvm: Fbvm) -> None:
     assert fbvm("chart", "run.fbtrace", "--scans", DIGITS).exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_number_of_many_digits_in_a_journal(fbvm: Fbvm) -> None:
     write_old_journal("run.journal", Path("counter.st").read_text(encoding="utf-8"))
     text = Path("run.journal").read_text(encoding="utf-8")

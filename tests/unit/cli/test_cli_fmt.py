@@ -164,6 +164,7 @@ DRAWN = """    RUNG 7 it shines
 """
 
 
+@pytest.mark.slow
 def test_rungs_are_drawn_and_written_as_instructions_again() -> None:
     given = RUNGS.replace("    CNT     5 #3", "    OUT     100.03")
     Path("rungs.st").write_text(given, encoding="utf-8")

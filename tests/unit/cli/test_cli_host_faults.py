@@ -167,6 +167,7 @@ def test_closed_streams_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- memory images ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_serve_refuses_an_image_that_cannot_be_written(tmp_path: Path) -> None:
     missing = str(tmp_path / "nope" / "image")
     result = fbvm("serve", "--port", "0", "--image", missing)

@@ -181,6 +181,7 @@ def test_an_export_of_a_file_with_an_impossible_time(fbvm: Fbvm) -> None:
     assert re.search(r'creationDateTime="\d{4}-', Path("out.xml").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_a_journal_with_an_endless_line(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) -> None:
     write_old_journal("run.journal", COUNTER)
     with Path("run.journal").open("a", encoding="utf-8") as file:

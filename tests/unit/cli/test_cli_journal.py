@@ -32,6 +32,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing", first_quick(["exact", "real"]))
 def test_a_run_is_done_again(here: Path, timing: str) -> None:
     asked = ["--show", "D200..D204", "--show", "Main.Read.Rcv_Counter", "--json"]
@@ -89,6 +90,7 @@ def test_a_condition_that_never_held(here: Path) -> None:
     assert (result.exit_code, result.output) == (1, "Main.n > 99 did not hold in 40ms\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "status", "message"),
     [
@@ -172,6 +174,7 @@ def test_both_options_ask_for_the_same_file(here: Path) -> None:
     assert fbvm("replay", "a", "--show", "Main.n").output == fbvm("replay", "b", "--show", "Main.n").output == "Main.n = 8\n"
 
 
+@pytest.mark.slow
 def test_all_plcs_of_a_project_are_in_one_recording(here: Path) -> None:
     Path("fbvm.toml").write_text('[plc.One]\nsources = ["counter.st"]\n[plc.Two]\nsources = ["counter.st"]\ncount = 2\n'
                                  'cycle = "20ms"\n', encoding="utf-8")  # fmt: skip

@@ -111,6 +111,7 @@ def test_scan_times_are_of_all_plcs_of_a_kind(folder: Path) -> None:
     assert [line.split(" on average")[0].rsplit(" ", 2)[0] for line in lines] == ["pump: scan time:", "valve: scan time:"]
 
 
+@pytest.mark.slow
 def test_a_trap_stops_one_plc_and_is_told(folder: Path) -> None:
     text = PROJECT + '\n[[plc.bad.set]]\nname = "Main.divisor"\nvalue = 0\n[plc.bad]\nsources = ["counter.st"]\n'
     (folder / "fbvm.toml").write_text(text, encoding="utf-8")
@@ -160,6 +161,7 @@ def check(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["check", *arguments])
 
 
+@pytest.mark.slow
 def test_a_project_is_checked_with_all_its_plcs(folder: Path) -> None:
     assert (check().exit_code, check(".").output, check("fbvm.toml").output) == (0, "", "")
     (folder / "counter.st").write_text(PROGRAM.replace("step / divisor", "steps / divisor"), encoding="utf-8")

@@ -22,6 +22,7 @@ def proved(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["prove", *arguments])
 
 
+@pytest.mark.slow
 def test_a_proof_has_status_0_and_says_how() -> None:
     result = proved(INTERLOCK, "--never", "Main.Left AND Main.Right")
     assert (result.exit_code, result.stdout) == (0, "never Main.Left AND Main.Right: PROVED by induction over 1 scan\n")
@@ -41,6 +42,7 @@ def test_json_has_the_inputs_scan_by_scan() -> None:
         1, "broken", [{"scan": 0, "values": {"Main.Backward": True}}])
 
 
+@pytest.mark.slow
 def test_the_test_that_is_written_fails_until_the_program_keeps_the_property(tmp_path: Path) -> None:
     program, test = tmp_path / "program.st", tmp_path / "test_found.py"
     program.write_text(DIVIDES, encoding="utf-8")
@@ -53,6 +55,7 @@ def test_the_test_that_is_written_fails_until_the_program_keeps_the_property(tmp
     assert proved(str(program), "--no-trap").exit_code == 0
 
 
+@pytest.mark.slow
 def test_an_answer_that_comes_too_late_is_written_as_a_test(tmp_path: Path) -> None:
     program, test = tmp_path / "program.st", tmp_path / "test_late.py"
     text = "PROGRAM Main\nVAR In AT %IX0.0 : BOOL; t : TON; END_VAR\n    t(IN := In, PT := T#50ms);\nEND_PROGRAM\n"
@@ -67,6 +70,7 @@ def test_an_answer_that_comes_too_late_is_written_as_a_test(tmp_path: Path) -> N
     late()
 
 
+@pytest.mark.slow
 def test_two_blocks_are_compared(tmp_path: Path) -> None:
     program = tmp_path / "blocks.st"
     block = "FUNCTION {} : INT\nVAR_INPUT a : INT; END_VAR\n    {} := {};\nEND_FUNCTION\n"
@@ -79,6 +83,7 @@ def test_two_blocks_are_compared(tmp_path: Path) -> None:
     assert proved(str(program), "--equal", "Twice", "Nobody").exit_code == 2
 
 
+@pytest.mark.slow
 def test_the_run_is_recorded(tmp_path: Path) -> None:
     trace = tmp_path / "found.fbtrace"
     assert proved(INTERLOCK, "--never", "Main.Left", "--trace", str(trace)).exit_code == 1

@@ -45,6 +45,7 @@ def test_a_picture_goes_to_a_file(file: Path, tmp_path: Path) -> None:
     assert (tmp_path / "lamps.svg").read_text(encoding="utf-8").startswith("<svg ")
 
 
+@pytest.mark.slow
 def test_a_run_draws_each_instance_in_some_scans(file: Path) -> None:
     result = CliRunner().invoke(main, ["run", str(file), "--scans", "5", "--set", "Main.switch=TRUE@20ms", "--sfc", "1,3"])
     assert result.exit_code == 0

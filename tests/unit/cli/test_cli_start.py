@@ -27,6 +27,7 @@ USED = {"fbvm.engine", "fbvm.machine.plc", "fbvm.run", "fbvm.net"}
 @pytest.mark.slow
 @pytest.mark.parametrize(("words", "needed"), [
     (["check", "main.st"], set()), (["fmt", "--check", "main.st"], set()), (["explain", "S0201"], set()),
+    (["test", "--version"], set()),
     (["list", "main.st"], {"fbvm.engine"}), (["run", "main.st", "--scans", "3", "--engine", "python"], USED),
 ])  # fmt: skip
 def test_a_verb_loads_what_it_needs(

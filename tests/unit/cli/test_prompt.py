@@ -42,6 +42,7 @@ def own_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / HISTORY
 
 
+@pytest.mark.slow
 def test_lines_until_the_end_of_input() -> None:
     assert typed("step\rprint Main.Count\r") == ["step", "print Main.Count"]
 
@@ -51,6 +52,7 @@ def test_control_c_takes_back_a_line() -> None:
     assert typed(f"print Main{CONTROL_C}scan\r") == ["scan"]
 
 
+@pytest.mark.slow
 def test_what_was_typed_is_kept(own_history: Path) -> None:
     assert typed("scan 3\r") == ["scan 3"]
     assert "scan 3" in own_history.read_text(encoding="utf-8")

@@ -32,6 +32,7 @@ def record(fbvm: Fbvm, *more: str) -> None:
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.slow
 def test_a_chart_of_a_trace(fbvm: Fbvm) -> None:
     record(fbvm)
     result = fbvm("chart", "run.fbtrace", "Main.Start,Main.Pump", "D200", "--scans", "2..12")
@@ -42,6 +43,7 @@ def test_a_chart_of_a_trace(fbvm: Fbvm) -> None:
         "D200        0     |7\n")  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_long_chart_is_wrapped_and_cut(fbvm: Fbvm) -> None:
     record(fbvm)
     assert "~" in fbvm("chart", "run.fbtrace", "Main.Pump").output
@@ -118,6 +120,7 @@ def test_a_table_of_a_long_trace_is_of_its_end(fbvm: Fbvm, monkeypatch: pytest.M
     assert "scan 3 " in fbvm("table", "run.fbtrace", "Main.Start", "--scans", "..").output
 
 
+@pytest.mark.slow
 def test_every_statement(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "statements")
     assert "pump.st:16" in fbvm("table", "run.fbtrace", "D200", "--scans", "8", "--every").output
@@ -135,6 +138,7 @@ def test_why(fbvm: Fbvm) -> None:
     assert fbvm("why", "D200", "run.fbtrace", "--deep", "0").output == lines[0] + "\n"
 
 
+@pytest.mark.slow
 def test_stepping_through_a_trace(fbvm: Fbvm) -> None:
     record(fbvm)
     Path("pump.st").unlink()
@@ -177,6 +181,7 @@ def test_what_clients_of_a_server_did(fbvm: Fbvm) -> None:
     assert "D10 = 200 since scan" in fbvm("why", "D10", "run.fbtrace").output
 
 
+@pytest.mark.slow
 def test_out_as_csv_and_in_again(fbvm: Fbvm) -> None:
     record(fbvm)
     assert fbvm("convert", "run.fbtrace", "run.csv", "Main.Pump,Main.Delay.ET", "--scans", "7..8").exit_code == 0
@@ -186,6 +191,7 @@ def test_out_as_csv_and_in_again(fbvm: Fbvm) -> None:
     assert "Main.Pump  .#" in fbvm("chart", "back.fbtrace", "Main.Pump").output
 
 
+@pytest.mark.slow
 def test_what_cannot_be_converted_leaves_files_as_they_were(fbvm: Fbvm) -> None:
     record(fbvm)
     Path("table.csv").write_text("a,b\n")
@@ -213,6 +219,7 @@ def test_vcd_without_its_package(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) ->
     assert not Path("run.vcd").exists()
 
 
+@pytest.mark.slow
 def test_only_what_is_selected(fbvm: Fbvm) -> None:
     record(fbvm, "--select", "Main.Delay", "--select", "*.CV")
     assert [line.split()[0] for line in fbvm("chart", "run.fbtrace").output.splitlines()[1:]] == [

@@ -146,6 +146,7 @@ def test_what_is_not_wanted_is_not_used(anew: list[int], folder: Path) -> None:
     assert len(anew) == 3
 
 
+@pytest.mark.slow
 def test_the_command_line_can_do_without(anew: list[int], folder: Path) -> None:
     for _ in range(2):
         result = CliRunner().invoke(main, ["run", "main.st", "--library", "lib", "--scans", "1", "--no-cache"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from textwrap import dedent
 
+import pytest
 from expression_rows import NUMBERS, RUNS, STRINGS
 from hand_image import at, behind, const, image, load, own, store
 from images import counter_image, task
@@ -139,6 +140,7 @@ def test_every_statement_can_be_listed(code: Block) -> None:
     assert listing(image(code, *helpers), observations=True).count("\n") >= len(code)
 
 
+@pytest.mark.slow
 def test_every_expression_can_be_listed() -> None:
     nodes = [row[1] for row in RUNS] + [row[0] for row in STRINGS]
     for name, machine, a, b, _ in NUMBERS:

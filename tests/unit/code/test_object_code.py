@@ -133,6 +133,7 @@ def test_programs_with_errors_and_warnings_hear_the_same() -> None:
     assert heard == [heard[0]] * 4 and heard[0][2]
 
 
+@pytest.mark.slow
 def test_references_into_a_linked_block_and_a_block_that_programs_complete() -> None:
     refers = ("PROGRAM Main\nVAR d : TON; p : POINTER TO TIME; END_VAR\nd(IN := TRUE, PT := T#1s);\np := ADR(d.ET);\n"
               "IF p^ > T#0s THEN p := 0; END_IF;\nEND_PROGRAM\n")

@@ -152,6 +152,7 @@ def program(names: tuple[str, ...], front: str = "") -> str:
     return f"{front}PROGRAM Main\nVAR {own}{declared}n : INT; END_VAR\n{called}\nb0();\nEND_PROGRAM\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("each", [(), pytest.param(tuple((name,) for name in BLOCKS), marks=pytest.mark.slow)])
 def test_linked_is_lowered_whatever_lies_before(each: tuple[tuple[str, ...], ...], monkeypatch: pytest.MonkeyPatch) -> None:
     texts = [program(names, front) for front in AROUND for names in (*each, BLOCKS, BLOCKS[::-1])]
@@ -167,6 +168,7 @@ def test_linked_is_lowered_whatever_lies_before(each: tuple[tuple[str, ...], ...
         assert kept >= APART and not kept & {"Refers", "Acts", "Sum_In", "Most_Of", "Holds"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", first_quick(BLOCKS))
 def test_what_one_program_had_made_known_another_has_too(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(object_code, "_libraries", {})

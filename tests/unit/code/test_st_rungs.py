@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from textwrap import dedent
 
+import pytest
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
@@ -60,11 +61,13 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @each_of("body", RUNGS)
 def test_a_statement_is_a_rung(body: str) -> None:
     assert steps(body)[0] == RUNGS[body]
 
 
+@pytest.mark.slow
 @each_of("body", REFUSED)
 def test_what_is_no_rung_is_named_with_its_line_and_the_rest_is_drawn(body: str) -> None:
     assert steps(f"{body}\na := b;") == [REFUSED[body], "LD b; OUT a"]
@@ -104,6 +107,7 @@ def test_conditions_of_a_block_are_observed() -> None:
     assert made.states == {0: [True], 1: [False], 2: [True], 3: [False]}
 
 
+@pytest.mark.slow
 def test_drawing_changes_nothing_but_what_is_told() -> None:
     body = "\n".join(one + ";" for one in RUNGS)
     plain, drawn = (Plc(image(body, drawn)) for drawn in (False, True))

@@ -67,6 +67,7 @@ def test_work_is_charged_by_its_size(declarations: str, body: str, expected: lis
     assert charged(declarations, body) == expected
 
 
+@pytest.mark.slow
 def test_long_expressions_are_more_than_a_step() -> None:
     assert charged("a : DINT; b : DINT;", f"a := {' + '.join(['b'] * 1000)};")[0] > 50
 
@@ -77,6 +78,7 @@ def test_initial_values_of_a_call_are_charged() -> None:
     assert bodies["F"] == [2, 195]
 
 
+@pytest.mark.slow
 def test_a_large_statement_charges_where_it_stands_in_the_source() -> None:
     image = image_of("a, b : ARRAY[1..1_000_000] OF DINT; n : INT;", "n := 1;\na := b;")
     large = [node for body in image.bodies for node in body.code if node[0] == "charge" and node[1] > 1000]

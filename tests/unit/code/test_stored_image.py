@@ -95,6 +95,7 @@ def test_a_run_is_the_same() -> None:
     assert plcs[1].read("Only.C") == plcs[0].read("Only.C")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [1, 5000])
 def test_the_fingerprint_is_that_of_equal_code(depth: int) -> None:
     def nested(*words: str) -> Any:
@@ -127,6 +128,7 @@ def test_what_is_no_image_is_refused(content: bytes) -> None:
         decode(content)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", [
     "IF x > 0 THEN\n" * 180 + "x := x + 1;\n" + "END_IF\n" * 180,
     "x := " + "x + " * 990 + "1;",

@@ -79,6 +79,7 @@ def test_capabilities_have_a_request_each() -> None:
         client.ask("initialize")
 
 
+@pytest.mark.slow
 def test_breakpoints_may_come_before_the_program(file: Path) -> None:
     client = Client()
     client.ask("initialize", adapterID="fbvm")
@@ -184,6 +185,7 @@ def test_functions_instances_and_what_is_none(file: Path) -> None:
     assert client.frames[0]["name"] == "Twice  Main.U"
 
 
+@pytest.mark.slow
 def test_data_breakpoints_on_names_addresses_and_ranges(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))
@@ -202,6 +204,7 @@ def test_data_breakpoints_on_names_addresses_and_ranges(file: Path) -> None:
     assert "was 1, is 2" in stop["description"] and client.value("D200") == "2 (16#0002)" and client.value("N") == "20"
 
 
+@pytest.mark.slow
 def test_breakpoints_may_change_while_it_runs(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))
@@ -254,6 +257,7 @@ def test_steps_in_over_out_and_back(file: Path) -> None:
         client.go("stepBack")
 
 
+@pytest.mark.slow
 def test_scans_and_the_end_of_the_program(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))
@@ -287,6 +291,7 @@ def test_reverse_who_wrote_this_and_a_forgotten_future(file: Path) -> None:
     assert stop["reason"] == "entry" and stop["description"] == "beginning of what is kept: scan 0, 0s"
 
 
+@pytest.mark.slow
 def test_a_write_in_the_past_forgets_what_came_after(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))
@@ -304,6 +309,7 @@ def test_a_write_in_the_past_forgets_what_came_after(file: Path) -> None:
     assert client.value("N") == "104"
 
 
+@pytest.mark.slow
 def test_a_trap_is_an_exception_that_only_going_back_leaves(file: Path) -> None:
     client = Client()
     stop = client.begin({"setExceptionBreakpoints": {"filters": ["trap"]}}, program=str(file),
@@ -327,6 +333,7 @@ def test_filters_in_both_forms_and_unknown_ones(file: Path) -> None:
     assert [row["verified"] for row in answer["breakpoints"]] == [True, False, True, False]
 
 
+@pytest.mark.slow
 def test_a_run_with_an_end_ends_the_session(file: Path) -> None:
     client = Client()
     assert client.begin(program=str(file), **{"for": "1s"}) == {}
@@ -340,6 +347,7 @@ def test_what_the_last_scans_said_comes_before_the_end(file: Path) -> None:
     assert events[-2:] == ["output", "exited"] and "n=5" in client.events("output")[-1]["output"]
 
 
+@pytest.mark.slow
 def test_restart_keeps_the_breakpoints(file: Path) -> None:
     client = Client()
     client.begin(lines(file, 22), program=str(file))
@@ -351,6 +359,7 @@ def test_restart_keeps_the_breakpoints(file: Path) -> None:
 # --- values -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_scopes_have_what_there_is(file: Path) -> None:
     client = Client()
     client.begin(lines(file, 6), program=str(file))
@@ -368,6 +377,7 @@ def test_scopes_have_what_there_is(file: Path) -> None:
     assert "Send Request Switch" in units["CIO 1519.03"]["value"]
 
 
+@pytest.mark.slow
 def test_large_arrays_and_areas_come_in_pages(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))
@@ -381,6 +391,7 @@ def test_large_arrays_and_areas_come_in_pages(file: Path) -> None:
     assert areas["D"]["indexedVariables"] == 32768 and list(words)[-1] == "D32767" and words["D32767"]["value"] == "0 (16#0000)"
 
 
+@pytest.mark.slow
 def test_a_client_without_paging_never_gets_more_than_256_rows(file: Path) -> None:
     client = Client(supportsVariablePaging=False)
     client.begin(program=str(file))
@@ -400,6 +411,7 @@ def test_references_end_when_the_position_changes(file: Path) -> None:
             client.ask(command, **arguments)
 
 
+@pytest.mark.slow
 def test_setting_the_shown_value_changes_nothing(file: Path) -> None:
     client = Client()
     client.begin(lines(file, 22), program=str(file))
@@ -416,6 +428,7 @@ def test_setting_the_shown_value_changes_nothing(file: Path) -> None:
         client.ask("setVariable", variablesReference=client.scopes()["Locals"]["variablesReference"], name="N", value="99999")
 
 
+@pytest.mark.slow
 def test_force_and_release(file: Path) -> None:
     client = Client()
     client.begin(program=str(file))
@@ -427,6 +440,7 @@ def test_force_and_release(file: Path) -> None:
     assert client.ask("fbvm/unforce")["forces"] == [] and client.ask("fbvm/forces") == {"forces": []}
 
 
+@pytest.mark.slow
 def test_expressions_names_and_commands_in_the_console(file: Path) -> None:
     client = Client()
     client.begin(lines(file, 6), program=str(file))
@@ -445,6 +459,7 @@ def test_expressions_names_and_commands_in_the_console(file: Path) -> None:
             client.ask("evaluate", expression=text, context="repl")
 
 
+@pytest.mark.slow
 def test_hexadecimal_is_asked_for(file: Path) -> None:
     client = Client()
     client.begin(lines(file, 22), program=str(file))

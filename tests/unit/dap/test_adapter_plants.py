@@ -54,6 +54,7 @@ END_PROGRAM
 TRAP = "PROGRAM Main\nVAR n, d : INT; END_VAR\nn := n + 1;\nd := 100 / (n - 41);\nEND_PROGRAM\n"
 
 
+@pytest.mark.slow
 def test_the_plcs_of_a_project_are_threads_of_one_time(tmp_path: Path) -> None:
     (tmp_path / "fbvm.toml").write_text(PROJECT, encoding="utf-8")
     for name, step in {"fast": 1, "slow": 100}.items():
@@ -89,6 +90,7 @@ def test_rungs_are_frames_and_breakpoints(tmp_path: Path) -> None:
     assert client.line == 11 != before
 
 
+@pytest.mark.slow
 def test_steps_of_charts_are_breakpoints(tmp_path: Path) -> None:
     path = tmp_path / "chart.st"
     path.write_text(CHART, encoding="utf-8")
@@ -191,6 +193,7 @@ END_PROGRAM
 """
 
 
+@pytest.mark.slow
 def test_variables_of_functions_and_temporary_ones_have_names_while_they_live(tmp_path: Path) -> None:
     path = tmp_path / "twice.st"
     path.write_text(FUNCTIONS, encoding="utf-8")

@@ -114,6 +114,7 @@ def sited(name: str) -> tuple[int, ...]:
     return (7,) if "site" in EXPRESSIONS[name].operands.split() else ()
 
 
+@pytest.mark.slow
 @each_of(("name", "machine", "a", "b", "wanted"), NUMBERS)
 def test_two_operands(name: str, machine: str, a: Any, b: Any, wanted: Any) -> None:
     (left, before), (right, more) = slot(machine, a), slot(machine, b, second=True)
@@ -134,6 +135,7 @@ def test_comparison(name: str, machine: str, a: Any, b: Any, wanted: bool) -> No
             assert yields("b", (name, "b", machine, x, y), before | more) is wanted
 
 
+@pytest.mark.slow
 @each_of(("name", "machine", "a", "wanted"), SINGLES)
 def test_one_operand(name: str, machine: str, a: Any, wanted: Any) -> None:
     operand, before = slot(machine, a)
@@ -182,11 +184,13 @@ def test_expression(machine: str, expression: Node, before: dict[int, bytes], wa
     assert same(yields(machine, expression, before), wanted)
 
 
+@pytest.mark.slow
 @each_of(("expression", "wanted"), STRINGS)
 def test_string_function(expression: Node, wanted: Any) -> None:
     assert yields("s8", expression) == wanted
 
 
+@pytest.mark.slow
 @each_of(("expression", "wanted"), STRINGS)
 def test_wide_string_function(expression: Node, wanted: Any) -> None:
     assert yields("s16", wide(expression)) == wide(wanted)
@@ -234,6 +238,7 @@ def test_an_operand_that_is_not_evaluated_does_not_trap() -> None:
     assert yields("b", ("or", "b", const("b", 1), trap)) == "R0101"
 
 
+@pytest.mark.slow
 def test_operands_trap_from_left_to_right() -> None:
     first = ("div", "i16", const("i16", 1), load("i16", 0), 3)
     second = ("check", "i16", load("i16", 0), 1, 2, "R0103", 4)

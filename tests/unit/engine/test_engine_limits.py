@@ -48,6 +48,7 @@ def test_blocks_nest(depth: int) -> None:
     assert (rig.slot("i16", 0), rig.slot("i16", 2)) == (1, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [14, 15, 16, 21, 40])
 def test_loops_nest(depth: int) -> None:
     rig = execute(nested_loops(depth, (add(0, ONE),), times=1))
@@ -70,6 +71,7 @@ def test_leaving_a_loop_from_deep_inside(depth: int, leave: str, counted: int, a
     assert (rig.slot("i16", 0), rig.slot("i16", 2)) == (counted, after)
 
 
+@pytest.mark.slow
 def test_a_case_in_deep_blocks_reads_its_value_from_outside() -> None:
     rows = tuple((((row, row),), (store("i16", 0, const("i16", row)),)) for row in range(300))
     rig = execute(nested_ifs(58, (("case", "i16", load("i16", 4), rows, ()),)), before={4: b"\xff\0"})

@@ -32,6 +32,7 @@ INSTANCE = SLOTS_OFFSET + 4096
 
 
 
+@pytest.mark.slow
 @each_of(("name", "code", "before", "wanted"), PROGRAMS, ids=[row[0] for row in PROGRAMS])
 def test_statement(name: str, code: Block, before: dict[int, bytes], wanted: Any) -> None:
     rig = execute(code, before=before, budget=1000)

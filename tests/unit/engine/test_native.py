@@ -288,6 +288,7 @@ def test_the_lesser_of_a_converted_float_and_0(level: int, machine: str, operati
     assert (slot(e, machine, 8), slot(e, "u8", 24)) == (200, 1)
 
 
+@pytest.mark.slow
 @each_of("level", LEVELS)
 @each_of("number", [0.0, 0.9, 2.0**62, 2.0**63, 2.0**63 + 2.0**11, 2.0**64 - 2.0**11, -0.4])
 @each_of("operation", ["truncate", "nearest"])

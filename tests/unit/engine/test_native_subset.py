@@ -60,6 +60,7 @@ def test_control_flow(n: int) -> None:
     assert compiled(COLLATZ)(n, 1000) == space["steps"](n, 1000)
 
 
+@pytest.mark.slow
 @each_of("expression", [
     "a + b * 2", "a - b", "a << b", "a | b ^ 1 & 7", "-a", "(a < b) + 1", "1 <= a <= 5", "1 <= a <= b <= 7", "LIMIT",
     "ord('x')", "a // 2", "a % 3", "a >> 1", "(a == b) + (a != b) * 2 + (a >= 5) * 4 + (b > a) * 8",

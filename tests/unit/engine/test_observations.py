@@ -58,6 +58,7 @@ def engine_of(*codes: Block) -> PythonEngine:
     return PythonEngine(program, power_on(program), observed=True)
 
 
+@pytest.mark.slow
 def test_all_that_a_program_does_is_told_in_its_order() -> None:
     compiled = compile_text(TEXT).image
     assert compiled is not None
@@ -134,6 +135,7 @@ def test_a_run_that_does_not_end_is_told_as_well(monkeypatch: pytest.MonkeyPatch
     assert len(expected) == 100_001 and list(endless().observations(0)) == expected
 
 
+@pytest.mark.slow
 def test_a_loop_is_told_as_far_as_somebody_wants() -> None:
     told, whole = endless(), endless()
     seen = list(told.observations(0, most=50))

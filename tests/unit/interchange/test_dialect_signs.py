@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 from rows import each_of
 
@@ -35,6 +36,7 @@ def test_the_tool_that_wrote_a_document_counts_more_than_constructs() -> None:
     assert (found.dialect, found.because) == ("matiec", "the header names Beremiz")
 
 
+@pytest.mark.slow
 @each_of(("name", "dialect", "reason"), [("beremiz.xml", "matiec", "there is `CONFIGURATION Config0`"),
                                          ("codesys.xml", "codesys", "the header names CODESYS")])
 def test_a_document_is_checked_in_the_dialect_of_its_tool_which_is_said(name: str, dialect: str, reason: str) -> None:

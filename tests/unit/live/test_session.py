@@ -153,6 +153,7 @@ def test_history_has_every_one_of_the_last_scans(page: Page) -> None:
     assert found["times"][1] - found["times"][0] == page.plc.cycle_ns
 
 
+@pytest.mark.slow
 def test_why_names_the_statement_that_gave_a_value(page: Page) -> None:
     page.scan(80)
     text = page.done("why", plc="pump", name="Main.Pump")["text"]
@@ -389,6 +390,7 @@ def test_a_past_that_cannot_be_done_again_has_one_future(page: Page) -> None:
     assert "cannot be done again" in page.ask("branch", plc="pump")["error"]
 
 
+@pytest.mark.slow
 def test_with_real_connections_machine_code_notes_the_power_of_rungs_until_nobody_looks() -> None:
     page = Page(RUNGS, real=True)
     page.done("hello", version=1)

@@ -161,6 +161,7 @@ def test_a_change_from_outside_is_found_at_the_first_statement(plc: Plc) -> None
     assert plc.halted and line_of(plc.halted) == 13 and plc.halted.reasons == ("D7 was 0, is 5",)
 
 
+@pytest.mark.slow
 def test_a_change_with_a_condition(plc: Plc) -> None:
     plc.breakpoints.change("D100", when="D100 > 20")
     assert [halt.scan for halt in halts(plc, 5)] == [3, 4]

@@ -249,6 +249,7 @@ def test_a_unit_with_nothing_to_do_does_not_hinder_them(wanted: int, timing: str
     assert many.read("Main.opened") == python.read("Main.opened") != 0
 
 
+@pytest.mark.slow
 def test_with_an_idle_unit_they_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
     plc = with_unit("native", 1_000_000)
     plc.run(scans=10)
@@ -256,6 +257,7 @@ def test_with_an_idle_unit_they_are_used(monkeypatch: pytest.MonkeyPatch) -> Non
     assert plc.run(scans=10_000) == "scans"
 
 
+@pytest.mark.slow
 def test_a_unit_that_something_is_done_to_takes_part_again() -> None:
     plc = with_unit("native", 1_000_000)
     plc.run(scans=100)
@@ -271,6 +273,7 @@ def test_a_unit_that_something_is_done_to_takes_part_again() -> None:
     assert plc.read("A302") == 0
 
 
+@pytest.mark.slow
 def test_a_unit_that_is_taken_away_and_comes_back_takes_part() -> None:
     plc = with_unit("native", 1_000_000)
     plc.run(scans=100)
@@ -283,6 +286,7 @@ def test_a_unit_that_is_taken_away_and_comes_back_takes_part() -> None:
     assert plc.read("CIO1517") != 0
 
 
+@pytest.mark.slow
 def test_faults_by_the_number_of_a_scan_count_all_scans() -> None:
     plc = with_unit("native", 1_000_000)
     plc.run(scans=5000)
@@ -294,6 +298,7 @@ def test_faults_by_the_number_of_a_scan_count_all_scans() -> None:
     assert link.scan == 5000
 
 
+@pytest.mark.slow
 def test_the_loop_that_waits_for_nobody_uses_them(monkeypatch: pytest.MonkeyPatch) -> None:
     plc = with_unit("native", 4980)
     begun: list[int] = []

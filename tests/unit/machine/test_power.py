@@ -134,6 +134,7 @@ def test_it_is_what_the_recorder_sees(engine: str) -> None:
     assert bytes(plc.memory.u8) == bytes(observed.memory.u8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_contacts_that_share_a_byte_are_told_apart(engine: str) -> None:
     made = image(MANY)

@@ -118,6 +118,7 @@ END_LADDER
 END_PROGRAM"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["python", "native"])
 def test_the_program_sets_the_clock(engine: str) -> None:
     plc = Plc(compiled(PLC_WITH_DATE).image, engine=engine)
@@ -143,6 +144,7 @@ def test_the_program_sets_the_clock(engine: str) -> None:
 COUNTED = "PROGRAM Main VAR n : UINT; END_VAR n := n + 1; END_PROGRAM"
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=times(10))
 @given(st.datetimes(datetime(2000, 1, 1), datetime(2099, 12, 31)))
 def test_both_engines_show_any_date_as_the_calendar_has_it(now: datetime) -> None:

@@ -68,6 +68,7 @@ def test_from_program_to_run_begins_anew() -> None:
     assert (active(plc, "plain"), active(plc, "kept")) == ("a", "b")
 
 
+@pytest.mark.slow
 def test_times_do_not_drift() -> None:
     plc = made("""PROGRAM Main
         VAR rounds : INT; END_VAR
@@ -79,6 +80,7 @@ def test_times_do_not_drift() -> None:
     assert plc.read("Main.rounds") == 101
 
 
+@pytest.mark.slow
 @each_of(("association", "due_ms"), [
     ("x(L, T#70ms)", 70), ("x(D, T#80ms)", 80), ("x(DS, T#90ms)", 90), ("x(SD, T#60ms)", 60), ("x(SL, T#50ms)", 50)])  # fmt: skip
 def test_it_is_known_when_an_action_changes_by_itself(association: str, due_ms: int) -> None:

@@ -137,6 +137,7 @@ SHAPES = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("program", "delays_ns", "latency_ns"), first_quick(SHAPES))
 def test_scan_by_scan(program: tuple[Any, ...], delays_ns: tuple[int, ...], latency_ns: int) -> None:
     rigs = four(image(*program), delays_ns, latency_ns)
@@ -156,6 +157,7 @@ def test_many_at_once(program: tuple[Any, ...], delays_ns: tuple[int, ...], late
     assert rigs[0].plc.scans == 743 and rigs[0].plc.read("D20001") > 20
 
 
+@pytest.mark.slow
 def test_a_trap_of_the_program_ends_a_run_and_a_restart_begins_anew() -> None:
     rigs = four(image(every=5, trap=47), (MS,))
     agree(rigs, lambda plc: plc.run(scans=100))
@@ -174,6 +176,7 @@ def test_a_trap_of_a_units_program_is_a_fault_of_ours() -> None:
             rig.plc.run(scans=3)
 
 
+@pytest.mark.slow
 def test_what_is_written_from_outside_is_seen() -> None:
     rigs = four(image(every=1000, slow=False), (0, 2 * MS))
     agree(rigs, lambda plc: plc.run(scans=20))
@@ -202,6 +205,7 @@ def test_its_time_comes_in_the_middle_of_many_scans() -> None:
     assert rigs[0].toys[0].refreshes < 5
 
 
+@pytest.mark.slow
 def test_scans_in_one_piece_and_others_take_turns() -> None:
     rigs = four(image(), (MS, 0))
     for number in range(12):

@@ -194,6 +194,7 @@ def test_two_plcs_have_scans_of_their_own() -> None:
     assert not line.network.fault(Peer("10.0.0.2", 1), Peer("10.0.0.3", 1)).silent
 
 
+@pytest.mark.slow
 @each_of("kind", KINDS)
 def test_after_each_kind_all_is_well(kind: str) -> None:
     row = KINDS[kind]

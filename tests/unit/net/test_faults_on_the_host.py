@@ -288,6 +288,7 @@ def test_a_row_holds_during_some_scans_and_for_one_peer() -> None:
     host.close()
 
 
+@pytest.mark.slow
 def test_faults_are_switched_while_data_flow(host: Host) -> None:
     """No byte is lost or changed by the way from the host's connection to wires, nor when there is no fault any more."""
     device = host.open()

@@ -90,6 +90,7 @@ def same_again(plc: Plc, text: str, image: Image | None = None) -> Replay:
 # --- the same again ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_run_over_a_network_is_done_again_without_it() -> None:
     run = Run()
     run.peer.server.holding_registers[7] = 4711
@@ -225,6 +226,7 @@ def test_a_program_that_stopped_and_was_started_again() -> None:
     assert replay.plc.scans == plc.scans > 3
 
 
+@pytest.mark.slow
 def test_a_replay_stops_where_one_wants_to_look() -> None:
     run = Run()
     run.plc.run(scans=60)

@@ -480,6 +480,7 @@ def test_peers_keep_the_last_frames_callers_and_ends_only(monkeypatch: pytest.Mo
     assert len(rude.callers) <= 50 and len(rude._conversations) == 0
 
 
+@pytest.mark.slow
 def test_a_reply_of_before_needs_no_more_than_that() -> None:
     peer = RUDE_PEERS["previous reply instead"](ModbusServer())
     conversation = peer.accept(Peer(UNIT, 49152))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+import pytest
 from rows import each_of
 
 from fbvm.net.loop import LoopNetwork
@@ -131,6 +132,7 @@ class Play:
         return {name: plain(told) for name, told in self.pending.items()}
 
 
+@pytest.mark.slow
 @each_of("name", SCENARIOS)
 def test_the_same_is_told(name: str) -> None:
     memory = Play(LoopNetwork())

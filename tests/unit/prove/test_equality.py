@@ -49,6 +49,7 @@ def test_what_is_equal_is_proved(left: str, right: str) -> None:
     assert (verdict.word, verdict.notes) == ("proved", ()), verdict
 
 
+@pytest.mark.slow
 def test_the_shortest_difference_is_found() -> None:
     verdict = compared("Latch", "Dominant")
     assert verdict.run is not None

@@ -99,11 +99,13 @@ def test_division_by_an_input_traps() -> None:
     assert (verdict.word, verdict.run.trap.code, verdict.run.scans) == ("broken", "R0101", 1)
 
 
+@pytest.mark.slow
 def test_an_index_that_is_limited_never_traps() -> None:
     image = program("n := LIMIT(0, Level, 9); a[n] := a[n] + 1;", "a : ARRAY [0..9] OF INT; n : INT;")
     assert asked(image, NO_TRAP).word == "proved"
 
 
+@pytest.mark.slow
 def test_an_index_that_is_one_too_large_traps() -> None:
     image = program("n := LIMIT(0, Level, 10); a[n] := a[n] + 1;", "a : ARRAY [0..9] OF INT; n : INT;")
     verdict = asked(image, NO_TRAP)
@@ -176,6 +178,7 @@ def test_clock_pulses_follow_the_cycle() -> None:
     assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 6)
 
 
+@pytest.mark.slow
 def test_a_timer_ends_after_its_time_and_not_before() -> None:
     image = program("t(IN := In, PT := T#100ms);", "t : TON;")
     verdict = asked(image, REACH, "Main.t.Q")
@@ -208,6 +211,7 @@ def test_reals_are_compared_exactly(kind: str, address: str) -> None:
     assert place.name == "Main.r" and isinstance(value, float) and 10.25 < value < 11.0
 
 
+@pytest.mark.slow
 def test_arithmetic_of_reals_is_taken_for_any_value() -> None:
     image = program("r := r + 1.0; Q := r > 10.0 AND In;", "r : REAL; Q : BOOL;")
     assert asked(image, NEVER, "Main.Q AND NOT Main.In").word == "proved"
@@ -228,6 +232,7 @@ PROGRAM Main VAR n : INT; END_VAR n := Look(); END_PROGRAM
     assert image.sites[refused.value.site].line == 3
 
 
+@pytest.mark.slow
 def test_inputs_of_an_enumeration_have_its_values_only() -> None:
     image = image_of("""TYPE Colour : (Red, Green, Blue); END_TYPE
 PROGRAM Main
@@ -254,6 +259,7 @@ def test_an_answer_within_a_time_is_proved() -> None:
     assert answered(image, 30, "Main.In", "NOT Main.Other").word == "proved"
 
 
+@pytest.mark.slow
 def test_an_answer_that_comes_too_late_is_shown() -> None:
     image = program(WAITING, "t : TON; Q : BOOL;")
     verdict = answered(image, 20, "NOT Main.Other")
@@ -261,12 +267,14 @@ def test_an_answer_that_comes_too_late_is_shown() -> None:
     assert (verdict.word, verdict.run.scans, str(verdict.question)) == ("broken", 3, "Main.Q within 20ms of Main.In")
 
 
+@pytest.mark.slow
 def test_an_answer_that_somebody_prevents_is_shown() -> None:
     image = program(WAITING, "t : TON; Q : BOOL;")
     verdict = answered(image, 50)
     assert (verdict.word, verdict.run and verdict.run.scans) == ("broken", 6)
 
 
+@pytest.mark.slow
 def test_bits_of_a_word_are_inputs_unless_the_program_writes_them() -> None:
     image = image_of("""PROGRAM Main
 VAR w AT CIO 0 : WORD; First AT CIO 0.00 : BOOL; Busy AT CIO 0.15 : BOOL; n : WORD; END_VAR
@@ -292,6 +300,7 @@ CHECKSUM = """FOR i := 0 TO 30 DO
 END_FOR"""
 
 
+@pytest.mark.slow
 def test_a_scan_with_too_many_ways_is_undecided_when_the_time_is_over() -> None:
     asks = iter(range(3))
     limits = Limits(expired=lambda: next(asks, None) is None)

@@ -86,6 +86,7 @@ def test_an_endless_loop_ends_in_its_trap(monkeypatch: pytest.MonkeyPatch) -> No
     assert trace.at(0).read("Main.a") == plain.read("Main.a") == plc.read("Main.a")
 
 
+@pytest.mark.slow
 def test_table_and_why_say_what_is_not_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
     _, trace = recorded(LOOP, 2, 1200, monkeypatch)
     place = {name: trace.find(f"Main.{name}") for name in "nab"}
@@ -100,6 +101,7 @@ def test_table_and_why_say_what_is_not_recorded(monkeypatch: pytest.MonkeyPatch)
     assert cause_text(trace, why(trace, place["n"], 1)).startswith("Main.n = 2 since scan 1 (10ms), by text.st:3 in Main")
 
 
+@pytest.mark.slow
 def test_why_of_a_long_loop_keeps_the_last_read_of_each_variable() -> None:
     """The condition of a loop is read at each pass: its last value is told, once."""
     made = compile_text("PROGRAM Main\nVAR i, s : DINT; END_VAR\ni := 0; s := 0;\nWHILE i < 500 DO\n    i := i + 1;\n"

@@ -21,6 +21,7 @@ def memory() -> Memory:
     return Memory(image.layout.size, image.layout.areas)
 
 
+@pytest.mark.slow
 def test_there_and_back(tmp_path: Path) -> None:
     path, one, other = tmp_path / "image.json", memory(), memory()
     places = [("CIO", 0), ("CIO", 1499), ("CIO", 6143), ("W", 511), ("H", 7), ("D", 0), ("D", 32767)]

@@ -45,6 +45,7 @@ def recorded(own: Path) -> bytes:
     return file.getvalue()
 
 
+@pytest.mark.slow
 def test_a_recording_opens_where_the_libraries_are_not(own: Path) -> None:
     written = recorded(own)
     shutil.rmtree(own)

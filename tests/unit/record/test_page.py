@@ -91,6 +91,7 @@ def test_the_rows_of_a_scan_lead_from_one_end_to_the_next(depth: Depth) -> None:
         assert known == [text(trace, name, scan) for name in names]
 
 
+@pytest.mark.slow
 def test_a_row_says_which_statement_it_was() -> None:
     read = ReadPage(page_data(traced(20, Depth.STATEMENTS)))
     pump = next(number for number, signal in enumerate(read.head["signals"]) if signal["name"] == "Main.Pump")
@@ -113,6 +114,7 @@ def test_where_power_flows_in_rungs() -> None:
     assert flows == {2: [(3, "0"), (4, "1"), (5, "0")], 3: [(3, "1"), (4, "1"), (5, "1")]}
 
 
+@pytest.mark.slow
 def test_charts_are_drawn_as_they_were_in_each_scan() -> None:
     text = """PROGRAM Main VAR x : BOOL; END_VAR INITIAL_STEP a: END_STEP
         TRANSITION FROM a TO b := TRUE; END_TRANSITION STEP b: x(N); END_STEP END_PROGRAM"""
@@ -153,6 +155,7 @@ def test_of_too_much_there_are_windows(monkeypatch: pytest.MonkeyPatch) -> None:
         assert ("Main.Pump" in moved) == (scan == 150)
 
 
+@pytest.mark.slow
 def test_a_trace_without_scans_and_one_with_a_late_beginning() -> None:
     assert page_data(traced(0)).head["scans"] == [0, 0]
     plc = Plc(image())
@@ -160,6 +163,7 @@ def test_a_trace_without_scans_and_one_with_a_late_beginning() -> None:
     assert page_data(Trace(io.BytesIO(record(plc, 5)))).head["scans"] == [7, 5]
 
 
+@pytest.mark.slow
 def test_the_page_holds_everything_and_asks_for_nothing() -> None:
     data = page_data(traced(30, Depth.STATEMENTS), title="a <run> & {{data}}")
     made = page(data)
@@ -208,6 +212,7 @@ def test_a_long_run_stays_a_picture() -> None:
     assert float(svg.get("width", 0)) < 2000
 
 
+@pytest.mark.slow
 def test_a_scan_with_very_many_statements_is_shown_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scan 2 of 5 passes its loop a hundred times; its first rows are there, its end, and all of the other scans."""
     monkeypatch.setattr(inside, "MOST_IN_SCAN", 60)

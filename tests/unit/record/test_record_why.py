@@ -29,6 +29,7 @@ def ask(trace: Trace, name: str, scan: int, deepest: int = 6) -> Cause:
     return why(trace, place, scan, deepest)
 
 
+@pytest.mark.slow
 def test_the_statement_and_what_it_read(trace: Trace) -> None:
     cause = ask(trace, "Main.Pump", 41)
     assert cause.value == "TRUE"
@@ -37,6 +38,7 @@ def test_the_statement_and_what_it_read(trace: Trace) -> None:
     assert [(inner.place.name, inner.value, inner.guard) for inner in cause.causes] == [("Main.Delay.Q", "TRUE", False)]
 
 
+@pytest.mark.slow
 def test_conditions_around_a_statement_count(trace: Trace) -> None:
     cause = ask(trace, "D200", 41)
     assert [(inner.place.name, inner.value) for inner in cause.causes if inner.guard] == [
@@ -44,6 +46,7 @@ def test_conditions_around_a_statement_count(trace: Trace) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_chain_goes_back_to_what_came_from_outside(trace: Trace) -> None:
     text = cause_text(trace, ask(trace, "Main.Pump", 41))
     assert text.splitlines()[0] == "Main.Pump = TRUE since scan 8 (80ms), by pump.st:17 in Main:  Pump := Delay.Q;"
@@ -69,6 +72,7 @@ def test_what_is_long_ago_is_found() -> None:
     assert "FALSE since scan 150" in cause_text(trace, ask(trace, "Main.Pump", 399))
 
 
+@pytest.mark.slow
 def test_a_trace_that_begins_later_says_so() -> None:
     plc, file = Plc(image()), io.BytesIO()
     for _ in range(20):
@@ -81,6 +85,7 @@ def test_a_trace_that_begins_later_says_so() -> None:
     assert cause_text(trace, ask(trace, "Main.Pump", 24)) == "Main.Pump = TRUE since before scan 20, the first of the trace"
 
 
+@pytest.mark.slow
 def test_a_copy_of_a_large_array_is_a_write_of_its_elements() -> None:
     plc, file = Plc(image("PROGRAM Main VAR n : DINT; a, b : ARRAY[0..1999] OF DINT; END_VAR\n"
                           "n := n + 1;\nIF n = 3 THEN b[7] := n; END_IF\na := b;\nEND_PROGRAM")), io.BytesIO()  # fmt: skip
@@ -92,6 +97,7 @@ def test_a_copy_of_a_large_array_is_a_write_of_its_elements() -> None:
     assert lines == ["Main.a[7] = 3 since scan 2 (20ms), by pump.st:4 in Main", "Main.a[8] = 0 since power-on"]
 
 
+@pytest.mark.slow
 def test_a_unit_changes_words_in_the_refresh() -> None:
     plc, file = Plc(image()), io.BytesIO()
     plc.attach(Etn21(0, "192.168.250.21"), LoopNetwork())
@@ -105,6 +111,7 @@ def test_a_unit_changes_words_in_the_refresh() -> None:
     assert {name: change.phase for name, change in phases.items() if change} == {"CIO 1519.00": Phase.REFRESH}
 
 
+@pytest.mark.slow
 def test_a_bit_of_a_word_that_was_written_whole() -> None:
     made = image("PROGRAM Main VAR n : INT; w : WORD; END_VAR n := n + 1; %W5 := INT_TO_WORD(n); w := %W5; END_PROGRAM")
     plc, file = Plc(made), io.BytesIO()
@@ -142,6 +149,7 @@ def test_contacts_of_a_rung_are_what_its_coil_read() -> None:
     assert _causes(text, "Main.Lamp", "Main.Start") == [("T0001", "TRUE"), ("C0001", "FALSE")]
 
 
+@pytest.mark.slow
 def test_what_a_function_was_given_is_what_its_result_is_made_of() -> None:
     text = """FUNCTION Scaled : INT
         VAR_INPUT raw, low : INT; END_VAR
@@ -174,6 +182,7 @@ def test_rungs_whose_statements_begin_at_one_place_come_to_an_end() -> None:
             assert steps < 10
 
 
+@pytest.mark.slow
 def test_what_lies_behind_a_reference_is_explained_where_it_lies() -> None:
     plc = Plc(image("FUNCTION_BLOCK Adder VAR_IN_OUT total : INT; END_VAR\ntotal := total + 1;\nEND_FUNCTION_BLOCK\n"
                     "PROGRAM Main VAR a, b : INT; r, none : REF_TO INT; f : REFERENCE TO INT; add : Adder; END_VAR\n"
@@ -195,6 +204,7 @@ def test_what_lies_behind_a_reference_is_explained_where_it_lies() -> None:
     }
 
 
+@pytest.mark.slow
 def test_an_interlock_is_why_its_outputs_are_off() -> None:
     rungs = "LD Go\nANDNOT Stop\nIL\nLD P_On\nOUT Motor\nILC\nLD P_On\nOUT Lamp"
     variables = "VAR Go : BOOL := TRUE; Stop, Motor, Lamp : BOOL; n : INT; END_VAR"

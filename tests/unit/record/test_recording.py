@@ -63,6 +63,7 @@ def press(plc: Plc, scans: int) -> list[bytes]:
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_any_scan_is_found_again(image: Image, engine: str) -> None:
     plc = Plc(image, engine=engine)
@@ -166,6 +167,7 @@ def test_another_future_from_a_recorded_scan(image: Image) -> None:
     assert (twin.read("Main.Steps.Count"), plc.read("Main.Steps.Count")) == (0, 10)
 
 
+@pytest.mark.slow
 def test_observed_scans_are_those_of_an_observed_run(image: Image) -> None:
     plc, twin, seen, again = Plc(image), Plc(image), WatchedRun(), WatchedRun()
     kept = recorded(plc)
@@ -176,6 +178,7 @@ def test_observed_scans_are_those_of_an_observed_run(image: Image) -> None:
     assert again.rows == seen.rows[20:45]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
 def test_a_period_without_inputs_takes_no_room_and_stays_in_machine_code(image: Image) -> None:
     plc, calls = Plc(image, engine="native"), []
@@ -340,6 +343,7 @@ def test_a_change_of_a_unit_is_an_input() -> None:
     assert contents(kept.at(20)) == contents(plc)
 
 
+@pytest.mark.slow
 def test_of_units_that_cannot_go_on_from_a_state_the_refresh_is_recorded(image: Image) -> None:
     made = compile_text("""PROGRAM Main
         VAR n : UINT; Words AT %CIO1500 : ARRAY[0..7] OF WORD; Table AT %D20000 : WORD; END_VAR
@@ -395,6 +399,7 @@ def test_the_oldest_scans_give_way(image: Image, monkeypatch: pytest.MonkeyPatch
         one.at(0)
 
 
+@pytest.mark.slow
 def test_sizes_are_given_back(image: Image, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "AGAIN_NS", 300_000)
     plc, recording = Plc(image), Recording()

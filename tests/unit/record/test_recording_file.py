@@ -72,6 +72,7 @@ def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- what is read -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_pieces")
 def test_values_are_those_of_the_run() -> None:
     plc = Plc(image(TEXT))
@@ -100,6 +101,7 @@ def test_what_readers_are_told_beside_the_scans() -> None:
     assert source.sites == plc.image.sites or source.sites == list(plc.image.sites)
 
 
+@pytest.mark.slow
 def test_several_plcs_are_in_one_file() -> None:
     file = io.BytesIO()
     made = Recording(file=RecordingWriter(file))
@@ -229,12 +231,14 @@ def test_a_file_is_read_while_it_grows() -> None:
 # --- other versions ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_version_that_computes_the_same_shows_all() -> None:
     source = FileScans(opened(written(version="0.1"), version="9.9")["pump"])
     assert source.at(41).read("D200") == 7
     assert source.warning == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verify", [True, False])
 @pytest.mark.usefixtures("small_pieces")
 def test_a_version_that_computes_something_else_says_from_where_on(verify: bool) -> None:
@@ -372,6 +376,7 @@ def test_data_of_any_form_are_refused_in_words(seed: int) -> None:
     assert refused > 10
 
 
+@pytest.mark.slow
 def test_blocks_that_are_much_larger_when_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(container, "LARGEST_BYTES", 1 << 22)
     whole = written(COUNTER, 5, nothing)

@@ -47,6 +47,7 @@ from fbvm.watch.paths import UnknownPlace
 # --- values at the end of each scan -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_whole_memory_of_every_scan_comes_back() -> None:
     plc, states = Plc(image()), []
     plc.watchers.append(lambda plc: states.append(bytes(plc.memory.snapshot())[START:]))
@@ -58,6 +59,7 @@ def test_the_whole_memory_of_every_scan_comes_back() -> None:
         assert bytes(trace.at(scan).memory.u8[START:]) == states[scan]
 
 
+@pytest.mark.slow
 def test_values_are_read_by_name() -> None:
     trace = traced()
     assert trace.at(41).read("Main.Delay.ET") == 50_000_000
@@ -67,6 +69,7 @@ def test_values_are_read_by_name() -> None:
     assert trace.at(2).read("CIO 0.00") is False
 
 
+@pytest.mark.slow
 def test_a_scan_that_is_not_there() -> None:
     with pytest.raises(ValueError, match="scan 10 is not in the trace, which has scans 0 to 9"):
         traced(10).at(10)
@@ -83,6 +86,7 @@ def test_a_recording_begins_where_it_begins() -> None:
     assert trace.at(7).read("D5") == 77
 
 
+@pytest.mark.slow
 def test_time_travel_writes_over_what_was_undone() -> None:
     plc, file = Plc(image()), io.BytesIO()
     writer = TraceWriter(plc, file)
@@ -134,6 +138,7 @@ class Log:
         return (*above, frame.body, self.names.instance(frame.base), frame.site)
 
 
+@pytest.mark.slow
 def test_a_trace_tells_what_a_listener_was_told() -> None:
     plc = Plc(image())
     names = Names.of(plc.image, plc.memory.areas)
@@ -167,6 +172,7 @@ def test_each_depth_holds_its_events(depth: Depth, kinds: set[type]) -> None:
     assert found == kinds
 
 
+@pytest.mark.slow
 def test_the_scan_table_of_a_trace_is_that_of_the_plc() -> None:
     plc = Plc(image())
     names = Names.of(plc.image, plc.memory.areas)
@@ -194,6 +200,7 @@ def test_the_engine_is_given_back() -> None:
 # --- selection --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_of(("patterns", "found"), [
     (["Main.Delay.Q"], ["Main.Delay.Q"]),
     (["main.*.q"], ["Main.Delay.Q", "Main.Starts.Q"]),
@@ -233,6 +240,7 @@ def test_a_program_stands_for_its_located_variables() -> None:
 # --- charts and lines -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_chart_of_some_scans() -> None:
     assert draw(waveforms(traced(), ["Main.Start", "Main.Pump", "D200"], range(2, 12))) == """
         Main.Start  .#########
@@ -257,6 +265,7 @@ def test_lines_of_the_source_travel_along() -> None:
 # --- growing and damaged files ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_trace_is_read_while_it_grows() -> None:
     plc, file = Plc(image()), io.BytesIO()
     writer = TraceWriter(plc, file)
@@ -280,6 +289,7 @@ def test_a_trace_is_read_while_it_grows() -> None:
     assert trace.at(129).read("Main.Both[2].b") == 65.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [1, 10, 30])
 def test_a_block_that_is_cut_off_is_not_there(cut: int) -> None:
     data = record(Plc(image()), 150)
@@ -410,6 +420,7 @@ def structure(name: str, inner: Any) -> list[Any]:
     return [name, 8, 8, False, [["part", inner, 0, "VAR", None, 0]]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("types", "message"), [
     ([structure("A", ["struct", 0])], "A holds itself"),
     ([structure("A", ["struct", 1]), structure("B", ["array", [[0, 1]], ["struct", 0]])], "holds itself"),

@@ -64,6 +64,7 @@ def test_a_real_has_the_digits_that_it_needs() -> None:
     assert rows(made).splitlines()[1] == "0,0,0.3,0.30000000000000004"
 
 
+@pytest.mark.slow
 def test_what_goes_out_comes_in() -> None:
     text = rows(waveforms(traced(30), NAMES))
     back = as_trace(text)
@@ -206,6 +207,7 @@ class _Read:
         monkeypatch.setattr(trace, "moments", counted)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("write", [write_csv, write_vcd])
 def test_each_scan_is_written_when_it_has_been_read(
     write: Callable[[Samples, TextIO], None], monkeypatch: pytest.MonkeyPatch
@@ -228,6 +230,7 @@ def test_each_scan_is_written_when_it_has_been_read(
     assert found.getvalue() == whole.getvalue()
 
 
+@pytest.mark.slow
 def test_without_names_what_changes_is_written() -> None:
     trace = traced(30)
     assert [signal.label for signal in samples(trace).signals] == [track.signal.label for track in waveforms(trace).tracks]

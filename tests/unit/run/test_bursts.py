@@ -119,6 +119,7 @@ def polling(image: Image, clock: Clock) -> tuple[Plc, Answering]:
     return plc, network
 
 
+@pytest.mark.slow
 def test_a_burst_gives_what_single_scans_give(image: Image, clock: Clock) -> None:
     plc, network = polling(image, clock)
     assert run(plc, for_ns=20 * MS, pace="event") == "time"

@@ -345,6 +345,7 @@ def test_a_source_that_is_not_there_is_told_at_its_place(folder: Path) -> None:
     assert found[0].hint.startswith("there is ") and "counter.st" in found[0].hint
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("program", "unit", "said"), [
     ("PROGRAM Main VAR s : ETN_Modbus_Server; END_VAR s(); END_PROGRAM", "ETN21", "the library omron/etn_modbus"),
     ("PROGRAM Main VAR c : MTCP_ETN_Connect; END_VAR c(Connect := TRUE); END_PROGRAM", "ETN21", "the library omron/mtcp_etn"),

@@ -78,6 +78,7 @@ def line(where: str, when: str = "", hits: str = "", message: str = "") -> Break
     return Breakpoint("line", where, when, hits, message)
 
 
+@pytest.mark.slow
 def test_a_stop_at_full_speed_is_a_position_of_stepping() -> None:
     found = debugger()
     found.here.put([line("text.st:5", "Main.N = 300")])
@@ -131,6 +132,7 @@ def test_reverse_goes_to_the_last_change_and_then_to_the_beginning() -> None:
     assert done(found.reverse()) is None and found.session.here == Position(0, 0)
 
 
+@pytest.mark.slow
 def test_a_hit_count_belongs_to_the_past() -> None:
     found = debugger()
     found.here.put([line("text.st:5", hits="7")])
@@ -184,6 +186,7 @@ def test_an_act_in_the_past_forgets_what_was_done_inside_the_same_scan_of_anothe
         assert session.read("Main.R") == value
 
 
+@pytest.mark.slow
 def test_log_points_speak_once_a_scan_however_often_it_is_done_again() -> None:
     said: list[Said] = []
     found = debugger(said=said)
@@ -233,6 +236,7 @@ def test_a_scan_is_left_by_way_of_its_refresh_and_stops_on_the_way_count() -> No
     assert done(found.scan(10)) is None and where(found) == (12, 13)
 
 
+@pytest.mark.slow
 def test_two_plcs_have_one_time() -> None:
     found = debugger(names=("a", "b"))
     found.plcs["b"].put([line("text.st:16", "N = 40")])
@@ -256,6 +260,7 @@ def test_a_run_that_is_given_up_stands_between_two_scans() -> None:
     assert found.session.read("Main.N") == here.scan
 
 
+@pytest.mark.slow
 def test_a_change_in_the_past_is_met_again() -> None:
     found = debugger()
     done(found.scan(3))

@@ -46,12 +46,14 @@ def test_an_exception_reply_stops_the_run_forth_and_back() -> None:
     assert again and (again.position, again.reasons) == (reached.position, reached.reasons)
 
 
+@pytest.mark.slow
 def test_only_the_codes_that_are_wanted_stop_it() -> None:
     found = demo()
     found.checks = {"plc": BetweenScans({"modbus": frozenset((4,))})}
     assert done(found.resume(200)) is None and found.session.here.scan == 200
 
 
+@pytest.mark.slow
 def test_a_response_code_of_the_unit_stops_it() -> None:
     found = demo(has_peer=False)
     found.checks = {"plc": BetweenScans({"response": frozenset()})}

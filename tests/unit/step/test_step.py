@@ -76,6 +76,7 @@ def test_each_statement_is_a_stop() -> None:
     assert commands.session.here == Position(1, 0)
 
 
+@pytest.mark.slow
 def test_blocks_at_once_and_out_of_them() -> None:
     commands = made()
     said(commands, "next", "next")
@@ -199,6 +200,7 @@ def test_a_run_for_a_time_ends_at_a_breakpoint() -> None:
     assert (commands.session.here, line_of(commands)) == (Position(8, 2), 4)
 
 
+@pytest.mark.slow
 def test_a_condition_stops_run_where_it_becomes_true() -> None:
     """As `fbvm run --break-if` does."""
     commands = made()
@@ -226,6 +228,7 @@ def test_a_time_of_day_in_a_condition_is_no_line() -> None:
     assert commands.session.here == Position(1, 1)
 
 
+@pytest.mark.slow
 @each_of("text, names", [
     ("D200..D201", ["D200", "D201"]), ("CIO 0.00..CIO 0.02", ["CIO 0.00", "CIO 0.01", "CIO 0.02"]),
     ("CIO 0 .. CIO 1", ["CIO 0", "CIO 1"]), ("%W5 Main . N", ["W5", "Main.N"]), ("D 200, 0.01", ["D200", "CIO 0.01"]),
@@ -385,6 +388,7 @@ END_PROGRAM
 """
 
 
+@pytest.mark.slow
 def test_a_chart_is_gone_through_by_its_transitions_and_actions() -> None:
     commands = made(CHART)
     said(commands, "Main.go = TRUE", "scan")
@@ -505,6 +509,7 @@ def test_errors_raised_for_scripts_are_told_apart() -> None:
         said(made(), "expect Main.N = 1")
 
 
+@pytest.mark.slow
 def test_nobody_stands_in_what_no_statement_calls() -> None:
     """At the beginning of a scan with rungs the front end calls CX_Begin."""
     commands = made("PROGRAM Main\nLADDER\nLD 0.00\nTIM 1 #0002\nLD T0001\nOUT W0.00\nEND_LADDER\nEND_PROGRAM")
@@ -520,6 +525,7 @@ def test_nobody_stands_in_what_no_statement_calls() -> None:
     assert session.statement is None and session.here.scan == 0
 
 
+@pytest.mark.slow
 def test_breakpoints_at_changes_with_conditions_and_hit_counts() -> None:
     commands = made()
     assert said(commands, "break Main.N IF Main.N > 3", "break Twice HITS % 3") == (

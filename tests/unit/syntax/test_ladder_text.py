@@ -96,6 +96,7 @@ def text(drawing: str) -> list[str]:
     return dedent(drawing).strip("\n").rstrip().split("\n")
 
 
+@pytest.mark.slow
 @each_of("name", DRAWINGS)
 def test_drawing(name: str) -> None:
     rungs, drawing = DRAWINGS[name]
@@ -194,6 +195,7 @@ def test_power_behind_a_block_is_its_ENO() -> None:
     assert ladder_text(made.picture, annotations=Annotations(made.states))[2] == "┣━━┫ ┣━━━┥EN        ENO├──────( )──┤"
 
 
+@pytest.mark.slow
 def test_values_are_those_that_the_rung_read() -> None:
     """The second rung changes what the first one compared and gave to the block."""
     declared = "n : INT; d : WORD := 7; b : BOOL; t : CTU;"
@@ -237,6 +239,7 @@ def test_each_instance_has_its_own_power() -> None:
     assert power.executed[0].base != power.executed[1].base
 
 
+@pytest.mark.slow
 def test_a_picture_is_well_formed_and_shows_power() -> None:
     made = executed("LD= D0 #0\nOUT a", "")[0]
     root = ElementTree.fromstring(ladder_svg([ladder_surface(made.picture, 60, Annotations(made.states))]))

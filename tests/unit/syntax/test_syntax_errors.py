@@ -72,6 +72,7 @@ ONE_ERROR = [
 ]
 
 
+@pytest.mark.slow
 @each_of(("text", "message", "statements"), ONE_ERROR, ids=[e[0].replace("\n", " ") for e in ONE_ERROR])
 def test_one_mistake_gives_one_message_and_the_rest_is_read(text: str, message: str, statements: int) -> None:
     pou, diagnostics = body(text)

@@ -34,6 +34,7 @@ def test_a_missing_file_is_written_and_used(cache: Path, monkeypatch: pytest.Mon
     assert fresh("st") == first == tables("st")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [
     b"", b"{", b"[]", b"null", b'{"rules": 1}', b"\xff\xfe", b"[" * 100_000], ids=range(7))
 @pytest.mark.parametrize("whole", [True, False])
@@ -50,6 +51,7 @@ def test_a_damaged_file_is_replaced(cache: Path, content: bytes, whole: bool) ->
     assert file.read_bytes() == good
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [
     lambda t: t["actions"][0].update(NAME=99_999), lambda t: t.pop("rules"), lambda t: t["rules"][0].pop()],
     ids=["state", "rules", "rule"])

@@ -29,10 +29,10 @@ from fbvm.testing.course.lessons import (
     lessons,
     program_mistakes,
     questions,
-    run_pytest,
 )
 from fbvm.testing.course.predictions import KEPT, first_wrong, keep_first_wrong
 from fbvm.testing.lesson import predicted
+from fbvm.testing.pytest_process import run_pytest
 
 HOUSE = Path(__file__).resolve().parents[3]
 LINES, COLUMNS = 25, 79

@@ -21,6 +21,7 @@ END_FUNCTION_BLOCK
 """
 
 
+@pytest.mark.slow
 def test_a_block_is_proved_for_all_inputs(fb: Any) -> None:
     verdict = proved(fb("Gate", text=GATE), never="Up AND Down")
     assert (verdict.word, verdict.how) == ("proved", "by induction over 2 scans")
@@ -38,6 +39,7 @@ def test_an_assumption_is_kept_by_all_runs(fb: Any) -> None:
     assert proved(gate, never="Down", assume="NOT Close").notes == ("assumed: NOT Close",)
 
 
+@pytest.mark.slow
 def test_a_proof_is_kept_until_the_program_changes(fb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[object] = []
     prove = stored.prove

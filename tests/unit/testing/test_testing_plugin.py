@@ -545,6 +545,7 @@ def test_warnings_can_fail_a_test(slack: pytest.Pytester) -> None:
     run(slack).assert_outcomes(passed=2)
 
 
+@pytest.mark.slow
 def test_what_is_no_code_of_a_warning_is_wrong_usage(slack: pytest.Pytester) -> None:
     result = run(slack, "--fbvm-no-warn=S0201")
     assert result.ret == pytest.ExitCode.USAGE_ERROR

@@ -320,6 +320,7 @@ def test_only_blocks_have_python_in_their_place() -> None:
 # --- subjects ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_without_a_name_the_only_pou_is_meant(tmp_path: Path) -> None:
     file = tmp_path / "pump.st"
     file.write_text(PUMP, encoding="utf-8")
@@ -434,6 +435,7 @@ END_PROGRAM
 """
 
 
+@pytest.mark.slow
 def test_what_a_unit_changed_is_told_apart_from_what_the_test_wrote() -> None:
     caller = rig("Main", CALLER, etn21="192.168.250.21")
     caller.network.place(Peer("192.168.250.1", 502), ModbusPeer())

@@ -51,6 +51,7 @@ class Watched:
         self.settle()
 
 
+@pytest.mark.slow
 @each_of("seed", SEEDS)
 def test_real_open_ends_with_its_words_out_of_step_assumed(seed: int) -> None:
     watched = Watched(seed)
@@ -62,6 +63,7 @@ def test_real_open_ends_with_its_words_out_of_step_assumed(seed: int) -> None:
     assert -1 <= changed["open"] - changed["switch"] <= 3
 
 
+@pytest.mark.slow
 def test_real_words_are_apart_in_every_way_assumed() -> None:
     skews = set()
     for seed in SEEDS:
@@ -71,6 +73,7 @@ def test_real_words_are_apart_in_every_way_assumed() -> None:
     assert skews == {-1, 0, 1, 2, 3}
 
 
+@pytest.mark.slow
 def test_real_services_take_3_to_7_refreshes_and_5_to_21_ms_assumed() -> None:
     refreshes = set()
     for seed in SEEDS:
@@ -89,6 +92,7 @@ def test_real_services_take_3_to_7_refreshes_and_5_to_21_ms_assumed() -> None:
     assert 5_000_000 <= short.rig.now_ns <= 22_000_000
 
 
+@pytest.mark.slow
 @each_of("seed", SEEDS)
 def test_a_real_service_takes_as_long_whether_the_network_answers_in_the_first_refresh_or_in_the_fifth_assumed(seed: int) -> None:
     ends = []
@@ -105,6 +109,7 @@ def test_a_real_service_takes_as_long_whether_the_network_answers_in_the_first_r
     assert ends[0] == ends[1]
 
 
+@pytest.mark.slow
 @each_of("seed", SEEDS)
 def test_real_words_agree_in_the_end(seed: int) -> None:
     watched = Watched(seed)
@@ -124,6 +129,7 @@ def test_real_words_agree_in_the_end(seed: int) -> None:
     assert (rig.status(), rig.state(), rig.waiting(), rig.code()) == (0, 0xA, 0, "0000")
 
 
+@pytest.mark.slow
 def test_real_punishes_a_send_that_does_not_wait_for_bit_15_assumed() -> None:
     codes = set()
     for seed in SEEDS:
@@ -143,6 +149,7 @@ def test_real_punishes_a_send_that_does_not_wait_for_bit_15_assumed() -> None:
     assert codes == {"0000", "2210"}
 
 
+@pytest.mark.slow
 @each_of("seed", SEEDS)
 def test_real_results_of_an_interrupted_service_are_a_cycle_apart_assumed(seed: int) -> None:
     watched = Watched(seed)

@@ -110,6 +110,7 @@ def test_omron_fins_writes_two_words(rig: FinsRig) -> None:
     assert rig.plc.read("D100..D101") == [0x1234, 0x5678]
 
 
+@pytest.mark.slow
 def test_omron_fins_sets_and_reads_the_clock(rig: FinsRig) -> None:
     assert rig.ask(f"{OMRON_FINS} 07 02 26 11 22 13 44 04 00") == f"{OMRON_ANSWER} 07 02 00 00"
     assert rig.ask(f"{OMRON_FINS} 07 01") == f"{OMRON_ANSWER} 07 01 00 00 26 11 22 13 44 04 00"

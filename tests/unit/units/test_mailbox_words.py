@@ -108,6 +108,7 @@ def test_the_head_of_a_new_vendor() -> None:
     assert memory.words("NEWC")[:3].tolist() == [1, 3, 0]
 
 
+@pytest.mark.slow
 def test_a_library_that_brings_another_mailbox() -> None:
     own = mailbox("MBP_MSTR", "NOC", "MSTR_Lines")
     assert own.lines.count == 32 and Noc.table.area == "NOC"

@@ -19,6 +19,7 @@ BYTE = st.integers(0, 255)
 ADDRESSES = st.builds(Address, BYTE, BYTE, BYTE)
 
 
+@pytest.mark.slow
 @given(ADDRESSES, ADDRESSES, BYTE, st.sampled_from([0x80, 0x81]), st.integers(0, 0xFFFF), st.binary(max_size=50))
 def test_a_command_comes_back(to: Address, by: Address, service: int, icf: int, code: int, parameters: bytes) -> None:
     command = Command(Header(to, by, service, icf), code, parameters)
@@ -29,6 +30,7 @@ def test_a_command_comes_back(to: Address, by: Address, service: int, icf: int, 
     assert answer.header.is_response and not answer.header.wants_response
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=60))
 def test_any_bytes_are_a_frame_or_damaged_and_can_be_described(data: bytes) -> None:
     frame = parse_frame(data)
@@ -36,6 +38,7 @@ def test_any_bytes_are_a_frame_or_damaged_and_can_be_described(data: bytes) -> N
     assert described(frame)
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=200), st.integers(1, 20))
 def test_any_stream_is_cut_alike_wherever_tcp_cuts_it(data: bytes, size: int) -> None:
     stream = Message(Kind.FRAME, data).to_bytes() + data

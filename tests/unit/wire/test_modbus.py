@@ -174,6 +174,7 @@ def test_any_cut_gives_the_same_frames(adus: list[Adu], data: st.DataObject) -> 
     assert splitter.pending == b""
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=600))
 def test_garbage_raises_nothing(garbage: bytes) -> None:
     splitter, whole = Splitter(), Splitter()
@@ -262,6 +263,7 @@ def test_an_identity_that_begins_nowhere_begins_with_its_first_object() -> None:
     assert whole is not None and whole[7:] == bytes.fromhex("2B 0E 01 81 00 00 03 00 01 61 01 01 62 02 01 63")
 
 
+@pytest.mark.slow
 def test_the_values_of_the_peer_show_their_addresses() -> None:
     server = registers.server()
     assert list(server.coils[:7]) == [1, 0, 1, 0, 1, 0, 1]
