@@ -91,6 +91,9 @@ def test_what_a_project_says(fbvm: Fbvm, name: str) -> None:
         fbvm(verb, str(folder), *(("--scans", "2") if verb == "run" else ()))
     (folder / "fbvm.toml").unlink()
     fbvm("run", str(folder))
+    text = f"[campaign]\n{json.dumps(EVIL)} = 1\n[[vary]]\nname = {json.dumps(EVIL)}\n"
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    fbvm("campaign", str(folder))
 
 
 @pytest.mark.slow
@@ -108,6 +111,11 @@ def test_options_and_arguments(fbvm: Fbvm) -> None:
         ("run", "trapped.st", "--scans", "1", "--show", "Main.s"), ("learn", EVIL), ("test", EVIL),
         ("prove", "counter.st", "--never", EVIL), ("prove", "counter.st", "--always", f"Main.{EVIL} = 1"),
         ("prove", f"no{EVIL}.st"), ("mutate", f"no{EVIL}.st"), ("mutate", "--tests", EVIL, "counter.st"),
+        ("campaign", f"no{EVIL}.st"), ("campaign", "counter.st", "--for", "20ms", "--vary", f"Main.{EVIL}=1"),
+        ("campaign", "counter.st", "--for", "20ms", "--never", EVIL),
+        ("campaign", "trapped.st", "--for", "20ms", "--out", f"o{EVIL}"),
+        ("sweep", "counter.st", "--for", "20ms", "--vary", f"Main.n={EVIL}"),
+        ("sweep", "trapped.st", "--for", "20ms", "--show", EVIL),
     ):  # fmt: skip
         fbvm(*arguments)
 
