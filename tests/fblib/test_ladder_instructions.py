@@ -38,6 +38,18 @@ def execute(instruction: str, before: dict[int, int], carry: bool = False) -> tu
     return {n: words[n] for n in range(20) if words[n]}, {name for name, at in FLAGS.items() if plc.read(at)}
 
 
+@pytest.mark.parametrize(("name", "operands", "holds", "order"), [
+    ("=", "D0 D3", False, "GT"), ("=S", "D0 D3", False, "LT"), ("<>", "D0 D3", True, "GT"), ("<>S", "D0 D3", True, "LT"),
+    ("=L", "D0 D3", False, "GT"), ("=SL", "D0 D3", False, "LT"), ("<>L", "D0 D3", True, "GT"), ("<>SL", "D0 D3", True, "LT"),
+    ("=S", "D0 D0", True, "EQ"), ("<>SL", "D0 D0", False, "EQ")])  # fmt: skip
+def test_equality_sets_the_flags_of_the_order_with_or_without_a_sign(name: str, operands: str, holds: bool, order: str) -> None:
+    """FFFF is more than 1 without a sign, and less with one."""
+    before = {0: 0xFFFF, 1: 0xFFFF, 3: 1}
+    after, flags = execute(f"AND{name} {operands}\nOUT D9.00", before)
+    assert after == before | ({9: 1} if holds else {})
+    assert flags == {order}
+
+
 CARRY = "\nSTC"
 """In front of an instruction whose row has CY before it."""
 TABLES = sorted((Path(__file__).parent / "ladder").glob("*.txt"))

@@ -321,7 +321,10 @@ class Etn21:
         """The requests that the unit's program has left for the network since the last call, in order."""
         if self._processor is None or self._words is None:
             return []
-        return self._processor.mail.collect(self._words.memory)
+        requests = self._processor.mail.collect(self._words.memory)
+        if self._fins:
+            self._fins.count(requests)
+        return requests
 
     # --- FINS ---------------------------------------------------------------------------------------------------------
 
@@ -345,6 +348,7 @@ class Etn21:
         fins = self._fins
         if fins is None:
             return []
+        fins.error_status = self._error_status
         if cpu.memory.words("A")[at.INITIALIZING] & self._mask:
             requests = fins.reset()
         else:
@@ -366,7 +370,10 @@ class Etn21:
 
     def execute(self, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
         """Executes a command of the PLC's own program for this unit; end code and data."""
-        return self._fins.execute(command, cpu) if self._fins else (EndCode.NO_UNIT, b"")
+        if self._fins is None:
+            return EndCode.NO_UNIT, b""
+        self._fins.error_status = self._error_status
+        return self._fins.execute(command, cpu)
 
     def send(self, command: Command) -> int:
         """Takes a command of a network instruction; an end code, 0000 if the next servicing sends it."""

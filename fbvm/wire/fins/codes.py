@@ -59,6 +59,7 @@ class EndCode(IntEnum):
     CANNOT_CHANGE = 0x2108
     IN_PROGRAM = 0x2203
     IN_RUN = 0x2206
+    NOT_A_CLIENT = 0x2231
     ACCESS_RIGHT = 0x3001
 
 

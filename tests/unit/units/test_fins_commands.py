@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import pytest
 from fins_rig import FinsRig, TcpClient, compiled
 from rows import each_of
@@ -39,8 +41,15 @@ REFUSED = [
     (0x2301, "0001 0001 B0 0064 00", {}, "1101"),
     (0x0101, "82 0000 00 0001", {"node": 2}, "1005"), (0x0101, "82 0000 00 0001", {"node": 0}, "0000"),
     (0x0101, "82 0000 00 0001", {"network": 3}, "0502"), (0x0101, "82 0000 00 0001", {"unit": 0x11}, "0202"),
-    (0x0801, "", {"unit": 0x10}, "1002"), (0x0801, "01", {"unit": 0xFE}, "0000"), (0x2730, "", {"unit": 0x10}, "0402"),
+    (0x0801, "", {"unit": 0x10}, "1002"), (0x0801, "01", {"unit": 0xFE}, "0000"), (0x2760, "", {"unit": 0x10}, "0402"),
     (0x0101, "", {"unit": 0x10}, "0401"),
+    (0x0501, "00", {"unit": 0x10}, "1001"), (0x0601, "00", {"unit": 0xFE}, "1001"), (0x2102, "0000", {"unit": 0x10}, "1002"),
+    (0x2102, "0040 0001", {"unit": 0x10}, "1103"), (0x2102, "0000 0000", {"unit": 0x10}, "110C"),
+    (0x2103, "", {"unit": 0x10}, "0000"),
+    (0x2730, "0001 C0A8FA02", {"unit": 0x10}, "1002"), (0x2730, "0000 C0A8FA02 2580", {"unit": 0x10}, "1100"),
+    (0x2730, "0001 00000000 2580", {"unit": 0x10}, "1100"), (0x2730, "0001 C0A8FA02 0000", {"unit": 0x10}, "1100"),
+    (0x2730, "0001 C0A8FA02 2580", {"unit": 0x10}, "2231"), (0x2731, "0000", {"unit": 0x10}, "1100"),
+    (0x2731, "0011", {"unit": 0x10}, "1100"), (0x2765, "00", {"unit": 0x10}, "1001"),
 ]  # fmt: skip
 
 
@@ -185,6 +194,33 @@ def test_the_error_log_is_empty(rig: FinsRig) -> None:
     assert rig.command(0x2103) == ("0000", "")
 
 
+def test_the_unit_says_what_it_is(rig: FinsRig) -> None:
+    """The node's two bytes, and the mode setting, are assumed."""
+    end_code, data = rig.command(0x0501, unit=0x10)
+    assert (end_code, bytes.fromhex(data)[:40]) == ("0000", b"CJ1W-ETN21".ljust(20) + b"fbvm".ljust(20))
+    assert data[120:] == "C0 A8 FA 01 FF FF FF 00 25 80 00 00 02 00 C0 A8 FA 01"
+    assert rig.command(0x2765, unit=0xFE) == ("0000", "00 01 00 01 C0 A8 FA 01")
+    assert rig.command(0x2102, "0000 0001", unit=0xFE) == ("0000", "00 40 00 00 00 00")
+
+
+def test_the_unit_counts_packets_and_shows_the_flags_of_n_18() -> None:
+    rig = FinsRig(fins_node=7)
+    rig.command(0x0101, "82 0000 00 0001", node=7)
+    received, sent = "00 00 00 02", "00 00 00 01"
+    nothing = "00 00 00 00"
+    assert rig.command(0x0601, unit=0x10, node=7) == ("0000", f"40 00 {received} {nothing} {sent} {nothing} {nothing}")
+    copy = deepcopy(rig.unit)
+    assert copy.state.other == rig.unit.state.other
+
+
+def test_the_unit_says_who_is_connected(rig: FinsRig) -> None:
+    assert rig.command(0x2731, "0001", unit=0x10)[1] == "00 01 00 03 C0 A8 FA 01 25 80 00 00 00 00 00 00 00 00 00 01"
+    TcpClient(rig).connect()
+    status = rig.command(0x2731, "0001", unit=0x10)[1]
+    assert status.startswith("00 01 00 03 C0 A8 FA 01 25 80 C0 A8 FA ")
+    assert status.endswith(" 00 00 00 04")
+
+
 def test_the_unit_echoes(rig: FinsRig) -> None:
     assert rig.command(0x0801, "01 02 03", unit=0xFE) == ("0000", "01 02 03")
 
@@ -216,6 +252,7 @@ def test_what_a_protected_unit_refuses(access: str, refused: list[str], taken: l
         for text in commands:
             assert rig.command(int(text[:4], 16), text[4:])[0] == end_code, text
     assert rig.command(0x0403, unit=0x10)[0] == "2102"
+    assert rig.command(0x2103, unit=0x10)[0] == ("2102" if access == "read-only" else "0000")
 
 
 def test_a_broadcast_is_executed_and_never_answered(rig: FinsRig) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fbvm.units.contract import CpuUnit
+from fbvm.units.etn21.fins import unit_commands
 from fbvm.units.etn21.fins.state import FinsSettings, FinsState
 from fbvm.wire.fins.codes import COMMANDS, EndCode
 from fbvm.wire.fins.frames import (
@@ -37,8 +38,8 @@ def refusal(settings: FinsSettings, command: Command, size_bytes: int) -> int:
     return EndCode.NORMAL
 
 
-def execute(settings: FinsSettings, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
-    """Lets the CPU unit, or this unit, execute a command that is for it; end code and data."""
+def execute(settings: FinsSettings, state: FinsState, error_status: int, command: Command, cpu: CpuUnit) -> tuple[int, bytes]:
+    """Lets the CPU unit, or this unit, whose n+18 is `error_status`, execute a command that is for it; end code and data."""
     if command.header.destination.unit == CPU_UNIT:
         return cpu.execute(command, settings.access)
     if command.code == ECHO:
@@ -48,6 +49,8 @@ def execute(settings: FinsSettings, command: Command, cpu: CpuUnit) -> tuple[int
         return (EndCode.TOO_LONG, b"") if len(data) > MAX_DATA_BYTES else (EndCode.NORMAL, data)
     if command.code == RESET:
         return EndCode.NORMAL if settings.access.may_control else EndCode.PROTECTED, b""
+    if command.code in unit_commands.ROWS:
+        return unit_commands.execute(command.code, unit_commands.Asked(settings, state, error_status, command.parameters))
     known = command.code in OF_THE_UNIT and command.code in COMMANDS
     return EndCode.NOT_SUPPORTED if known else EndCode.UNDEFINED, b""
 

@@ -57,6 +57,8 @@ class FinsService:
         """Commands of this servicing."""
         self.asks_restart = False
         """True if a command restarts the unit; who does so resets it."""
+        self.error_status = 0
+        """What n+18 shows; the unit says so before each servicing."""
         self._cpu: CpuUnit
         self._now_ns = 0
 
@@ -66,11 +68,16 @@ class FinsService:
         """Keeps the events that are for this service until they are served; returns the others."""
         others = []
         for event in events:
+            self.state.received += isinstance(event, Received)
             if event.channel in CHANNELS:
                 self.state.events.append(event)
             else:
                 others.append(event)
         return others
+
+    def count(self, requests: Iterable[Request]) -> None:
+        """Counts what the unit sends."""
+        self.state.sent += sum(isinstance(request, Send | SendTo) for request in requests)
 
     @property
     def wake_ns(self) -> int:
@@ -94,7 +101,7 @@ class FinsService:
         """Executes a command of the PLC's own program; end code and data."""
         if refused := routing.refusal(self.settings, command, len(command.to_bytes())):
             return refused, b""
-        end_code, data = routing.execute(self.settings, command, cpu)
+        end_code, data = routing.execute(self.settings, self.state, self.error_status, command, cpu)
         self.asks_restart = self.asks_restart or routing.restarts(command, end_code)
         return end_code, data
 
@@ -134,6 +141,7 @@ class FinsService:
         if state.outgoing and state.udp_open:
             self._requests += state.outgoing
             state.outgoing = []
+        self.count(self._requests)
         return self._requests
 
     def _open(self) -> None:
@@ -277,7 +285,7 @@ class FinsService:
         if not end_code and self._frames > MOST_FRAMES:
             end_code = EndCode.BUSY
         if not end_code:
-            end_code, found = routing.execute(self.settings, frame, self._cpu)
+            end_code, found = routing.execute(self.settings, self.state, self.error_status, frame, self._cpu)
             self.asks_restart = self.asks_restart or routing.restarts(frame, end_code)
         if not header.wants_response or header.destination.node == EVERY_NODE:
             return b""

@@ -108,6 +108,10 @@ class FinsState:
     """What the network told and has not been served yet."""
     outgoing: list[Send | SendTo] = field(default_factory=list)
     """What network instructions send in the next servicing."""
+    received: int = 0
+    """Datagrams, and blocks of connections, that have come for the unit since it started; its sockets count, too."""
+    sent: int = 0
+    """Those that it has sent."""
 
     @property
     def plain(self) -> tuple[Any, ...]:
@@ -119,16 +123,17 @@ class FinsState:
                          if isinstance(request, SendTo) else (request.channel, "", 0, request.data)
                          for request in self.outgoing)  # fmt: skip
         return (tuple(sorted(self.busy)), tuple(sorted(self.closing)), tuple(sorted(self.failed)), self.udp_open, connections,
-                learned, tuple(self.events), outgoing)  # fmt: skip
+                learned, tuple(self.events), outgoing, self.received, self.sent)  # fmt: skip
 
     @classmethod
     def of(cls, plain: tuple[Any, ...]) -> FinsState:
         """The state of which these are the `plain` values."""
-        busy, closing, failed, udp_open, connections, learned, events, outgoing = plain
+        busy, closing, failed, udp_open, connections, learned, events, outgoing, received, sent = plain
         return cls(
             set(busy), set(closing), set(failed), udp_open,
             {channel: Connection(number, Peer(host, port), since_ns, node, held)
              for channel, number, host, port, since_ns, node, held in connections},
             {node: Peer(host, port) for node, host, port in learned}, list(events),
             [SendTo(channel, Peer(host, port), data) if host else Send(channel, data) for channel, host, port, data in outgoing],
+            received, sent,
         )  # fmt: skip
