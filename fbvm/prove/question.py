@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fbvm.base.types import RefType, StringType
+from fbvm.base.types import AnyType, ArrayType, OpenArrayType, RefType, StringType, StructType, Type
 from fbvm.code.image import Image
 from fbvm.engine.trap import Trap
 from fbvm.watch.conditions import Condition, parse_condition
@@ -78,9 +78,22 @@ class Names:
         if any(place.hops for place in places):
             raise UnknownPlace(f"{text} lies behind a reference: name the variable itself")
         for place in places:
-            if isinstance(place.type, StringType | RefType):
-                raise UnknownPlace(f"{text} is of {place.type}: bits, numbers and times can be free, texts and references cannot")
+            if part := _unfree(place.type, text):
+                raise UnknownPlace(f"{part}: bits, numbers and times can be free, texts, references and instances cannot")
         return [(place.offset, place.type.size, place.bit) for place in places]
+
+
+def _unfree(type: Type, path: str) -> str:
+    """The first part of a variable that cannot be free, with its type; empty if there is none."""
+    if isinstance(type, StringType | RefType | AnyType | OpenArrayType):
+        return f"{path} is of {type}"
+    if isinstance(type, ArrayType):
+        return _unfree(type.element, f"an element of {path}")
+    if isinstance(type, StructType):
+        if type.block:  # it begins with the number of its type, by which calls find their body
+            return f"{path} is an instance of {type}"
+        return next(filter(None, (_unfree(member.type, f"{path}.{member.name}") for member in type.fields.values())), "")
+    return ""
 
 
 @dataclass(frozen=True)

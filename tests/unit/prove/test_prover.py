@@ -10,7 +10,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, prove
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
 from fbvm.prove.runs import repeated
 from fbvm.watch.paths import UnknownPlace
 
@@ -141,8 +141,22 @@ def test_inputs_that_only_the_property_reads_are_free() -> None:
 def test_a_text_or_a_reference_cannot_be_free() -> None:
     image = program("n := LEN(s);", "n : INT; s : STRING; r : REF_TO INT;")
     for name in ("Main.s", "Main.r"):
-        with pytest.raises(UnknownPlace, match="texts and references cannot"):
+        with pytest.raises(UnknownPlace, match="texts, references and instances cannot"):
             prove(image, Question(ALWAYS, "Main.n = 0", free=(name,)), FEW)
+
+
+def test_what_holds_a_text_a_reference_or_an_instance_cannot_be_free() -> None:
+    image = image_of("TYPE Tag : STRUCT n : INT; s : STRING[8]; END_STRUCT END_TYPE\n"
+                     "TYPE Line : STRUCT n : INT; t : ARRAY[1..2] OF Tag; END_STRUCT END_TYPE\n"
+                     "TYPE Plain : STRUCT n : INT; b : ARRAY[1..2] OF BOOL; END_STRUCT END_TYPE\n"
+                     "PROGRAM Main VAR t : Tag; l : Line; p : ARRAY[0..1] OF REF_TO INT; e : R_TRIG; f : Plain; END_VAR\n"
+                     "END_PROGRAM\n")
+    names = Names(image)
+    for name, part in (("Main.t", "Main.t.s is of STRING"), ("Main.l", "an element of Main.l.t.s is of STRING"),
+                       ("Main.p", "an element of Main.p is of REF_TO INT"), ("Main.e", "Main.e is an instance of R_TRIG")):
+        with pytest.raises(UnknownPlace, match=part):
+            names.extents(name)
+    assert [(size, bit) for _, size, bit in names.extents("Main.f")] == [(4, None)]
 
 
 def test_a_variable_that_nothing_changes_is_told() -> None:
