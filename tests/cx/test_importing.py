@@ -14,6 +14,7 @@ from fbvm.code.compiler import compile_sources
 from fbvm.interchange.cx.compression import compress
 from fbvm.interchange.cx.markup import CxText, read_markup
 from fbvm.interchange.cx.read.importing import import_project
+from fbvm.interchange.cx.write.exporting import export_into
 from fbvm.interchange.imported import Imported
 
 
@@ -328,6 +329,16 @@ def test_what_is_no_ladder_protected_or_in_no_task_is_told() -> None:
             (text.replace("1,X,1,", "3,X,1,"), "X0203", "usage 3")):  # fmt: skip
         made = import_project(changed.encode(), "line.cxt")
         assert any(d.code == code and words in d.message for d in made.diagnostics), words
+
+
+def test_a_plc_setup_is_named_as_not_read_and_stays_in_the_file() -> None:
+    setup = "  Settings:=\n  BEGIN\n   Data:=\n$?St$Bk?_#[900]\n5A 5A\n$?St$Bk?_#[900]\n  END;"
+    data = replace(SAMPLE, plc_keys=setup).bytes()
+    made = import_project(data, "line.cxt")
+    assert [d.severity for d in made.diagnostics] == ["warning"]
+    assert "PLC Setup (cycle time, startup mode) is not read" in made.diagnostics[0].message
+    sources = [Source(name, text) for name, text in made.files.items()]
+    assert export_into(data, "line.cxt", sources, compressed=False).data == data
 
 
 def test_one_of_several_plcs_is_chosen_by_name() -> None:

@@ -127,6 +127,9 @@ class _Sources:
 
     def _configuration(self) -> None:
         """Which programs run: cyclic tasks in the order of their numbers."""
+        if setup := self.plc.value.get("PLC", "Settings", "Data"):
+            self.reading.report("X0190", setup, "the PLC Setup (cycle time, startup mode) is not read: how it is stored is "
+                                "not known", "say the cycle time with --cycle")
         programs = [program for program in self.plc.programs if not program.protected]
         any_starts = any(program.starts for program in programs)
         run = []
