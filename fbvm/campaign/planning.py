@@ -9,6 +9,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.campaign.execution import Wrong
+from fbvm.campaign.judge import Judge
 from fbvm.campaign.plan import VALUE, Axis, Plan
 from fbvm.campaign.plan_file import Written
 from fbvm.code.image import Image
@@ -18,6 +19,7 @@ from fbvm.machine.scan.watch_cycle import USUAL_NS
 from fbvm.run.plant import Plant, value_for
 from fbvm.run.project import FILE, PlcRow, Project, UnitRow
 from fbvm.run.running import CYCLIC
+from fbvm.watch.conditions import ConditionError
 from fbvm.watch.paths import UnknownPlace
 
 PLC = "plc"
@@ -31,8 +33,10 @@ class Unfit(ValueError):
 
 
 def program_project(sources: Sequence[Path], about: Mapping[str, Any], folder: Path) -> Project:
-    """The project of one PLC with an ETN21 and the units of the mailboxes that its program uses.  Raises Wrong."""
+    """The project of one PLC with an ETN21 and the units of the mailboxes that its program uses.  Raises Wrong, Unfit."""
     libraries = tuple(folder / library for library in about["libraries"])
+    if missing := [source for source in sources if not source.is_file()]:
+        raise Unfit(f"there is no file {missing[0]}")
     row = PlcRow(PLC, tuple(sources), about["program"], None, about["dialect"] or usual_dialect(sources), libraries,
                  about["cycle"], USUAL_NS, CYCLIC, "auto", None, None, (), (), ())  # fmt: skip
     servers = tuple((endpoint, None) for endpoint in about["servers"])
@@ -74,6 +78,10 @@ def plan_of(written: Written, project: Project, images: Mapping[str, Image]) -> 
     for axis in plan.axes:
         for value in axis.values if axis.what == VALUE else ():
             _check(axis, value, plcs[axis.plc].runs[0].plc)
+    try:
+        Judge(plan.judging, plant.named_runs, plan.alone)
+    except (ConditionError, UnknownPlace, TypeError) as error:
+        raise Unfit(str(error)) from None
     return plan
 
 
@@ -103,7 +111,7 @@ def _check(axis: Axis, value: Any, plc: Any) -> None:
     except UnknownPlace as error:
         raise Unfit(str(error)) from None
     except (TypeError, ValueError) as error:
-        raise Unfit(f"{axis.name}: {error}") from None
+        raise Unfit(str(error)) from None
 
 
 def unfit_conditions(plan: Plan) -> Iterator[str]:

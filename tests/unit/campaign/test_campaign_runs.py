@@ -223,3 +223,21 @@ def test_the_row_of_three_plcs_is_good_and_a_fault_planted_in_a_copy_is_found(fo
     [group] = found
     assert (group["text"], len(group["faults"])) == ("panel.Main.Done AND tank.Main.Level < 700.0", 1)
     assert Path(group["file"]).read_text().splitlines()[group["line"] - 1].strip() == "Done := Level >= Wanted;"
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (("mix.st",), "say how long a run takes at most"),
+    (("mix.st", "--for", "1s", "--never", "Main.Foo"), "Foo"),
+    (("mix.st", "--for", "1s", "--always", "Main.Count"), "Main.Count"),
+    (("mix.st", "--for", "1s", "--vary", "Main.Limit=1,abc"), "Main.Limit: 'abc' is no literal"),
+    (("mix.st", "--for", "1s", "--vary", "Main.Limit=1,70000"), "Main.Limit"),
+    (("mix.st", "--for", "1s", "--runs", "3", "--only", "3"), "there are runs 0 to 2"),
+    (("mix.st", "--for", "1s", "--map", "10.0.0.1:502=host:1"), "runs are in memory"),
+    (("mix.st", "--faults", "1"), "say how long a run takes at most"),
+    (("mix.st", "--for", "1s", "--write-golden"), "no [[golden]] to write"),
+    (("none.toml",), "none.toml"),
+])  # fmt: skip
+def test_what_does_not_fit_is_said_before_anything_is_written(folder: Path, arguments: tuple[str, ...], said: str) -> None:
+    status, text = fbvm(*arguments)
+    assert (status, said in text) == (2, True), text
+    assert not (folder / "campaign-results").exists()
