@@ -14,7 +14,7 @@ from fbvm.base.files import write_file
 from fbvm.base.version import VERSION
 from fbvm.campaign.execution import Result
 from fbvm.campaign.judge import Failure
-from fbvm.campaign.plan import Plan
+from fbvm.campaign.plan import VALUE, Axis, Plan
 from fbvm.campaign.runs import Outcome
 from fbvm.campaign.variants import draw
 
@@ -103,7 +103,7 @@ def rows(outcome: Outcome) -> Iterator[list[Any]]:
         said = [failure.kind, failure.text, failure.plc, failure.scan, _ms(failure.now_ns), failure.code, failure.file,
                 failure.line or ""] if failure else ["good", "", "", "", _ms(result.time_ns), "", "", ""]  # fmt: skip
         yield [result.number, variant.seed, *values, "; ".join(map(str, variant.faults)), "; ".join(map(str, variant.cuts)),
-               *said, result.scans, *result.shown]  # fmt: skip
+               *said, result.scans, *(result.shown or [""] * len(plan.shown))]  # fmt: skip
 
 
 def _ms(time_ns: int) -> int | float:
@@ -120,10 +120,27 @@ def write_table(path: Path, outcome: Outcome) -> None:
 
 
 def write_parquet(path: Path, outcome: Outcome) -> None:
-    """Writes the table as Parquet.  Raises ImportError without pyarrow, OSError."""
+    """Writes the table as Parquet: numbers where a column has no other values, and always the same types for the same campaign.
+    Raises ImportError without pyarrow, OSError."""
     import pyarrow  # type: ignore[import-not-found, unused-ignore]
     from pyarrow import parquet  # type: ignore[import-not-found, unused-ignore]
 
-    names, lines = columns(outcome.plan), list(rows(outcome))
-    table = {name: [line[at] if line[at] != "" else None for line in lines] for at, name in enumerate(names)}
-    parquet.write_table(pyarrow.table(table), path)
+    plan, lines = outcome.plan, list(rows(outcome))
+    kinds = {name: (_NUMBERS.get(name, str)) for name in columns(plan)[: -len(plan.shown) or None]}
+    kinds |= {axis.name: _kind(axis) for axis in plan.axes}
+    types: dict[type | None, Any] = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+    arrays = {}
+    for at, name in enumerate(columns(plan)):
+        kind = kinds.get(name)
+        cells = [None if line[at] == "" else line[at] if kind is None else kind(line[at]) for line in lines]
+        arrays[name] = pyarrow.array(cells, types.get(kind))
+    parquet.write_table(pyarrow.table(arrays), path)
+
+
+_NUMBERS: dict[str, type] = {"run": int, "seed": int, "scan": int, "time_ms": float, "line": int, "scans": int}
+
+
+def _kind(axis: Axis) -> type:
+    """The type of a column of values of an axis: a number if all of them are written as numbers."""
+    kinds = {type(value) for value in axis.values} if axis.what == VALUE else {str}
+    return int if kinds == {int} else float if kinds <= {int, float} else str

@@ -241,3 +241,15 @@ def test_what_does_not_fit_is_said_before_anything_is_written(folder: Path, argu
     status, text = fbvm(*arguments)
     assert (status, said in text) == (2, True), text
     assert not (folder / "campaign-results").exists()
+
+
+def test_a_table_for_other_tools_has_numbers_as_numbers(folder: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    assert fbvm("mix.st", "--vary", "Main.Limit=1,7", "--vary", "cycle=10ms,20ms", "--for", "300ms", "--show", "Main.Kept",
+                "--parquet", "t.parquet")[0] == 0  # fmt: skip
+    table = parquet.read_table("t.parquet")
+    kinds = {field.name: str(field.type) for field in table.schema}
+    assert [kinds[name] for name in ("run", "Main.Limit", "cycle", "faults", "power", "time_ms", "line", "Main.Kept")] == [
+        "int64", "int64", "string", "string", "string", "double", "int64", "int64"]  # fmt: skip
+    assert table.column("Main.Limit").to_pylist() == [1, 1, 7, 7]
+    assert table.column("cycle").to_pylist() == ["10ms", "20ms", "10ms", "20ms"]
