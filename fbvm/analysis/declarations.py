@@ -10,7 +10,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
 from fbvm.check.checker import Checker
 from fbvm.check.symbols.facts import Pou, Variable
-from fbvm.check.symbols.project import TypeEntry
+from fbvm.check.symbols.symbol_table import TypeEntry
 from fbvm.syntax import tree
 
 

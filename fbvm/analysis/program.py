@@ -23,9 +23,9 @@ from fbvm.check.checker import Checker
 from fbvm.check.lint.linter import lint_steps
 from fbvm.check.lint.suppression import ANY, Suppressions
 from fbvm.check.symbols.library import Libraries, LibraryError
-from fbvm.check.symbols.project import Project
 from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.size_limits import SizeLimits
+from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.code.builder.evaluation import evaluate
 from fbvm.code.compiler.follow_on_errors import FollowOnErrors
 from fbvm.syntax import tree
@@ -42,7 +42,7 @@ class Checked:
     """The result of one `check`, kept true by `check_changes`."""
 
     checker: Checker
-    project: Project
+    project: SymbolTable
     collected: dict[Source, list[Diagnostic]] = field(default_factory=dict)
     """Messages about declarations by the text of the part, or of the library, that they are about."""
     found: dict[Source, list[Diagnostic]] = field(default_factory=dict)
@@ -154,7 +154,7 @@ class Program:
 
     def _check(self, lint: bool) -> Iterator[None]:
         report = Report()
-        project = Project(self._searched(), report, self.dialect)
+        project = SymbolTable(self._searched(), report, self.dialect)
         parts = list(self.parts())
         for part in parts:
             if "_parsed" not in vars(part):

@@ -16,7 +16,7 @@ from fbvm.check.recursion import check_recursion
 from fbvm.check.statements import check_body
 from fbvm.check.symbols.context import Context, Evaluate, Rules
 from fbvm.check.symbols.dependencies import Dependencies
-from fbvm.check.symbols.project import Project
+from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
 
 RULES = Rules(
@@ -40,7 +40,7 @@ class Checker(Context):
     `evaluate` folds calls of standard functions; `progress` is called with the number of POUs that are checked and of those
     that are known; `checked_before` as for `Context`."""
 
-    def __init__(self, project: Project, evaluate: Evaluate, checked_before: Mapping[tree.Pou, Dependencies] | None = None,
+    def __init__(self, project: SymbolTable, evaluate: Evaluate, checked_before: Mapping[tree.Pou, Dependencies] | None = None,
                  progress: Callable[[int, int], None] = _no_progress) -> None:
         super().__init__(project, RULES, evaluate, checked_before)
         self._progress = progress

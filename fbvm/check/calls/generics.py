@@ -17,7 +17,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.elementary_types import elementary_type
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
-from fbvm.check.symbols.project import Project
+from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import copied, walk
 
@@ -29,7 +29,7 @@ def variables(declared: tree.Pou) -> dict[str, str]:
             for name in variable.names}
 
 
-def passed_as_is(pou: Pou, project: Project) -> frozenset[str]:
+def passed_as_is(pou: Pou, project: SymbolTable) -> frozenset[str]:
     """Folded names of parameters that take any argument as it is: the body, or a function that it calls, reads members of ANY."""
     if pou.passed_as_is is None:
         pou.passed_as_is = frozenset()
@@ -43,7 +43,7 @@ def passed_as_is(pou: Pou, project: Project) -> frozenset[str]:
     return pou.passed_as_is
 
 
-def _passed_on(call: tree.Call, called: Pou | None, project: Project) -> set[str]:
+def _passed_on(call: tree.Call, called: Pou | None, project: SymbolTable) -> set[str]:
     """Folded names that a call passes to parameters that take any argument as it is."""
     if called is None or not called.is_function:
         return set()
@@ -68,7 +68,7 @@ def _given(call: tree.Call, called: Pou) -> Iterator[tuple[str, tree.Expr, str]]
             yield parameters[position][0], argument.value, parameters[position][1]
 
 
-def is_generic(pou: Pou, project: Project) -> bool:
+def is_generic(pou: Pou, project: SymbolTable) -> bool:
     """True for a function that is instantiated for the types of each call."""
     if not pou.is_function or pou.types:
         return False

@@ -10,7 +10,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.dependencies import Dependencies, Key
 from fbvm.check.symbols.facts import is_open
-from fbvm.check.symbols.project import GlobalDeclaration, Project, list_name
+from fbvm.check.symbols.symbol_table import GlobalDeclaration, SymbolTable, list_name
 
 
 def enroll(context: Context) -> None:
@@ -46,7 +46,7 @@ def declare_early(context: Context, key: Key) -> None:
         _declare(context, declaration)
 
 
-def _keys(project: Project, declaration: GlobalDeclaration) -> list[Key]:
+def _keys(project: SymbolTable, declaration: GlobalDeclaration) -> list[Key]:
     """The names under which the variables of a declaration are found: behind that of their list if it is qualified_only."""
     space = f"{list_name(declaration.source)}." if declaration.section in project.qualified_only else ""
     return [(declaration.source.library, f"{space}{fold(name.text)}") for name in declaration.declared.names]

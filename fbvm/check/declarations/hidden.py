@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fbvm.base.types import BOOL
 from fbvm.check.symbols.facts import Pou, Variable, is_block
-from fbvm.check.symbols.project import Project
 from fbvm.check.symbols.statement_lists import names_of_eno
+from fbvm.check.symbols.symbol_table import SymbolTable
 
 
-def add_hidden(project: Project, pou: Pou) -> None:
+def add_hidden(project: SymbolTable, pou: Pou) -> None:
     """Declare for instances of a POU whether a task of its own runs them, and whether their last call has."""
     for name in sorted(project.tasked(pou.name)) if pou.kind == "PROGRAM" else ():
         block = _instance(pou, name)

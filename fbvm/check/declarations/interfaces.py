@@ -31,8 +31,8 @@ from fbvm.check.declarations.variables import check_qualifiers, initialized, is_
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Edge, Pou, Variable, is_block, is_open
-from fbvm.check.symbols.project import Resolved
 from fbvm.check.symbols.statement_lists import writes_eno
+from fbvm.check.symbols.symbol_table import Resolved
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import passes_places
 

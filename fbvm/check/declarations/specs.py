@@ -36,8 +36,8 @@ from fbvm.check.symbols import vendor_names
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.elementary_types import elementary_type
 from fbvm.check.symbols.facts import Pou, is_block, is_open
-from fbvm.check.symbols.project import Resolved, TypeEntry
 from fbvm.check.symbols.reserved_names import refuse_reserved
+from fbvm.check.symbols.symbol_table import Resolved, TypeEntry
 from fbvm.syntax import tree
 from fbvm.syntax.tree import il
 

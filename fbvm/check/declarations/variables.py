@@ -13,9 +13,9 @@ from fbvm.check.expressions.constants import decode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Variable, is_block
-from fbvm.check.symbols.project import Resolved
 from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
+from fbvm.check.symbols.symbol_table import Resolved
 from fbvm.syntax import tree
 
 _QUALIFIERS = {

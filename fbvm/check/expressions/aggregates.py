@@ -16,7 +16,7 @@ from fbvm.check.expressions.constants import default, encode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import flattened, initialisable
 from fbvm.check.symbols.facts import Aggregate, AggregatePart, Variable
-from fbvm.check.symbols.project import Project
+from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
 
 Written = tree.ArrayInit | tree.StructInit
@@ -134,7 +134,7 @@ def _part(scope: Scope, value: Value, content: bytearray) -> AggregatePart | Non
     return None
 
 
-def _initial_bytes(project: Project, kind: Type) -> bytes:
+def _initial_bytes(project: SymbolTable, kind: Type) -> bytes:
     """The bytes of a variable of a type that is declared without an initial value."""
     if isinstance(kind, ArrayType):
         return _initial_bytes(project, kind.element) * kind.count

@@ -16,8 +16,8 @@ from fbvm.check.symbols.config_facts import TaskFact
 from fbvm.check.symbols.dependencies import Dependencies, Key, has_lasting_body, key_of
 from fbvm.check.symbols.elementary_types import elementary_type
 from fbvm.check.symbols.facts import Facts, Pou, StandardCall, Value, Variable
-from fbvm.check.symbols.project import Project, Resolved, TypeEntry, list_name
 from fbvm.check.symbols.statement_lists import writes_eno
+from fbvm.check.symbols.symbol_table import Resolved, SymbolTable, TypeEntry, list_name
 from fbvm.syntax import tree
 
 Evaluate = Callable[[StandardCall, Sequence[Value], Dialect], Value | None]
@@ -50,7 +50,7 @@ class Context:
     """The state of one check.  `checked_before` has the bodies of libraries that need no check, with their dependencies;
     None if this check records no dependencies for others."""
 
-    def __init__(self, project: Project, rules: Rules, evaluate: Evaluate,
+    def __init__(self, project: SymbolTable, rules: Rules, evaluate: Evaluate,
                  checked_before: Mapping[tree.Pou, Dependencies] | None = None) -> None:
         self.project = project
         self.rules = rules

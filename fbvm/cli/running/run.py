@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
-from fbvm.cli.running.project import run_project
-from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
+from fbvm.cli.running.project_run import run_project
+from fbvm.cli.shared.breakpoint_options import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.files import growing_file, writing

@@ -19,8 +19,8 @@ from fbvm.check.lint.suppression import Suppressions, Wanted
 from fbvm.check.symbols.config_facts import TaskFact
 from fbvm.check.symbols.facts import Pou
 from fbvm.check.symbols.library import Libraries, LibraryError
-from fbvm.check.symbols.project import Project
 from fbvm.check.symbols.report import Report
+from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.code.builder.evaluation import evaluate
 from fbvm.code.compiler.compilation import LONG, Progress
 from fbvm.code.compiler.follow_on_errors import FollowOnErrors
@@ -48,7 +48,7 @@ def run_passes(sources: Sequence[Source], program: str | None, libraries: Sequen
     except LibraryError as error:
         return None, [error.diagnostic]
     with deep(sources):
-        project = Project(searched, report, answers)
+        project = SymbolTable(searched, report, answers)
         follow_on = FollowOnErrors()
         for source in sources:
             text, diagnostics = parse(source, partial(_parsed, progress, source))

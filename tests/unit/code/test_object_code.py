@@ -14,7 +14,7 @@ from depth import times
 from fbvm.base.data import data_folder
 from fbvm.base.dialects import DIALECTS
 from fbvm.check.symbols.facts import Facts, Pou, Variable
-from fbvm.check.symbols.project import Project
+from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.code.compiler import Compilation, compile_text
 from fbvm.code.store import object_code
 from fbvm.code.store.encoding import encode
@@ -157,7 +157,7 @@ def test_what_is_kept_leads_to_no_program() -> None:
         item = left.pop()
         if id(item) not in seen and not isinstance(item, type) and not callable(item):
             seen.add(id(item))
-            assert not isinstance(item, Pou | Variable | Project | Facts)
+            assert not isinstance(item, Pou | Variable | SymbolTable | Facts)
             left += gc.get_referents(item)
 
 

@@ -63,7 +63,7 @@ LISTED = 8
 T = TypeVar("T")
 
 
-class Project:
+class SymbolTable:
     """Names of all POUs, types and global variables."""
 
     def __init__(self, libraries: Libraries, report: Report, dialect: Dialect = STANDARD) -> None:
