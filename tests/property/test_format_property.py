@@ -227,10 +227,10 @@ def test_names_are_written_as_they_are_declared(number: int, chance: random.Rand
     assert write(renamed(text, chance)) == write(text)
 
 
-def test_the_name_of_a_transition_is_declared_where_it_stands() -> None:
-    ladder = "LADDER\nLD a\nOUT Go\nEND_LADDER"
-    chart = f"INITIAL_STEP s: END_STEP\nTRANSITION Go FROM s TO s:\n{ladder}\nEND_TRANSITION"
-    text = f"PROGRAM Main\nVAR a : BOOL; END_VAR\n{chart}\nEND_PROGRAM\n"
+@pytest.mark.parametrize("condition", ["LADDER\nLD a\nOUT Go\nEND_LADDER", "    LD a\n    ST b"])
+def test_the_name_of_a_transition_is_declared_where_it_stands(condition: str) -> None:
+    chart = f"INITIAL_STEP s: END_STEP\nTRANSITION Go FROM s TO s:\n{condition}\nEND_TRANSITION"
+    text = f"PROGRAM Main\nVAR a, b : BOOL; END_VAR\n{chart}\nEND_PROGRAM\n"
     assert text.index("Go") not in Spelling(parsed(text)[0]).at
 
 

@@ -77,12 +77,17 @@ class Spelling:
     def _walk(self, tree: SourceText) -> None:
         """Visit every node, those of a POU in the scope of the POU."""
         todo: list[tuple[Node, Scope]] = [(tree, {})]
+        declared: list[int] = []
         while todo:
             node, scope = todo.pop()
             if isinstance(node, Pou):
                 scope = declared_in(node, self.globals)
             self._visit(node, scope)
+            if isinstance(node, Transition) and node.name is not None:
+                declared.append(node.name.start)
             todo.extend((child, scope) for child in _children(node) if not _is_ladder(child))
+        for start in declared:  # what an instruction list computes is assigned there
+            self.at.pop(start, None)
 
     def _visit(self, node: Node, scope: Scope) -> None:
         if isinstance(node, NameRef):
