@@ -47,19 +47,18 @@ class Store:
 
     def _resume(self, head: dict[str, Any]) -> None:
         """Reads the whole lines that there are; what a crash has cut off is written over."""
-        good = 0
+        good, first = 0, _line(head)
         for number, line in enumerate(self._file):
+            if not number and not first.startswith(line):
+                self._file.close()
+                raise OtherCampaign("holds results of another campaign, another program or another version of fbvm")
             if not line.endswith(b"\n"):
                 break
             try:
-                read = json.loads(line)
                 if number:
-                    self.known.append(result_of(read))
+                    self.known.append(result_of(json.loads(line)))
             except (ValueError, TypeError, KeyError):
                 break
-            if not number and read != head:
-                self._file.close()
-                raise OtherCampaign("holds results of another campaign, another program or another version of fbvm")
             good += len(line)
         self._file.seek(good)
         self._file.truncate()
@@ -71,11 +70,15 @@ class Store:
         self._file.flush()
 
     def _write(self, row: dict[str, Any]) -> None:
-        self._file.write(json.dumps(row, allow_nan=False).encode() + b"\n")
+        self._file.write(_line(row))
 
     def close(self) -> None:
         """Closes the file."""
         self._file.close()
+
+
+def _line(row: dict[str, Any]) -> bytes:
+    return json.dumps(row, allow_nan=False).encode() + b"\n"
 
 
 def result_of(row: dict[str, Any]) -> Result:

@@ -25,7 +25,7 @@ from fbvm.campaign.plan import Moments, PowerRule
 from fbvm.campaign.plan_file import Written, with_about
 from fbvm.campaign.planning import images_of, plan_of, program_project
 from fbvm.campaign.runs import Outcome, conduct
-from fbvm.campaign.store import LINES, TABLE, Store, write_table
+from fbvm.campaign.store import LINES, TABLE, OtherCampaign, Store, write_table
 from fbvm.campaign.work import Batch, Bench, Done, Task
 from fbvm.cli.main import main
 
@@ -175,6 +175,22 @@ def test_results_of_another_campaign_are_not_mixed(folder: Path) -> None:
     assert status == 2
     assert "holds results of another campaign, another program or another version of fbvm" in said and "--fresh" in said
     assert fbvm("mix.st", "--vary", "Main.Limit=1..3", "--for", "100ms", "--fresh")[0] == 0
+
+
+@pytest.mark.parametrize("text", [b"notes of somebody\nof a long night\n", b"a note", b'{"format": 1}\n'])
+def test_a_file_that_is_no_campaign_s_is_left_as_it_is(tmp_path: Path, text: bytes) -> None:
+    (tmp_path / LINES).write_bytes(text)
+    with pytest.raises(OtherCampaign):
+        Store(tmp_path, "mark")
+    assert (tmp_path / LINES).read_bytes() == text
+
+
+def test_a_file_whose_first_line_was_cut_off_begins_anew(tmp_path: Path) -> None:
+    Store(tmp_path, "mark").close()
+    whole = (tmp_path / LINES).read_bytes()
+    (tmp_path / LINES).write_bytes(whole[:20])
+    Store(tmp_path, "mark").close()
+    assert (tmp_path / LINES).read_bytes() == whole
 
 
 PLANTED = ("Failures := Failures + 1;", "Failures := Failures + 1; Level := Wanted;")
