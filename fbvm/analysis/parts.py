@@ -126,9 +126,19 @@ class File:
         while gone and texts and gone[-1].source.text == texts[-1]:
             del gone[-1], texts[-1]
             tail += 1
-        self.parts = [*old[:head], *(Part(Source(self.name, part), 0) for part in texts), *old[len(old) - tail:]]
+        return self._exchange(head, tail, gone, texts)
+
+    def _exchange(self, head: int, tail: int, gone: list[Part],
+                  texts: list[str]) -> list[tuple[Part | None, Part | None]]:  # fmt: skip
+        """Puts parts with some texts in place of those that are gone, between `head` parts in front and `tail` behind.
+
+        Returns the pairs that `replace` does.  Of as many texts as parts, each part whose text is the same stays."""
+        kept = {at for at, part in enumerate(gone) if len(gone) == len(texts) and part.source.text == texts[at]}
+        between = [gone[at] if at in kept else Part(Source(self.name, part), 0) for at, part in enumerate(texts)]
+        self.parts = [*self.parts[:head], *between, *self.parts[len(self.parts) - tail:]]
         moved = self._place_parts()
-        new = self.parts[head:len(self.parts) - tail]
+        new = [part for at, part in enumerate(self.parts[head:len(self.parts) - tail]) if at not in kept]
+        gone = [part for at, part in enumerate(gone) if at not in kept]
         longer = max(len(gone), len(new))
         return moved + list(zip([*gone, *[None] * (longer - len(gone))], [*new, *[None] * (longer - len(new))], strict=True))
 

@@ -88,6 +88,8 @@ class Program:
         """Whether the changes since the last `check` need another one for the errors."""
         self.revision = 0
         """Counts changes of texts and of what is known about them."""
+        self._outdated: list[SymbolTable] = []
+        """What earlier checks knew, to be freed."""
         self._uses: dict[Part, list[Use]] = {}
         """Names by part.  Keys outlive a check that changes nothing that others see."""
 
@@ -141,7 +143,10 @@ class Program:
         return self.checked is not None and not self._changes and not self._whole
 
     def check(self, lint: bool = True) -> Generator[None, None, None]:
-        """Check everything, in steps.  A caller that gives up closes the iterator: the program then knows what it knew before."""
+        """Check everything, in steps.  A caller that gives up closes the iterator: the program then knows what it knew before.
+
+        Call `release` when there is time for it behind the last step."""
+        self.release()
         changes, self._changes = self._changes, []
         before, self._whole = (self._whole, changes), False
         try:
@@ -170,12 +175,18 @@ class Program:
         old, self.checked = self.checked, checked
         self.revision += 1
         if old is not None:
-            old.project.let_go()
+            self._outdated.append(old.project)
+
+    def release(self) -> None:
+        """Free what earlier checks knew, which takes tenths of a second after many changes of a large program."""
+        while self._outdated:
+            self._outdated.pop().let_go()
 
     def check_all(self) -> None:
         """Check everything at once."""
         for _ in self.check():
             pass
+        self.release()
 
     def check_changes(self) -> bool:
         """Check again the POUs that have changed since the last check.  Returns False, and does nothing, if the changes

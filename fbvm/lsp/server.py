@@ -6,12 +6,12 @@ requests are answered.  A change of what others see begins with everything."""
 from __future__ import annotations
 
 import asyncio
-import gc
 from pathlib import Path
 
 from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
+from fbvm.analysis.garbage import Garbage
 from fbvm.analysis.parts import File
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.twincat import TASK_SUFFIX
@@ -44,7 +44,8 @@ class Server(LanguageServer):
         """The files that the editor has open, and their URIs as it writes them."""
         self.told: dict[str, list[types.Diagnostic]] = {}
         """The diagnostics that the editor has of each URI, where there are any."""
-        self._garbage: asyncio.TimerHandle | None = None
+        self._garbage = Garbage()
+        self._collection: asyncio.TimerHandle | None = None
 
     # --- texts ------------------------------------------------------------------------------------------------------
 
@@ -151,12 +152,14 @@ class Server(LanguageServer):
         finally:
             steps.close()
         self.tell(project)
+        program.release()
+        self._garbage.checked()
         self._collect_later()
 
     def _collect_later(self) -> None:
-        if self._garbage is not None:
-            self._garbage.cancel()
-        self._garbage = asyncio.get_running_loop().call_later(COLLECTED_AFTER_S, gc.collect)
+        if self._collection is not None:
+            self._collection.cancel()
+        self._collection = asyncio.get_running_loop().call_later(COLLECTED_AFTER_S, self._garbage.collect)
 
     async def ready(self, uri: str) -> tuple[Project, File] | None:
         """The program of a file, checked as its text is now; None for a file of no program."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from fbvm.base.digits import whole_number
-from fbvm.base.types import fold
+from fbvm.base.types import StructType, fold
 from fbvm.machine.breakpoints import Breakpoint as Row
 from fbvm.machine.plc import Mode, Plc
 from fbvm.record.draw.table import ScanTable
@@ -373,7 +373,9 @@ def completed(session: Stepping, takes: str, word: str, words: Mapping[str, obje
             place = session.find(front)
         except UnknownPlace:
             return []
-        names = [field.name for field in getattr(getattr(place, "type", None), "fields", {}).values()]
+        kind = getattr(place, "type", None)
+        names = [field.name for field in getattr(kind, "fields", {}).values()]
+        names += session.properties.of(kind) if isinstance(kind, StructType) else []
     else:
         names = [field.name for field in session.facts.image.symbols.values()]
     return [f"{front}{dot}{name}" for name in names if fold(name).startswith(fold(last))]

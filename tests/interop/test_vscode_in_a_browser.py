@@ -43,6 +43,21 @@ VAR Level : INT; END_VAR
 END_PROGRAM
 """
 
+LAMP = """\
+<?xml version="1.0" encoding="utf-8"?>
+<TcPlcObject Version="1.1.0.1">
+  <POU Name="FB_Lamp">
+    <Declaration><![CDATA[FUNCTION_BLOCK FB_Lamp
+VAR_OUTPUT
+    bOn : BOOL;
+END_VAR]]></Declaration>
+    <Implementation>
+      <ST><![CDATA[bOff := TRUE;]]></ST>
+    </Implementation>
+  </POU>
+</TcPlcObject>
+"""
+
 
 @pytest.fixture(scope="module")
 def code_server() -> list[str]:
@@ -60,6 +75,7 @@ def address(code_server: list[str], tmp_path: Path) -> Iterator[str]:
     work.mkdir()
     (work / "pump.st").write_text(PUMP, encoding="utf-8")
     (work / "tank.st").write_text(PUMP.replace("Levl", "Level"), encoding="utf-8")
+    (work / "FB_Lamp.TcPOU").write_text(LAMP, encoding="utf-8")
     (work / "test_level.st").write_text(TEST, encoding="utf-8")
     fbvm = tmp_path / "fbvm"
     fbvm.write_text(f'#!/bin/sh\nexec {sys.executable} -m fbvm "$@"\n', encoding="utf-8")
@@ -153,6 +169,13 @@ def test_from_a_mistake_to_a_step_back_and_a_green_test(page: Any) -> None:
     page.locator(".testing-run-glyph").first.click()
     page.locator(".codicon-testing-passed-icon, .testing-passed, .codicon-testing-passed").first.wait_for()
     assert page.locator(".squiggly-error").count() == 0
+
+
+def test_a_mistake_in_an_object_of_twincat_is_underlined_in_its_xml(page: Any) -> None:
+    row(page, "FB_Lamp.TcPOU").dblclick()
+    page.locator(".squiggly-error").first.wait_for()
+    page.locator(".view-line", has_text="bOff").get_by_text("bOff").first.hover()
+    page.get_by_text("bOff is not declared").first.wait_for()
 
 
 def test_the_live_page_stands_beside_the_code(page: Any) -> None:
