@@ -5,11 +5,12 @@ changes of its inputs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 
 from fbvm.prove.encoding.cells import Cell
-from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.clocks import Clock
 from fbvm.prove.encoding.summary import Summary
 from fbvm.prove.encoding.terms import Term
 from fbvm.prove.solver import SAT, UNKNOWN, UNSAT, Solver
@@ -20,8 +21,16 @@ MOST_IN_BLOCK = 512
 MOST_SIMPLER = 120
 """Questions that may be asked to find a run with fewer changes."""
 
-Inputs = list[dict[Cell, int]]
-"""The inputs of each scan of a run, as unsigned numbers."""
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a run is given: the inputs of each scan, as unsigned numbers, and the times at which the scans begin."""
+
+    values: list[dict[Cell, int]]
+    times_ns: list[int]
+
+    def __len__(self) -> int:
+        return len(self.values)
 
 
 @dataclass(frozen=True)
@@ -41,8 +50,8 @@ class Goal:
 class BoundedSearch:
     """Looks for runs to a goal.  `cleared` is the number of scans after power-on in which it is known that none gets there."""
 
-    def __init__(self, summary: Summary, goal: Goal, clock: FixedCycle, expired: Callable[[], bool]) -> None:
-        self.summary, self.terms = summary, summary.terms
+    def __init__(self, summary: Summary, goal: Goal, clock: Clock, expired: Callable[[], bool]) -> None:
+        self.summary, self.terms, self.clock = summary, summary.terms, clock
         self.unrolling: Unrolling = from_power_on(summary, goal.terms, clock)
         self.solver = Solver(expired)
         self.cleared = 0
@@ -96,12 +105,13 @@ class BoundedSearch:
 
     def _model(self, last: int) -> dict[Term, int]:
         names = [self.unrolling.input(variable, number) for number in range(last + 1) for variable in self.unrolling.inputs]
-        return self.solver.values(names)
+        passed = (self.clock.passed(number) for number in range(1, last + 1))
+        return self.solver.values([*names, *(term for term in passed if not term.is_constant)])
 
     def _simplest(self, model: dict[Term, int], last: int) -> Inputs:
         """A run to the goal in the scan `last` in which inputs keep their values where they can, beginning with 0."""
         terms, kept = self.terms, [self.hit(last)]
-        wishes = []
+        wishes = [*self._even_times(last)]
         for number in range(last + 1):
             for variable in self.unrolling.inputs:
                 here = self.unrolling.input(variable, number)
@@ -109,8 +119,22 @@ class BoundedSearch:
                 wishes.append(terms.eq(here, before))
         model = self._granted(kept, wishes, model, last)
         cells = self.summary.inputs
-        return [{cells[variable]: model[self.unrolling.input(variable, number)] for variable in self.unrolling.inputs}
-                for number in range(last + 1)]  # fmt: skip
+        values = [{cells[variable]: model[self.unrolling.input(variable, number)] for variable in self.unrolling.inputs}
+                  for number in range(last + 1)]  # fmt: skip
+        passed = (self.clock.passed(number) for number in range(last + 1))
+        return Inputs(values, [*accumulate(term.value if term.is_constant else model[term] for term in passed)])
+
+    def _even_times(self, last: int) -> Iterator[Term]:
+        """That scans begin every so often, at one of the bounds."""
+        if not self.clock.is_free:
+            return
+        terms = self.terms
+        ends = [terms.constant(64, self.clock.cycle_ns), terms.constant(64, self.clock.longest_ns)]
+        for number in range(1, last + 1):
+            passed = self.clock.passed(number)
+            yield terms.any_of(*(terms.eq(passed, end) for end in ends))
+            if number > 1:
+                yield terms.eq(passed, self.clock.passed(number - 1))
 
     def _granted(self, kept: list[Term], wishes: list[Term], model: dict[Term, int], last: int) -> dict[Term, int]:
         """The model of a run that grants as many wishes, the latest first, as can be found out by some questions."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from fbvm.prove.bounded import Goal
+from fbvm.prove.encoding.clocks import Clock
 from fbvm.prove.encoding.summary import Summary
 from fbvm.prove.encoding.terms import Term
 from fbvm.prove.solver import UNKNOWN, UNSAT, Solver
@@ -17,12 +18,12 @@ from fbvm.prove.unrolling import from_anywhere
 class Induction:
     """Whether scans from any state on get to a goal.  `facts` are invariants over the state before them."""
 
-    def __init__(self, summary: Summary, goal: Goal, cycle_ns: int, expired: Callable[[], bool],
+    def __init__(self, summary: Summary, goal: Goal, clock: Clock, expired: Callable[[], bool],
                  facts: Sequence[Term] = ()) -> None:  # fmt: skip
         self.terms = summary.terms
-        self.unrolling, known = from_anywhere(summary, goal.terms, cycle_ns)
+        self.unrolling, later = from_anywhere(summary, goal.terms, clock)
         self.solver = Solver(expired)
-        self.solver.assume(*known, *facts)
+        self.solver.assume(*later.facts, *facts)
         self.depth = 0
         """So many scans without the goal are assumed before one with it."""
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.clocks import Clock
 from fbvm.prove.encoding.summary import Summary
 from fbvm.prove.encoding.terms import Term, Terms, signed
 from fbvm.prove.solver import SAT, UNSAT, Solver
@@ -143,7 +143,7 @@ class Invariants:
 
     `stop` and `given` are as in a goal: scans behind a trap, and those that break an assumption, do not count."""
 
-    def __init__(self, summary: Summary, variables: Sequence[Term], stop: Term, given: Term, clock: FixedCycle,
+    def __init__(self, summary: Summary, variables: Sequence[Term], stop: Term, given: Term, clock: Clock,
                  expired: Callable[[], bool]) -> None:  # fmt: skip
         self.summary, self.variables, self.clock = summary, list(variables), clock
         self.behind = [summary.next[variable] for variable in variables]
@@ -152,18 +152,17 @@ class Invariants:
 
     def kept(self, found: list[Guess]) -> list[Guess] | None:
         """The guesses that hold behind every scan; None if the time is over."""
-        summary, terms, cycle_ns = self.summary, self.summary.terms, self.clock.cycle_ns
+        summary, terms = self.summary, self.summary.terms
         wanted = [*self.context, *self.behind]
         begun = from_power_on(summary, wanted, self.clock)
         first = self._filtered(found, begun.scan(0), [], terms.constant(64, 0), None)
         if first is None:
             return None
-        anywhere, facts = from_anywhere(summary, wanted, cycle_ns)
-        behind = anywhere.scan(0)
-        now = terms.variable(("now", "anywhere"), 64)
-        return self._filtered(first, behind, facts, now, terms.sub(now, terms.constant(64, cycle_ns)))
+        anywhere, later = from_anywhere(summary, wanted, self.clock)
+        now = terms.add(later.before, self.clock.passed(0, later=True))
+        return self._filtered(first, anywhere.scan(0), later.facts, now, later.before)
 
-    def _filtered(self, found: list[Guess], scan: list[Term], facts: list[Term], now: Term,
+    def _filtered(self, found: list[Guess], scan: list[Term], facts: Sequence[Term], now: Term,
                   before: Term | None) -> list[Guess] | None:  # fmt: skip
         """The guesses that hold behind a scan, if they hold `before` it; None there is power-on."""
         terms, solver = self.summary.terms, Solver(self._expired)
@@ -190,9 +189,8 @@ def balanced(terms: Terms, some: list[Term]) -> Term:
     return some[0] if some else terms.false
 
 
-def facts_of(summary: Summary, found: Sequence[Guess], cycle_ns: int) -> list[Term]:
+def facts_of(summary: Summary, found: Sequence[Guess], clock: Clock) -> list[Term]:
     """Invariants as terms over the state before the first scan of `from_anywhere`."""
-    terms = summary.terms
     same = {variable: variable for variable in summary.next}
-    before = terms.sub(terms.variable(("now", "anywhere"), 64), terms.constant(64, cycle_ns))
-    return [guess.term(terms, same, before) for guess in found]
+    before = clock.later().before
+    return [guess.term(summary.terms, same, before) for guess in found]

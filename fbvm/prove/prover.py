@@ -9,10 +9,12 @@ from fbvm.base.types import EnumType, SubrangeType, base
 from fbvm.code.image import Image
 from fbvm.machine.plc import STEP_BUDGET
 from fbvm.prove.bounded import BoundedSearch, Goal, Inputs
+from fbvm.prove.cycle import show_cycle
+from fbvm.prove.encoding.clocks import Clock, clock_of
 from fbvm.prove.encoding.execution import UNWOUND, Refused
 from fbvm.prove.encoding.properties import condition_term, place_term
 from fbvm.prove.encoding.rewriting import cone, leaves
-from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.scan import WIDTHS
 from fbvm.prove.encoding.summary import Summary, summarize
 from fbvm.prove.encoding.terms import Term, TimeOver
 from fbvm.prove.induction import Induction
@@ -31,7 +33,7 @@ from fbvm.prove.question import (
     Run,
     Verdict,
 )
-from fbvm.prove.runs import Judge, replayed, sampled, simulated
+from fbvm.prove.runs import Judge, Machine, replayed, sampled, simulated
 from fbvm.prove.solver import UNSAT
 from fbvm.prove.unreached import unreached
 from fbvm.watch.names import Names as PlaceNames
@@ -51,20 +53,23 @@ MOST_STATE = 200
 
 @dataclass(frozen=True)
 class Limits:
-    """How far to go: `scans` from power-on on, until `expired` answers True.  `seed` is that of random runs."""
+    """How far to go: `scans` from power-on on, until `expired` answers True.  `seed` is that of random runs.
+
+    Scans begin every `cycle_ns`; with `longest_ns`, any time between these two lies between two scans, another one each time."""
 
     cycle_ns: int = 10_000_000
     scans: int = 1000
     seed: int = 0
     expired: Callable[[], bool] = lambda: False
     simulated_scans: int = SIMULATED_SCANS
+    longest_ns: int = 0
 
 
 Tell = Callable[[str], None]
 
 
 def prove(image: Image, question: Question, limits: Limits | None = None, tell: Tell = lambda said: None) -> Verdict:
-    """The answer to a question about the runs of a program from power-on, with any inputs, in a fixed cycle.
+    """The answer to a question about the runs of a program from power-on, with any inputs.
 
     `tell` is told what is done.  Raises Refused for a program or property that cannot be followed, ConditionError and
     UnknownPlace for names that it does not have, SolverMissing."""
@@ -84,8 +89,10 @@ class Prover:
         self.judge = Judge.of(image, question)
         names = Names(image, question.prefix)
         free = [extent for name in question.free for extent in names.extents(name)]
-        self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired)
-        self.clock = FixedCycle(self.summary.terms, image.tasks, limits.cycle_ns)
+        self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired, self.judge.all_places)
+        longest_ns = max(limits.longest_ns, limits.cycle_ns)
+        self.clock: Clock = clock_of(self.summary.terms, image.tasks, limits.cycle_ns, longest_ns)
+        self.machine = Machine(image, limits.cycle_ns, longest_ns, STEP_BUDGET)
         self.goal = self._goal(names)
         self.notes: list[str] = []
         relevant = leaves([*self.goal.terms, *self.summary.next.values()])
@@ -109,17 +116,21 @@ class Prover:
     def _awaited(self, answer: Term, trigger: Term) -> Term:
         """The condition that an answer is late.
 
-        Adds two variables to the state: whether the trigger held behind the scan before, and for how many scans the answer is
-        awaited."""
+        Adds to the state whether the trigger held behind the scan before, whether its answer is awaited, and for how long."""
         terms, summary = self.summary.terms, self.summary
-        before, waited = terms.variable(("trigger", "before"), 0), terms.variable(("answer", "awaited"), 32)
-        none, one = terms.constant(32, 0), terms.constant(32, 1)
-        waits = terms.not_(terms.eq(waited, none))
-        begins = terms.all_of(trigger, terms.not_(before), terms.not_(waits))
-        longer = terms.ite(terms.or_(waits, begins), terms.add(waited, one), none)
-        summary.initial |= {before: terms.false, waited: none}
-        summary.next |= {before: trigger, waited: terms.ite(answer, none, longer)}
-        return terms.eq(summary.next[waited], terms.constant(32, self.question.waiting_scans(self.limits.cycle_ns) + 1))
+        before, waits = terms.variable(("trigger", "before"), 0), terms.variable(("answer", "awaited"), 0)
+        waited = terms.variable(("answer", "time"), 64)
+        passed, zero = terms.variable(("passed", 0), WIDTHS["passed"]), terms.constant(64, 0)
+        since = terms.ite(waits, terms.add(waited, passed), zero)
+        asked = terms.or_(waits, terms.and_(trigger, terms.not_(before)))
+        open_ = terms.and_(asked, terms.not_(answer))
+        summary.signals[passed] = ("passed", 0)
+        summary.initial |= {before: terms.false, waits: terms.false, waited: zero}
+        summary.next |= {before: trigger, waits: open_, waited: terms.ite(open_, since, zero)}
+        limit = terms.constant(64, self.question.within_ns)
+        next_one = terms.add(since, terms.constant(64, self.limits.cycle_ns))  # begins then at the earliest
+        comes_late = terms.and_(asked, terms.less(limit, since, False))
+        return terms.or_(comes_late, terms.and_(open_, terms.less(limit, next_one, False)))
 
     def _types(self) -> Iterable[Term]:
         """What the types of inputs say: enumerations have their members, subranges their limits."""
@@ -183,6 +194,8 @@ class Prover:
             self.notes.append(f"{place.name} has the same value in every scan: it is no input, and no code changes it")
         if found := self._unknowns():
             self.notes.append(f"taken for any value: {', '.join(found)}")
+        if self.clock.is_free:
+            self.notes.append(f"time between two scans: {show_cycle(self.clock.cycle_ns, self.clock.longest_ns)}")
         if self.question.assumptions:
             self.notes.append(f"assumed: {'; '.join(self.question.assumptions)}")
 
@@ -204,8 +217,7 @@ class Prover:
     def _simulated(self) -> Verdict | None:
         """Random runs; what they find is made shorter by the solver."""
         self.tell("trying random inputs")
-        for found in simulated(self.image, self.limits.cycle_ns, self.judge, self.inputs, self.limits.simulated_scans,
-                               self.limits.seed, budget=STEP_BUDGET):  # fmt: skip
+        for found in simulated(self.machine, self.judge, self.inputs, self.limits.simulated_scans, self.limits.seed):
             if found is not None:
                 self.tell(f"a random run gets there after {_scans(len(found.inputs))}: looking for the shortest")
                 shorter = self._searched(min(len(found.inputs), self.limits.scans))
@@ -226,7 +238,7 @@ class Prover:
 
     def _met(self, inputs: Inputs, is_shortest: bool) -> Verdict:
         """The verdict about a run that gets to the goal, which the engine has to confirm."""
-        run = replayed(self.image, self.limits.cycle_ns, self.judge, inputs, is_shortest, budget=STEP_BUDGET)
+        run = replayed(self.machine, self.judge, inputs, is_shortest)
         if run is not None:
             word = REACHED if self.question.is_reach else BROKEN
             how = "the shortest run" if is_shortest else "a random run"
@@ -243,8 +255,8 @@ class Prover:
 
     def _induced(self, found: list[Guess], most: int) -> Verdict | None:
         """k-induction up to a depth, which the bounded search has cleared."""
-        facts = facts_of(self.summary, found, self.limits.cycle_ns)
-        induction = Induction(self.summary, self._whole_goal(), self.limits.cycle_ns, self.limits.expired, facts)
+        facts = facts_of(self.summary, found, self.clock)
+        induction = Induction(self.summary, self._whole_goal(), self.clock, self.limits.expired, facts)
         while induction.depth <= min(most, self.search.cleared - 1) and not self.limits.expired():
             if induction.step() == UNSAT:
                 how = f"by induction over {induction.depth + 1} scan{'s' * (induction.depth > 0)}"
@@ -267,8 +279,7 @@ class Prover:
             return None
         self.tell(f"guessing invariants of {len(state)} variables")
         cells = {variable: self.summary.cells[variable] for variable in state}
-        samples = sampled(self.image, self.limits.cycle_ns, self.judge, self.inputs, cells, SAMPLED_SCANS, self.limits.seed,
-                          budget=STEP_BUDGET)  # fmt: skip
+        samples = sampled(self.machine, self.judge, self.inputs, cells, SAMPLED_SCANS, self.limits.seed)
         if not samples:
             return None
         found = guesses(state, samples)
@@ -279,7 +290,7 @@ class Prover:
 
     def _deepest(self) -> int:
         """The scans that induction looks back: those in which an answer is awaited, if there are not too many."""
-        awaited = self.question.waiting_scans(self.limits.cycle_ns) + 2 if self.question.kind == WITHIN else 0
+        awaited = self.question.within_ns // self.limits.cycle_ns + 2 if self.question.kind == WITHIN else 0
         return max(MOST_INDUCTION, min(awaited, DEPTHS[-1]))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from fbvm.prove.question import ALWAYS, NO_TRAP, REACH, WITHIN, Run, Verdict
@@ -37,32 +37,44 @@ def _test_name(verdict: Verdict, used: set[str]) -> str:
 
 def _statements(verdict: Verdict, run: Run) -> list[str]:
     """The writes of each scan and the scans between them; the last scan is asked for the property."""
-    if verdict.question.kind == WITHIN:
-        return _awaiting(verdict, run)
-    lines: list[str] = []
-    waiting = 0
-    for number, writes in enumerate(run.writes):
-        if writes and waiting:
-            lines.append(f"    plc.run(scans={waiting})")
-            waiting = 0
-        lines += [f"    plc.write({place.name!r}, {value!r})" for place, value in writes.items()]
-        waiting += number < len(run.writes) - 1
-    if waiting:
-        lines.append(f"    plc.run(scans={waiting})")
     question = verdict.question
+    first_asked = run.scans - 1
+    if question.kind == WITHIN:
+        first_asked = run.times_ns.index(run.asked_ns)
+    lines = list(_scans(run, first_asked))
     if question.kind == NO_TRAP:
-        return [*lines, "    assert plc.scan() is None"]
+        return [*lines, *_writes(run, first_asked), "    assert plc.scan() is None"]
+    ended = f"plc.run(scans=1, until={question.text!r})"
+    if question.kind == WITHIN:
+        lines.append("    answers = []")
+        for number in range(first_asked, run.scans):
+            if run.times_ns[number] - run.asked_ns > question.within_ns:
+                break
+            lines += [*_writes(run, number), f"    answers.append({ended})"]
+        return [*lines, "    assert 'until' in answers"]
     sign = "==" if question.kind in (ALWAYS, REACH) else "!="
-    return [*lines, f"    assert plc.run(scans=1, until={question.text!r}) {sign} 'until'"]
+    return [*lines, *_writes(run, first_asked), f"    assert {ended} {sign} 'until'"]
 
 
-def _awaiting(verdict: Verdict, run: Run) -> list[str]:
-    """The scans of a run in which an answer is awaited, with what each of the last ones is asked."""
-    question = verdict.question
-    first = run.scans - 1 - question.waiting_scans(run.cycle_ns)
-    lines = ["    answers = []"]
-    for number, writes in enumerate(run.writes):
-        lines += [f"    plc.write({place.name!r}, {value!r})" for place, value in writes.items()]
-        ended = f"plc.run(scans=1, until={question.text!r})"
-        lines.append(f"    answers.append({ended})" if number >= first else "    plc.scan()")
-    return [*lines, "    assert 'until' in answers"]
+def _scans(run: Run, count: int) -> Iterator[str]:
+    """The first scans of a run, those between which nothing is written at once."""
+    waiting = 0
+    for number in range(count):
+        if waiting and (changes := [*_writes(run, number)]):
+            yield f"    plc.run(scans={waiting})"
+            yield from changes
+            waiting = 0
+        elif not waiting:
+            yield from _writes(run, number)
+        waiting += 1
+    if waiting:
+        yield f"    plc.run(scans={waiting})"
+
+
+def _writes(run: Run, number: int) -> Iterator[str]:
+    """What is written before the scan of a number, and how long before it the last one began where that changes."""
+    passed_ns = [run.cycle_ns, *run.passed_ns]
+    if number and passed_ns[number] != passed_ns[number - 1]:
+        yield f"    plc.cycle_ns = {passed_ns[number]:_}"
+    for place, value in run.writes[number].items():
+        yield f"    plc.write({place.name!r}, {value!r})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from fbvm.base.types import AnyType, ArrayType, OpenArrayType, RefType, StringType, StructType, Type
 from fbvm.code.image import Image
@@ -43,10 +44,6 @@ class Question:
         if self.kind == WITHIN:
             return f"{self.text} within {show_time(self.within_ns)[2:]} of {self.trigger}"
         return self.kind if self.kind == NO_TRAP else f"{self.kind} {self.text}"
-
-    def waiting_scans(self, cycle_ns: int) -> int:
-        """Scans after the trigger behind one of which WITHIN wants the condition to hold."""
-        return self.within_ns // cycle_ns
 
     @property
     def is_reach(self) -> bool:
@@ -100,17 +97,27 @@ def _unfree(type: Type, path: str) -> str:
 class Run:
     """A run that answers a question: what is written before each scan, and what was seen behind each.
 
-    `writes` has for each scan the inputs that change, with their values; `is_shortest` tells whether no shorter run does it."""
+    `writes` has for each scan the inputs that change, with their values, `times_ns` when it begins; `cycle_ns` is the cycle, if
+    that is fixed, else the shortest one.  `is_shortest` tells whether no shorter run does it."""
 
     writes: tuple[dict[Place, Value], ...]
+    times_ns: tuple[int, ...]
     cycle_ns: int
     is_shortest: bool
     trap: Trap | None = None
+    asked_ns: int = 0
+    """Of WITHIN: when the trigger became true whose answer does not come in time."""
+    has_free_times: bool = False
+    """True if its scans could have begun at other times: there was no fixed cycle."""
 
     @property
     def scans(self) -> int:
         return len(self.writes)
 
+    @property
+    def passed_ns(self) -> list[int]:
+        """The time between each scan but the first and the one before."""
+        return [after - before for before, after in pairwise(self.times_ns)]
 
 @dataclass(frozen=True)
 class Verdict:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
+from fbvm.prove.cycle import show_passed
 from fbvm.prove.question import Run, Verdict
 from fbvm.prove.runs import repeated
 from fbvm.record.draw.chart import draw
@@ -21,6 +22,8 @@ def details(image: Image, verdict: Verdict, width: int | None = None) -> Iterato
     """The lines below the sentence: what limits the answer, the run as a chart of `width` characters, the trap that ends it."""
     yield from (f"  {note}" for note in verdict.notes)
     if verdict.run is not None:
+        if verdict.run.has_free_times and verdict.run.passed_ns:
+            yield f"  times between its scans: {show_passed(verdict.run.passed_ns)}"
         yield from run_chart(image, verdict, verdict.run, width).splitlines()
         if verdict.run.trap is not None:
             yield f"  {verdict.run.trap}"

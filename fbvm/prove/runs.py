@@ -28,6 +28,16 @@ EDGES = 3
 """One number of so many is one of the edges: 0, 1, the greatest, the smallest."""
 
 
+@dataclass
+class Waiting:
+    """Of WITHIN, in a run: whether the trigger held behind the scan before, whether its answer is awaited, and since when
+    the last one was."""
+
+    triggered: bool = False
+    is_open: bool = False
+    since_ns: int = 0
+
+
 @dataclass(frozen=True)
 class Judge:
     """Tells behind a scan whether a run got to the goal of a question, and whether it keeps the assumptions."""
@@ -36,8 +46,7 @@ class Judge:
     condition: Condition | None
     assumptions: tuple[Condition, ...]
     trigger: Condition | None = None
-    waited: list[int] = field(default_factory=lambda: [0, 0])
-    """Of WITHIN: whether the trigger held behind the scan before, and for how many scans its answer is awaited."""
+    waiting: Waiting = field(default_factory=Waiting)
 
     @classmethod
     def of(cls, image: Image, question: Question) -> Judge:
@@ -49,13 +58,18 @@ class Judge:
 
     def begun(self) -> Judge:
         """The judge of a new run."""
-        return replace(self, waited=[0, 0])
+        return replace(self, waiting=Waiting())
 
     @property
     def places(self) -> tuple[Place, ...]:
         """What the property names."""
         conditions = [each for each in (self.trigger, self.condition) if each is not None]
         return tuple(dict.fromkeys(place for condition in conditions for place in condition.places))
+
+    @property
+    def all_places(self) -> tuple[Place, ...]:
+        """What the property and the assumptions name."""
+        return (*self.places, *(place for assumption in self.assumptions for place in assumption.places))
 
     def met(self, plc: Plc) -> bool:
         """True if the last scan of a PLC met the goal.  To be asked once behind each scan of a run."""
@@ -66,10 +80,13 @@ class Judge:
         return plc.trap is None and self.condition.holds(plc.read) != (self.question.kind == ALWAYS)
 
     def _is_late(self, plc: Plc, answered: bool, triggered: bool) -> bool:
-        before, waited = self.waited
-        begins = triggered and not before and not waited
-        self.waited[:] = [triggered, 0 if answered else waited + 1 if waited or begins else 0]
-        return self.waited[1] == self.question.waiting_scans(plc.cycle_ns) + 1
+        waiting = self.waiting
+        if triggered and not waiting.triggered and not waiting.is_open:
+            waiting.since_ns, waiting.is_open = plc.now_ns, True
+        waiting.triggered, was_open = triggered, waiting.is_open
+        waiting.is_open &= not answered
+        waited_ns = plc.now_ns - waiting.since_ns + (0 if answered else plc.cycle_ns)  # the next scan begins then at the earliest
+        return was_open and waited_ns > self.question.within_ns
 
     def kept(self, plc: Plc) -> bool:
         """True if the assumptions hold now."""
@@ -136,6 +153,28 @@ class RandomInputs:
 
 
 @dataclass(frozen=True)
+class Machine:
+    """Makes PLCs of a program, and says when they scan: every `cycle_ns`, or up to `longest_ns` apart where that is more."""
+
+    image: Image
+    cycle_ns: int
+    longest_ns: int
+    budget: int
+
+    def plc(self) -> Plc:
+        return Plc(self.image, self.cycle_ns, budget=self.budget, engine="python")
+
+    def random_times(self, random: Random, hold_scans: int) -> Iterator[int]:
+        """The times of the scans of a random run."""
+        now_ns, passed_ns = 0, self.cycle_ns
+        while True:
+            yield now_ns
+            if self.longest_ns > self.cycle_ns and random.randrange(hold_scans) == 0:
+                passed_ns = random.choice((self.cycle_ns, self.longest_ns, random.randint(self.cycle_ns, self.longest_ns)))
+            now_ns += passed_ns
+
+
+@dataclass(frozen=True)
 class Found:
     """A random run that met the goal: its inputs, scan by scan."""
 
@@ -144,25 +183,26 @@ class Found:
     hold_scans: int
 
 
-def simulated(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], scans: int, seed: int, *,
-              budget: int) -> Iterator[Found | None]:  # fmt: skip
+def simulated(machine: Machine, judge: Judge, cells: Sequence[Cell], scans: int, seed: int) -> Iterator[Found | None]:
     """Runs with random inputs, some scans each; yields None now and then, and the run that met the goal, at last."""
     for number, hold_scans in enumerate(HOLD_SCANS):
         judge = judge.begun()
-        plc = Plc(image, cycle_ns, budget=budget, engine="python")
+        plc = machine.plc()
         random = Random(f"{seed} {number}")
+        times_ns = machine.random_times(random, hold_scans)
         writer = InputWriter(plc, cells)
         values = RandomInputs(writer, random)
-        inputs: Inputs = []
+        inputs = Inputs([], [])
         for _ in range(scans):
-            now = dict(inputs[-1]) if inputs else {}
+            now = dict(inputs.values[-1]) if inputs.values else {}
             for cell in cells:
-                if not inputs or random.randrange(hold_scans) == 0:
+                if not inputs.values or random.randrange(hold_scans) == 0:
                     now[cell] = values.value(cell)
-            inputs.append(now)
+            inputs.values.append(now)
+            inputs.times_ns.append(next(times_ns))
             for cell, value in now.items():
                 writer.write(cell, value)
-            plc.scan()
+            plc.scan(inputs.times_ns[-1])
             if not judge.kept(plc):
                 break
             if judge.met(plc):
@@ -174,20 +214,21 @@ def simulated(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], 
                 yield None
 
 
-def sampled(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], state: dict[Term, Cell], scans: int, seed: int, *,
-            budget: int) -> list[Sample]:  # fmt: skip
+def sampled(machine: Machine, judge: Judge, cells: Sequence[Cell], state: dict[Term, Cell], scans: int,
+            seed: int) -> list[Sample]:  # fmt: skip
     """States behind scans of random runs: the values of the cells `state`."""
     found: list[Sample] = []
     for number, hold_scans in enumerate(HOLD_SCANS[:3] * 2):
-        plc = Plc(image, cycle_ns, budget=budget, engine="python")
+        plc = machine.plc()
         random = Random(f"states {seed} {number}")
+        times_ns = machine.random_times(random, hold_scans)
         writer = InputWriter(plc, cells)
         values = RandomInputs(writer, random)
         for _ in range(scans):
             for cell in cells:
                 if not plc.scans or random.randrange(hold_scans) == 0:
                     writer.write(cell, values.value(cell))
-            plc.scan()
+            plc.scan(next(times_ns))
             if plc.trap or not judge.kept(plc):
                 break
             seen: Values = {variable: writer.read(cell) for variable, cell in state.items()}
@@ -195,24 +236,25 @@ def sampled(image: Image, cycle_ns: int, judge: Judge, cells: Sequence[Cell], st
     return found
 
 
-def replayed(image: Image, cycle_ns: int, judge: Judge, inputs: Inputs, is_shortest: bool, *, budget: int,
-             plc: Plc | None = None) -> Run | None:  # fmt: skip
+def replayed(machine: Machine, judge: Judge, inputs: Inputs, is_shortest: bool) -> Run | None:
     """The run with these inputs, done on the engine; None if it does not meet the goal in its last scan, or earlier only."""
-    judge = judge.begun()
-    plc = plc or Plc(image, cycle_ns, budget=budget, engine="python")
-    writer = InputWriter(plc, list(inputs[0]) if inputs else [])
+    judge, plc = judge.begun(), machine.plc()
+    writer = InputWriter(plc, list(inputs.values[0]) if inputs.values else [])
     writes: list[dict[Place, Value]] = []
-    for number, now in enumerate(inputs):
-        before = inputs[number - 1] if number else {cell: writer.read(cell) for cell in now}
+    for number, now in enumerate(inputs.values):
+        before = inputs.values[number - 1] if number else {cell: writer.read(cell) for cell in now}
         changed = [cell for cell, value in now.items() if value != before[cell]]
         for cell in changed:
             writer.write(cell, now[cell])
         writes.append({place: plc.read(place) for cell in changed for place in writer.places[cell]})
-        plc.scan()
+        plc.scan(inputs.times_ns[number])
         if not judge.kept(plc):
             return None
         if judge.met(plc):
-            return Run(tuple(writes), cycle_ns, is_shortest, plc.trap) if number == len(inputs) - 1 else None
+            is_last = number == len(inputs) - 1
+            run = Run(tuple(writes), tuple(inputs.times_ns), machine.cycle_ns, is_shortest, plc.trap, judge.waiting.since_ns,
+                      machine.longest_ns > machine.cycle_ns)  # fmt: skip
+            return run if is_last else None
         if plc.trap:
             return None
     return None
@@ -220,7 +262,7 @@ def replayed(image: Image, cycle_ns: int, judge: Judge, inputs: Inputs, is_short
 
 def repeated(plc: Plc, run: Run) -> None:
     """Does a run again on a PLC that has not scanned yet."""
-    for writes in run.writes:
+    for writes, now_ns in zip(run.writes, run.times_ns, strict=True):
         for place, value in writes.items():
             plc.write(place, value)
-        plc.scan()
+        plc.scan(now_ns)

@@ -16,7 +16,7 @@ PROOFS = Cache("proofs", b"fbvm proof 1\n", 4 << 20)
 
 def proved_once(image: Image, question: Question, limits: Limits) -> Verdict:
     """The answer to a question; a proof is kept and not made again.  Raises what `prove` raises."""
-    name = name_of((_methods(), image.fingerprint, str(limits.cycle_ns), *_asked(image, question)))
+    name = name_of((_methods(), image.fingerprint, str(limits.cycle_ns), str(limits.longest_ns), *_asked(image, question)))
     if (known := PROOFS.read(name)) is not None:
         found = json.loads(known)
         return Verdict(question, PROVED, found["how"], found["scans"], None, (), tuple(found["notes"]))

@@ -8,7 +8,7 @@ from fbvm.base.data import data_folder
 from fbvm.code.image import Image
 from fbvm.code.shapes import statements
 from fbvm.prove.bounded import Goal
-from fbvm.prove.encoding.scan import FixedCycle
+from fbvm.prove.encoding.clocks import Clock
 from fbvm.prove.encoding.summary import Summary
 from fbvm.prove.invariants import balanced
 from fbvm.prove.solver import SAT, Solver
@@ -18,7 +18,7 @@ STEPS = (1, 4, 16, 64)
 """Scans after which the solver is asked."""
 
 
-def unreached(summary: Summary, goal: Goal, clock: FixedCycle, scans: int, expired: Callable[[], bool]) -> list[int]:
+def unreached(summary: Summary, goal: Goal, clock: Clock, scans: int, expired: Callable[[], bool]) -> list[int]:
     """The sites of the user's statements that no run of so many scans reaches, in the order of the source."""
     image, terms = summary.image, summary.terms
     own = _own_files(image)
@@ -29,7 +29,7 @@ def unreached(summary: Summary, goal: Goal, clock: FixedCycle, scans: int, expir
     return sorted(missing, key=lambda site: (image.sites[site].file, image.sites[site].line))
 
 
-def _unmet(summary: Summary, goal: Goal, clock: FixedCycle, sites: list[int], scans: int,
+def _unmet(summary: Summary, goal: Goal, clock: Clock, sites: list[int], scans: int,
            expired: Callable[[], bool]) -> list[int]:  # fmt: skip
     """The sites of some that no run of so many scans reaches, as far as the solver tells."""
     terms = summary.terms

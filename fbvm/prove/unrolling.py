@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from fbvm.prove.encoding.clocks import Clock, Later
 from fbvm.prove.encoding.rewriting import cone, leaves, substituted
-from fbvm.prove.encoding.scan import FixedCycle, Signal
+from fbvm.prove.encoding.scan import Signal
 from fbvm.prove.encoding.summary import Summary
 from fbvm.prove.encoding.terms import Term
 
@@ -53,30 +54,15 @@ class Unrolling:
         self.state.append(dict(zip(self.cone, found[len(self.wanted):], strict=True)))
 
 
-def from_power_on(summary: Summary, wanted: Sequence[Term], clock: FixedCycle) -> Unrolling:
-    """A run from power-on on, in a fixed cycle."""
+def from_power_on(summary: Summary, wanted: Sequence[Term], clock: Clock) -> Unrolling:
+    """A run from power-on on."""
     return Unrolling(summary, wanted, clock.value)
 
 
-MOST_NOW_NS = 1 << 60
-"""Times before which proofs hold: 36 years after power-on."""
-
-
-def from_anywhere(summary: Summary, wanted: Sequence[Term], cycle_ns: int) -> tuple[Unrolling, list[Term]]:
-    """Scans from any state on, the first scan after power-on left out; and what is known of them.
-
-    What clock pulses and intervals of tasks are is not known there."""
-    terms = summary.terms
-    now = terms.variable(("now", "anywhere"), 64)
-
-    def signal(number: int, signal: Signal) -> Term | None:
-        if signal[0] == "first":
-            return terms.false
-        return terms.add(now, terms.constant(64, number * cycle_ns)) if signal[0] == "now" else None
-
-    state = {variable: variable for variable in cone(summary.next, wanted)}
-    facts = [terms.less(terms.constant(64, cycle_ns), now, True, True), terms.less(now, terms.constant(64, MOST_NOW_NS), True)]
-    return Unrolling(summary, wanted, signal, state), facts
+def from_anywhere(summary: Summary, wanted: Sequence[Term], clock: Clock) -> tuple[Unrolling, Later]:
+    """Scans from any state on, the first scan after power-on left out; and what is known of their times."""
+    later = clock.later()
+    return Unrolling(summary, wanted, later.signal, {variable: variable for variable in cone(summary.next, wanted)}), later
 
 
 def variables_in(terms: Iterable[Term]) -> set[Term]:

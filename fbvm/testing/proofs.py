@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 
 from fbvm.base.types import StructType
 from fbvm.code.image import Image
+from fbvm.prove.cycle import cycle_bounds
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, Question, Verdict
@@ -29,13 +30,14 @@ class NotProved(AssertionError):
 
 
 def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False, assume: str | Sequence[str] = (),
-           free: str | Sequence[str] = (), scans: int = 1000, seconds: float = 60) -> Verdict:  # fmt: skip
+           free: str | Sequence[str] = (), scans: int = 1000, seconds: float = 60, cycle: str = "") -> Verdict:  # fmt: skip
     """Asserts that a property of the block or program of a rig holds in every run from power-on.
 
     One of `never`, `always` (conditions, as `until` takes them) and `no_trap` says which.  Inputs of a block or of a program
     are free in each scan; `free` names others.  `assume` are conditions that all runs keep.  `scans` is how far to look
-    where there is no proof, `seconds` how long.  Stubs and units have no part in it.  A proof is kept on disk until the program
-    or the property changes.
+    where there is no proof, `seconds` how long.  `cycle` is the time between two scans, that of the rig unless given:
+    `5ms..50ms` lets any time within these bounds pass.  Stubs and units have no part in it.  A proof is kept on disk until the
+    program or the property changes.
 
     Raises NotProved, and ValueError for a program that cannot be followed, for names that it does not have, or without exactly
     one property."""
@@ -50,7 +52,8 @@ def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False
     assumed = (assume,) if isinstance(assume, str) else tuple(assume)
     question = Question(kind, "" if kind == NO_TRAP else text, assumed, (*_inputs(subject.image, subject.prefix), *named),
                         subject.prefix)  # fmt: skip
-    limits = Limits(rig.plc.cycle_ns, scans, expired=time_limit(int(seconds * 1_000_000_000)))
+    cycle_ns, longest_ns = cycle_bounds(cycle) if cycle else (rig.plc.cycle_ns, 0)
+    limits = Limits(cycle_ns, scans, longest_ns=longest_ns, expired=time_limit(int(seconds * 1_000_000_000)))
     try:
         verdict = proved_once(subject.image, question, limits)
     except Refused as refused:

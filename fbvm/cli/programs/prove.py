@@ -24,6 +24,7 @@ from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove import equality
+from fbvm.prove.cycle import cycle_bounds, show_cycle
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, SpuriousRun, prove
 from fbvm.prove.pytest_text import pytest_text
@@ -34,11 +35,19 @@ from fbvm.prove.solver import SolverMissing
 from fbvm.run.time_limit import time_limit
 from fbvm.watch.paths import UnknownPlace
 from fbvm.watch.scanner import ConditionError
-from fbvm.watch.values import plain_value, show_time
+from fbvm.watch.values import plain_value
 
 BUDGET_NS = 60_000_000_000
 _COLOURS = {"proved": "green", "reached": "green"}
 _FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+def _cycle(value: str) -> tuple[int, int]:
+    """The shortest and the longest time between two scans.  Raises BadParameter."""
+    try:
+        return cycle_bounds(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
 
 
 @click.command("prove")
@@ -54,8 +63,8 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--assume", multiple=True, metavar="EXPRESSION", help="Look only at runs in which it holds behind every scan.")
 @click.option("--free", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST",
               help="Takes any value in each scan, as inputs do.")
-@click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
-              help="How often the PLC scans.")
+@click.option("--cycle", type=_cycle, default=str(CYCLE_NS // 1_000_000) + "ms", metavar="TIME|TIME..TIME", show_default="10ms",
+              help="How often the PLC scans; 5ms..50ms: any time within these bounds passes between two scans.")
 @click.option("--scans", type=click.IntRange(min=1), default=1000, show_default=True, metavar="N",
               help="Look no further than N scans after power-on where there is no proof for all.")
 @click.option("--budget", "budget_ns", type=time_ns, default=BUDGET_NS, show_default="1m", metavar="TIME",
@@ -92,7 +101,9 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         if not as_json:
             _print(image, verdict)
     if as_json:
-        say_json({"cycle_ns": options["cycle_ns"], "properties": [_as_dict(verdict) for verdict in verdicts]})
+        cycle_ns, longest_ns = options["cycle"]
+        rows = [_as_dict(verdict) for verdict in verdicts]
+        say_json({"cycle_ns": cycle_ns, "longest_cycle_ns": longest_ns, "properties": rows})
     if found := [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]:
         _keep(asked[-1][0], found, options, files, libraries, program)
     sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
@@ -116,7 +127,8 @@ def _equality(pair: tuple[str, str], files: Sequence[Path], libraries: Sequence[
 
 def _answered(image: Image, question: Question, options: dict[str, Any]) -> Verdict:
     """The answer to one question.  Ends the verb for one that cannot be answered."""
-    limits = Limits(options["cycle_ns"], options["scans"], options["seed"], time_limit(options["budget_ns"]))
+    cycle_ns, longest_ns = options["cycle"]
+    limits = Limits(cycle_ns, options["scans"], options["seed"], time_limit(options["budget_ns"]), longest_ns=longest_ns)
     try:
         with _told(str(question)) as tell:
             return prove(image, question, limits, tell)
@@ -153,6 +165,7 @@ def _as_dict(verdict: Verdict) -> dict[str, object]:
     if run := verdict.run:
         found["run"] = {
             "scans": run.scans, "shortest": run.is_shortest, "trap": run.trap.code if run.trap else None,
+            "times_ns": [*run.times_ns],
             "writes": [{"scan": number, "values": {place.name: plain_value(place.type, value) for place, value in writes.items()}}
                        for number, writes in enumerate(run.writes) if writes],
         }  # fmt: skip
@@ -176,7 +189,7 @@ def _record(image: Image, verdict: Verdict, options: dict[str, Any], files: Sequ
     assert verdict.run is not None
     about = {"journal": None, "trace": options["trace"], "selected": (), "verify": False, "depth": "scans"}
     plc = Plc(image, verdict.run.cycle_ns)
-    with record_run(about, {"proof": str(verdict.question), "cycle": show_time(verdict.run.cycle_ns)}) as recorded:
+    with record_run(about, {"proof": str(verdict.question), "cycle": show_cycle(*options["cycle"])}) as recorded:
         text = program_text(files, libraries, program=program, drawn=False, e_banks=(), **compile_options(files))
         recorded.add(files[0].stem, plc, described(plc, text, about, files, libraries))
         repeated(plc, verdict.run)

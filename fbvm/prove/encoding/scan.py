@@ -17,24 +17,22 @@ from fbvm.machine.scan.clock_words import (
     FREE_COUNTERS,
     MAX_CYCLE_TIME,
     PERIODS_NS,
-    TENTH_MS_NS,
 )
 from fbvm.prove.encoding.cells import Contents
 from fbvm.prove.encoding.execution import Execution, State, Trapped
 from fbvm.prove.encoding.expressions import EXPRESSION_ROWS
 from fbvm.prove.encoding.statements import STATEMENT_ROWS, call
-from fbvm.prove.encoding.terms import Term, Terms
+from fbvm.prove.encoding.terms import Term
 from fbvm.watch.paths import Place, find_place
 
 Signal = tuple[str, int]
 """What the machine tells a scan: a kind and a number.
 
-now 0: time in ns; first 0: the first scan; pulse N: clock pulse CFN; counter N: free counter AN; cycle 0 and 1: cycle time and
-the longest one, in 0.1 ms; grid N: the interval of task N has passed; level N: what SINGLE of task N was in the scan before;
-fresh N: task N has not been executed yet."""
-WIDTHS = {"now": 64, "first": 0, "pulse": 0, "counter": 16, "cycle": 32, "grid": 0, "level": 0, "fresh": 0}
+now 0: time in ns; passed 0: time since the scan before; first 0: the first scan; pulse N: clock pulse CFN; counter N: free
+counter AN; cycle 0 and 1: cycle time and the longest one, in 0.1 ms; grid N: the interval of task N has passed; level N: what
+SINGLE of task N was in the scan before; fresh N: task N has not been executed yet."""
+WIDTHS = {"now": 64, "passed": 64, "first": 0, "pulse": 0, "counter": 16, "cycle": 32, "grid": 0, "level": 0, "fresh": 0}
 Signals = Callable[[Signal], Term]
-MOST_CYCLE_TENTHS = (1 << 32) - 1
 
 
 @dataclass
@@ -142,42 +140,3 @@ def _word(contents: Contents, word: int, value: Callable[[], Term]) -> None:
     offset = AREAS["A"].offset + 2 * word
     if offset in contents.partition.at or offset + 1 in contents.partition.at:
         contents.write(offset, 2, value(), contents.terms.true)
-
-
-# --- a fixed cycle ----------------------------------------------------------------------------------------------------
-
-
-class FixedCycle:
-    """What the machine says in each scan of a run whose scans begin every `cycle_ns`."""
-
-    def __init__(self, terms: Terms, tasks: tuple[TaskRow, ...], cycle_ns: int) -> None:
-        self._terms, self._tasks, self.cycle_ns = terms, tasks, cycle_ns
-        self._grids: list[list[bool]] = []
-        self._next_ns = [0] * len(tasks)
-
-    def value(self, number: int, signal: Signal) -> Term | None:
-        """A signal in the scan of a number, from 0 on; None for what depends on the scans before."""
-        kind, which = signal
-        now_ns = number * self.cycle_ns
-        tenths = min(self.cycle_ns // TENTH_MS_NS, MOST_CYCLE_TENTHS) if number else 0
-        if kind in ("level", "fresh"):
-            return None
-        if kind == "first":
-            return self._terms.boolean(number == 0)
-        if kind == "pulse":
-            return self._terms.boolean(now_ns % PERIODS_NS[which] >= PERIODS_NS[which] // 2)
-        if kind == "grid":
-            return self._terms.boolean(self._passed(number)[which])
-        value = {"now": now_ns, "counter": now_ns // dict(FREE_COUNTERS).get(which, 1), "cycle": tenths}[kind]
-        return self._terms.constant(WIDTHS[kind], value)
-
-    def _passed(self, number: int) -> list[bool]:
-        while len(self._grids) <= number:
-            now_ns, row = len(self._grids) * self.cycle_ns, []
-            for task, planned in enumerate(self._next_ns):
-                interval_ns = self._tasks[task].interval_ns
-                row.append(bool(interval_ns) and now_ns >= planned)
-                if row[-1]:
-                    self._next_ns[task] += ((now_ns - planned) // interval_ns + 1) * interval_ns
-            self._grids.append(row)
-        return self._grids[number]

@@ -4,7 +4,7 @@ State is what a scan can change; everything else keeps its initial value and is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -14,8 +14,10 @@ from fbvm.code.image import Image
 from fbvm.engine.depths import with_recursion_room
 from fbvm.prove.encoding.cells import BIT, Cell, Contents, Partition, Reshape, constant_of, initial_bytes
 from fbvm.prove.encoding.execution import Refused, TrapCondition
+from fbvm.prove.encoding.properties import place_term
 from fbvm.prove.encoding.scan import WIDTHS, Scanned, Signal, scan
 from fbvm.prove.encoding.terms import Term, Terms, never
+from fbvm.watch.paths import Place
 
 FRAMES_A_LEVEL = 8
 """Python frames that executing takes at most for each level of nested code."""
@@ -53,24 +55,25 @@ IsInput = Callable[[Cell], bool]
 
 
 def summarize(image: Image, budget: int, free: Iterable[tuple[int, int, int | None]] = (),
-              expired: Callable[[], bool] = never) -> Summary:
+              expired: Callable[[], bool] = never, seen: Sequence[Place] = ()) -> Summary:  # fmt: skip
     """The summary of a program.
 
     `budget` is the step budget of a scan; `free` are places (offset, bytes, bit or None) that are inputs besides those that
-    `input_places` finds.  Raises Refused for a program that cannot be followed, with the site, and TimeOver if `expired` answers
-    True before it is done."""
+    `input_places` finds; `seen` are places at which somebody looks behind a scan.  Raises Refused for a program that cannot be
+    followed, with the site, and TimeOver if `expired` answers True before it is done."""
     places = [*input_places(image), *free]
-    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_summarized, image, budget, places, expired))
+    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_summarized, image, budget, places, expired, seen))
 
 
-def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None]], expired: Callable[[], bool]) -> Summary:
+def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None]], expired: Callable[[], bool],
+                seen: Sequence[Place]) -> Summary:  # fmt: skip
     area = AREAS["CIO"]
     partition = Partition(bitwise=range(area.offset, area.offset + area.size_bytes))
     numbers: frozenset[int] = frozenset()
     for _ in range(MOST_ROUNDS):
         try:
             used = set(partition.used)
-            found = _Fixpoint(image, budget, partition, free, expired).summary()
+            found = _Fixpoint(image, budget, partition, free, expired, seen).summary()
             if partition.used == used:
                 found.terms.expired = never
                 return found
@@ -87,7 +90,8 @@ class _Fixpoint:
     """Finds what is state: at first nothing is, then what some scan leaves with another value than it may have had before."""
 
     def __init__(self, image: Image, budget: int, partition: Partition, free: list[tuple[int, int, int | None]],
-                 expired: Callable[[], bool]) -> None:  # fmt: skip
+                 expired: Callable[[], bool], seen: Sequence[Place]) -> None:  # fmt: skip
+        self.seen = [place for place in seen if not place.hops]
         self.image, self.budget, self.partition, self.terms = image, budget, partition, Terms(expired)
         self.power_on = initial_bytes(image.initial)
         self.free_bytes = {at for offset, size, bit in free if bit is None for at in range(offset, offset + size)}
@@ -143,6 +147,8 @@ class _Fixpoint:
             if self.is_input(cell):
                 contents.written[cell] = self._input(cell)
         begun = contents.child()
+        for place in self.seen:  # what only the property reads: the machine, too, writes where somebody looks
+            place_term(begun, place)
         return scan(self.image, begun, self.signal, self.budget)
 
     def _take(self, scanned: Scanned) -> None:

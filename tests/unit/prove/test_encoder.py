@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from functools import partial
-from itertools import groupby
+from itertools import accumulate, groupby
 from pathlib import Path
 from random import Random
 
@@ -89,6 +89,47 @@ def test_random_programs() -> None:
             except Refused:
                 refused += 1
     assert refused <= times(20, 80)
+
+
+CLOCKED = """PROGRAM Slow VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+PROGRAM Fast
+VAR
+    longest AT A262 : UDINT; last AT A264 : UDINT; n : INT; sum : UDINT; t : TON; First AT A200.11 : BOOL;
+END_VAR
+sum := sum + last + longest; n := n + 1; IF First THEN n := 100; END_IF t(IN := NOT t.Q, PT := T#35ms);
+END_PROGRAM
+PROGRAM Pulses VAR q : ARRAY[0..4] OF BOOL; w, x : WORD; a0 AT A0 : WORD; a1 AT A1 : WORD; END_VAR
+LADDER
+LD P_0_02s
+OUT q[0]
+LD P_0_1s
+OUT q[1]
+LD P_0_2s
+OUT q[2]
+LD P_1s
+OUT q[3]
+LD P_1min
+OUT q[4]
+LD P_On
+MOV a0 w
+MOV a1 x
+END_LADDER
+END_PROGRAM
+CONFIGURATION C RESOURCE R ON PLC
+TASK S(INTERVAL := T#70ms, PRIORITY := 2); TASK F(INTERVAL := T#10ms, PRIORITY := 1); TASK P(INTERVAL := T#1ms, PRIORITY := 3);
+PROGRAM A WITH S : Slow; PROGRAM B WITH F : Fast; PROGRAM C WITH P : Pulses;
+END_RESOURCE END_CONFIGURATION
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("longest_ns", [9_000_000, 45_000_000, 3_000_000_000])
+def test_scans_at_any_times(longest_ns: int) -> None:
+    image = compile_text(CLOCKED).image
+    assert image is not None
+    random = Random(longest_ns)
+    times_ns = [0, *accumulate(random.randint(1_000, longest_ns) for _ in range(60))]
+    compare_scans(image, CYCLE_NS, 60, BUDGET, times_ns=times_ns)
 
 
 def test_every_operation_has_its_row() -> None:

@@ -187,6 +187,13 @@ def test_the_first_cycle_flag_is_on_in_the_first_scan_only() -> None:
     assert prove(image, Question(ALWAYS, "Main.n = 1"), FEW).word == "proved"
 
 
+def test_what_the_machine_writes_is_seen_by_a_property_that_nobody_else_reads() -> None:
+    image = program("Q := In;", "Q : BOOL; First AT A200.11 : BOOL; Count AT A0 : UINT;")
+    assert prove(image, Question(REACH, "Main.First"), FEW).word == "reached"
+    verdict = prove(image, Question(NEVER, "Main.Count = 3"), FEW)
+    assert (verdict.word, verdict.run and verdict.run.scans, verdict.notes) == ("broken", 4, ())
+
+
 def test_clock_pulses_follow_the_cycle() -> None:
     verdict = prove(rung("LD P_0_1s"), Question(REACH, "Main.Q"), FEW)
     assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 6)

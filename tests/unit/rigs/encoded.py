@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import pairwise
 
 from fbvm.base.areas import AREAS, PAGE_BYTES
-from fbvm.code.image import Image
+from fbvm.code.image import Image, TaskRow
 from fbvm.engine.depths import with_recursion_room
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.cells import BIT, Cell, Contents, Partition, Reshape, constant_of
-from fbvm.prove.encoding.scan import FixedCycle, Scanned, Signal, scan
+from fbvm.prove.encoding.clocks import Clock, FixedCycle, FreeCycle
+from fbvm.prove.encoding.scan import Scanned, Signal, scan
 from fbvm.prove.encoding.terms import Term, Terms
 
 FRAMES_A_LEVEL = 8
@@ -20,11 +22,23 @@ MACHINE_BYTES = range(AREAS["A"].offset, AREAS["A"].offset + AREAS["A"].size_byt
 """Where the machine writes words that no program asks for."""
 
 
+class KnownTimes(FreeCycle):
+    """Scans that begin at known times, in the way of those at any time."""
+
+    def __init__(self, terms: Terms, tasks: tuple[TaskRow, ...], times_ns: Sequence[int]) -> None:
+        passed_ns = [after - before for before, after in pairwise(times_ns)]
+        super().__init__(terms, tasks, min(passed_ns), max(passed_ns))
+        self._times_ns = times_ns
+
+    def passed(self, number: int, *, later: bool = False) -> Term:
+        return self.terms.constant(64, self._times_ns[number] - self._times_ns[number - 1] if number else 0)
+
+
 class Encoded:
     """Scans of an image by the encoder, over the memory that a PLC has before each."""
 
-    def __init__(self, image: Image, cycle_ns: int, budget: int) -> None:
-        self.image, self.cycle_ns, self.budget = image, cycle_ns, budget
+    def __init__(self, image: Image, cycle_ns: int, budget: int, times_ns: Sequence[int] = ()) -> None:
+        self.image, self.cycle_ns, self.budget, self.times_ns = image, cycle_ns, budget, times_ns
         self.carried: dict[Signal, bool] = {}
 
     def scan(self, number: int, memory: bytes) -> Scanned:
@@ -35,7 +49,9 @@ class Encoded:
 
     def _scan(self, number: int, memory: bytes) -> Scanned:
         terms, numbers = Terms(), frozenset[int]()
-        clock = FixedCycle(terms, self.image.tasks, self.cycle_ns)
+        clock: Clock = FixedCycle(terms, self.image.tasks, self.cycle_ns)
+        if self.times_ns:
+            clock = KnownTimes(terms, self.image.tasks, self.times_ns)
 
         def signal(asked: Signal) -> Term:
             known = clock.value(number, asked)
@@ -76,14 +92,17 @@ def differences(scanned: Scanned, before: bytes, plc: Plc) -> list[str]:
 
 
 def compare_scans(image: Image, cycle_ns: int, scans: int, budget: int,
-                  write: Callable[[Plc, int], None] = lambda plc, number: None) -> None:  # fmt: skip
-    """Asserts that the encoder does so many scans as the engine does; `write` writes inputs before each."""
-    plc, encoded = Plc(image, cycle_ns, budget=budget, engine="python"), Encoded(image, cycle_ns, budget)
+                  write: Callable[[Plc, int], None] = lambda plc, number: None,
+                  times_ns: Sequence[int] = ()) -> None:  # fmt: skip
+    """Asserts that the encoder does so many scans as the engine does; `write` writes inputs before each.
+
+    They begin every `cycle_ns`, or at `times_ns`."""
+    plc, encoded = Plc(image, cycle_ns, budget=budget, engine="python"), Encoded(image, cycle_ns, budget, times_ns)
     for number in range(scans):
         write(plc, number)
         before = bytes(plc.memory.u8)
         scanned = encoded.scan(number, before)
-        plc.scan()
+        plc.scan(times_ns[number] if times_ns else None)
         assert differences(scanned, before, plc) == [], f"scan {number}"
         if plc.trap:
             break
