@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any, Protocol, TextIO
 
@@ -310,13 +311,14 @@ def _plain(value: int | str | bytes | Peer) -> int | str:
 
 def to_event(told: list[Any]) -> Event:
     """The event that `from_event` was given.  Raises ValueError, TypeError, LookupError or AttributeError for other data."""
-    kind = EVENTS.get(told[0])
-    rows = fields(kind) if kind else ()
-    if kind is None or len(told) != 1 + len(rows):
-        raise ValueError(f"{told[0]!r} with {len(told) - 1} values is no event")
-    return kind(*(_READ[str(row.type)](value) for row, value in zip(rows, told[1:], strict=True)))
+    kind, *values = told
+    readers = _READERS.get(kind)
+    if readers is None or len(values) != len(readers):
+        raise ValueError(f"{kind!r} with {len(values)} values is no event")
+    return EVENTS[kind](*[read(value) for read, value in zip(readers, values, strict=True)])
 
 
+@lru_cache
 def _peer(text: str) -> Peer:
     host, _, port = text.rpartition(":")
     return Peer(host, int(port))
@@ -324,3 +326,4 @@ def _peer(text: str) -> Peer:
 
 _READ: dict[str, Callable[[Any], Any]] = {"int": int, "str": str, "bytes": bytes.fromhex, "Peer": _peer}
 """From JSON to the type of a field."""
+_READERS = {name: tuple(_READ[str(row.type)] for row in fields(kind)) for name, kind in EVENTS.items()}

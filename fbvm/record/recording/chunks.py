@@ -147,7 +147,10 @@ class Chunk:
     def __init__(self, state: State, units: Sequence[UnitKeyframe], budget: int, follows: bool) -> None:
         self.state, self.units, self.budget, self.follows = state, units, budget, follows
         self.times = Times(state.scans)
+        self.numbers: list[int] = []
+        """The numbers of the scans that have inputs."""
         self.inputs: list[ScanInputs] = []
+        """Of each of them."""
         self.inputs_bytes = 0
         self.machine = False
         """True if machine code did some of the scans."""
@@ -158,19 +161,29 @@ class Chunk:
         return self.state.scans
 
     def add(self, inputs: ScanInputs) -> None:
-        """Adds the inputs of a scan; those of the last one are completed."""
+        """Adds the inputs of a scan behind those that are there."""
+        self.numbers.append(inputs.scan)
         self.inputs.append(inputs)
         self.inputs_bytes += inputs.size_bytes
 
-    def next_inputs(self, scan: int) -> ScanInputs | None:
-        """The inputs of this scan, or of the next one that has any."""
-        at = bisect_left(self.inputs, scan, key=lambda inputs: inputs.scan)
-        return self.inputs[at] if at < len(self.inputs) else None
+    def next_with_inputs(self, scan: int) -> int | None:
+        """The number of this scan, or of the next one, that has inputs."""
+        at = bisect_left(self.numbers, scan)
+        return self.numbers[at] if at < len(self.numbers) else None
+
+    def inputs_of(self, scan: int) -> ScanInputs | None:
+        """The inputs of a scan."""
+        at = bisect_left(self.numbers, scan)
+        return self._inputs_at(at) if at < len(self.numbers) and self.numbers[at] == scan else None
+
+    def _inputs_at(self, at: int) -> ScanInputs:
+        return self.inputs[at]
 
     def cut(self, scan: int) -> None:
         """Forgets this scan and those behind it."""
         self.times.cut(scan)
-        self.inputs = [inputs for inputs in self.inputs if inputs.scan < scan]
+        at = bisect_left(self.numbers, scan)
+        del self.numbers[at:], self.inputs[at:]
 
     def pack(self, base: Chunk) -> None:
         """Keeps of its memories what differs from those of `base`, an earlier chunk that is not packed, as long as both have the

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
-from contextlib import contextmanager
+from types import TracebackType
 
 from fbvm.record.recording.container import RecordingError
 
+DAMAGES = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, BufferError, MemoryError, StopIteration,
+           struct.error)  # fmt: skip
+"""What data of another form raises where it is read."""
 
-@contextmanager
-def damages(sentence: str) -> Iterator[None]:
+
+class damages:
     """For a `with` block that reads data which may have any form: what that raises is a RecordingError that begins with the
-    sentence."""
-    try:
-        yield
-    except RecordingError:
-        raise
-    except RecursionError:
-        raise RecordingError(f"{sentence}: it is nested too deeply") from None
-    except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, BufferError, MemoryError, StopIteration,
-            struct.error) as error:  # fmt: skip
-        raise RecordingError(f"{sentence}: {error}") from None
+    sentence.  A class, since a generator takes three times as long and there is one for each scan that is executed again."""
+
+    __slots__ = ("_sentence",)
+
+    def __init__(self, sentence: str) -> None:
+        self._sentence = sentence
+
+    def __enter__(self) -> None:
+        """Nothing to prepare."""
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if error is None or isinstance(error, RecordingError):
+            return
+        if isinstance(error, RecursionError):
+            raise RecordingError(f"{self._sentence}: it is nested too deeply") from None
+        if isinstance(error, DAMAGES):
+            raise RecordingError(f"{self._sentence}: {error}") from None

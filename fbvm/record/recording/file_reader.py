@@ -9,10 +9,10 @@ The program of a PLC is in the file as text.  It is compiled here, and executed 
 
 from __future__ import annotations
 
+import gc
 import json
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -155,6 +155,9 @@ class FileRecordedPlc(RecordedPlc):
     def program(self) -> Image | str:
         """The program, whose memory is laid out as in the recording; or a sentence that says why it cannot be executed here."""
         found = self._given or self._text.compiled(self._libraries)
+        if not gc.get_freeze_count():  # what compiling has made is old: no scan that is shown next waits for its collection
+            gc.freeze()
+            gc.unfreeze()
         if isinstance(found, str):
             return found
         if found.fingerprint == self.head["image"]:
@@ -252,23 +255,15 @@ class FileRecordedPlc(RecordedPlc):
             chunk = self._keyframes.chunk(payload, self._base)
             if chunk.first != blocks.first:
                 raise RecordingError(f"the keyframe of scan {blocks.first} says that it is of scan {chunk.first}")
-            last_ns = chunk.state.now_ns
             for segment in self._segments(blocks):
-                for _, time_ns, step_ns, scans in segment.times.rows(segment.first):
-                    if time_ns < last_ns:
-                        raise ValueError("time runs backwards")
-                    chunk.times.add(time_ns, scans, step_ns)
-                    last_ns = time_ns + (scans - 1) * step_ns
-                chunk.machine = chunk.machine or segment.machine
-                for inputs in segment.inputs:
-                    chunk.add(inputs)
+                chunk.add_segment(segment)
             if blocks.cut is not None:
                 chunk.cut(blocks.cut)
             return chunk
 
     def _segments(self, blocks: ChunkBlocks) -> Iterator[Segment]:
         for head in blocks.segments:
-            yield decode_scans(read_block(self._file, head), head.first, head.scans, self.memory_size)
+            yield decode_scans(read_block(self._file, head), head.first, head.scans)
 
     @cached_property
     def _keyframes(self) -> KeyframeReader:
@@ -285,17 +280,15 @@ class FileRecordedPlc(RecordedPlc):
         chunk = self.chunk(scan)
         if scan >= chunk.times.end and self._last:
             return self._last[1]
-        return chunk.next_inputs(scan)
+        return chunk.inputs_of(scan)
 
     def now_ns(self, scan: int) -> int:
         chunk = self.chunk(scan)
         last = self._last if scan >= chunk.times.end else None
         return last[0] if last else chunk.times.at(scan)
 
-    @contextmanager
-    def applying(self, scan: int) -> Iterator[None]:
-        with damages(f"the recording is damaged at scan {scan}"):
-            yield
+    def applying(self, scan: int) -> damages:
+        return damages(f"the recording is damaged at scan {scan}")
 
     # --- what comes out differently -----------------------------------------------------------------------------------
 

@@ -84,8 +84,9 @@ class FileScans(RecordedScans):
 
     def _tell(self, moment: Moment, follower: Follower) -> None:
         """Reports the end of a scan, and before it what passed the network as it was recorded."""
-        inputs = self._file.inputs(moment.scans)
-        if inputs and inputs.scan == moment.scans:
+        with self._file.applying(moment.scans):
+            inputs = self._file.inputs(moment.scans)
+        if inputs:
             for now_ns, _, event in inputs.traffic:
                 follower.event(moment, NetworkEvent(now_ns, event))
         follower.phase(moment, Phase.REFRESH)

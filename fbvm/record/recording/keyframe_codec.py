@@ -19,6 +19,7 @@ from fbvm.machine.scan.tasks import TaskScheduleState
 from fbvm.machine.state import Mode, State
 from fbvm.record.recording.chunks import Chunk, UnitKeyframe
 from fbvm.record.recording.plain_data import number, parts_of, payload_of, tagged, untagged
+from fbvm.record.recording.scan_codec import StoredChunk
 from fbvm.units.contract import Unit, UnitState
 from fbvm.watch.paths import Place, find_place
 from fbvm.watch.values import Value
@@ -78,7 +79,7 @@ class KeyframeReader:
             raise ValueError("a base that has a base")
         return self._memories(data["memories"], rest, ())
 
-    def chunk(self, payload: bytes, base_of: Callable[[int], Sequence[Snapshot]]) -> Chunk:
+    def chunk(self, payload: bytes, base_of: Callable[[int], Sequence[Snapshot]]) -> StoredChunk:
         """A keyframe, before it has scans.  `base_of` gives the memories of the keyframe at a byte of the file.
 
         Raises errors of several classes for other bytes."""
@@ -95,7 +96,7 @@ class KeyframeReader:
         units = [self._frame(own, *row) for row in data["units"]]
         state = State(memories[0], number(data["now_ns"]), number(data["scan"]), schedule, self._forces(data["forces"]),
                       Mode(data["mode"]), bool(data["first"]), None if trap is None else _trap(*trap))  # fmt: skip
-        return Chunk(state, units, number(data["budget"]), bool(data["follows"]))
+        return StoredChunk(state, units, number(data["budget"]), bool(data["follows"]), self._size)
 
     def _memories(self, rows: list[Any], rest: memoryview, base: Sequence[Snapshot]) -> list[Snapshot]:
         made, at = [], 0

@@ -35,7 +35,7 @@ def dump(data: object) -> bytes:
 
 def load(payload: bytes) -> Any:
     """The data that `dump` was given.  Raises ValueError, RecursionError, KeyError."""
-    return json.loads(payload, object_hook=_bytes)
+    return json.loads(payload, object_hook=_bytes if b'{"bytes":' in payload else None)  # a hook takes as long as the rest
 
 
 def payload_of(data: object, pages: Sequence[bytes] = ()) -> bytes:

@@ -47,7 +47,7 @@ class RecordedPlc(ABC):
 
     @abstractmethod
     def inputs(self, scan: int) -> ScanInputs | None:
-        """The inputs of a scan, or of the next one in its chunk that has any."""
+        """The inputs of a scan, if there are any."""
 
     @abstractmethod
     def now_ns(self, scan: int) -> int:

@@ -157,11 +157,10 @@ class PlcRecording(RecordedPlc):
         return self._chunks[bisect_right(self._chunks, scan, key=lambda chunk: chunk.first) - 1]
 
     def inputs(self, scan: int) -> ScanInputs | None:
-        """The inputs of a scan, or of the next one in its chunk that has any."""
-        found = self.chunk(scan).next_inputs(scan)
-        if found is None and self._has_begun and scan == self.scans.stop:
+        """The inputs of a scan, if there are any."""
+        if self._has_begun and scan == self.scans.stop:
             return self._pending
-        return found
+        return self.chunk(scan).inputs_of(scan)
 
     def now_ns(self, scan: int) -> int:
         """The time of a scan."""

@@ -163,8 +163,7 @@ class Replay:
     def _begin(self, number: int) -> None:
         """Executes a scan with its inputs."""
         recorded, plc = self._recorded, self.plc
-        inputs = recorded.inputs(number)
-        if inputs and inputs.scan == number:
+        if inputs := recorded.inputs(number):
             self._apply(inputs)
         plc.scan(recorded.now_ns(number))
 
@@ -188,9 +187,9 @@ class Replay:
         count, step_ns = chunk.times.regular(number)
         if count > 1:
             plc.cycle_ns = step_ns
-        inputs = chunk.next_inputs(number)
-        last = min(scan, number + count, inputs.scan if inputs else scan)
-        return last - number if self._recorded.now_ns(number) == plc.elapsed_ns else 0
+        with_inputs = chunk.next_with_inputs(number)
+        last = min(scan, number + count, scan if with_inputs is None else with_inputs)
+        return last - number if chunk.times.at(number) == plc.elapsed_ns else 0
 
     def _load(self, chunk: Chunk) -> None:
         """Puts the PLC into the state of a keyframe."""

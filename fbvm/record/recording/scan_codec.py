@@ -6,15 +6,43 @@ Events are written by the codec of `fbvm.net.journal`.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+from fbvm.machine.state import State
 from fbvm.net.journal import from_event, to_event
-from fbvm.record.recording.chunks import ScanInputs, Times, Writes
+from fbvm.record.recording.chunks import Chunk, ScanInputs, Times, UnitKeyframe, Writes
 from fbvm.record.recording.plain_data import number, parts_of, payload_of
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import TapEvent, TapKind
+
+
+class StoredChunk(Chunk):
+    """A chunk of a file.  The inputs of a scan are decoded when somebody asks for them, which of most scans nobody does."""
+
+    inputs: list[Any]
+
+    def __init__(self, state: State, units: Sequence[UnitKeyframe], budget: int, follows: bool, size: int) -> None:
+        super().__init__(state, units, budget, follows)
+        self._size = size
+
+    def add_segment(self, segment: Segment) -> None:
+        """Adds some scans behind those that are there.  Raises ValueError for times that are not in their order."""
+        times = self.times
+        last_ns = times.at(times.end - 1) if times.end > self.first else self.state.now_ns
+        for _, time_ns, step_ns, scans in segment.times.rows(segment.first):
+            if time_ns < last_ns:
+                raise ValueError("time runs backwards")
+            times.add(time_ns, scans, step_ns)
+            last_ns = time_ns + (scans - 1) * step_ns
+        self.machine = self.machine or segment.machine
+        self.numbers += segment.numbers
+        self.inputs += segment.inputs
+
+    def _inputs_at(self, at: int) -> ScanInputs:
+        return decode_inputs(self.inputs[at], self._size)
 
 
 @dataclass
@@ -24,7 +52,10 @@ class Segment:
     first: int
     """The number of the first of them."""
     times: Times
-    inputs: list[ScanInputs]
+    numbers: list[int]
+    """The numbers of the scans that have inputs."""
+    inputs: list[Any]
+    """Of each of them, for `decode_inputs`."""
     machine: bool
     """True if machine code did some of the scans behind the keyframe."""
     memory: int
@@ -40,8 +71,8 @@ def encode_scans(rows: list[list[int]], inputs: Sequence[ScanInputs], machine: b
     return payload_of(data, [array("I", memories).tobytes()] if memories else [])
 
 
-def decode_scans(payload: bytes, first: int, scans: int, size: int) -> Segment:
-    """The scans that `encode_scans` was given; `size` is that of the memory.
+def decode_scans(payload: bytes, first: int, scans: int) -> Segment:
+    """The scans that `encode_scans` was given; their inputs are not decoded yet.
 
     Raises errors of several classes for other bytes."""
     data, rest = parts_of(payload)
@@ -54,12 +85,11 @@ def decode_scans(payload: bytes, first: int, scans: int, size: int) -> Segment:
         at += count
     if at != first + scans or len(rest) not in (0, 4 * scans):
         raise ValueError(f"{at - first} scans where {scans} should be")
-    inputs = [decode_inputs(row, size) for row in data["inputs"]]
-    scans_with = [row.scan for row in inputs]
-    if sorted(set(scans_with)) != scans_with or (scans_with and not first <= scans_with[0] <= scans_with[-1] < at):
+    numbers = [number(row["scan"]) for row in data["inputs"]]
+    if sorted(set(numbers)) != numbers or (numbers and not first <= numbers[0] <= numbers[-1] < at):
         raise ValueError("inputs that belong to no scan, or are not in their order")
     memories = memoryview(rest).cast("I") if rest else ()
-    return Segment(first, times, inputs, bool(data["machine"]), number(data["memory"]), memories)
+    return Segment(first, times, numbers, data["inputs"], bool(data["machine"]), number(data["memory"]), memories)
 
 
 def _writes(writes: Writes) -> list[Any]:
@@ -88,17 +118,25 @@ def encode_inputs(inputs: ScanInputs) -> dict[str, Any]:
 
 
 def decode_inputs(row: Mapping[str, Any], size: int) -> ScanInputs:
-    """The inputs of a scan again.  Raises errors of several classes for other data."""
-    writes, results, refreshed = ([_write(size, *write) for write in row.get(name, ())]
-                                  for name in ("writes", "results", "refreshed"))  # fmt: skip
-    watch = row.get("watch")
-    return ScanInputs(
-        number(row["scan"]), writes, None if "forces" not in row else dict(row["forces"]),
-        number(row["budget"]) if "budget" in row else None,
-        {number(unit): dict(given) for unit, given in row.get("settings", ())},
-        {number(unit): [to_event(event) for event in events] for unit, events in row.get("events", ())},
-        results, [_passed(*passing) for passing in row.get("traffic", ())],
-        None if watch is None else (number(watch[0]), number(watch[1])), refreshed)  # fmt: skip
+    """The inputs of a scan again; `size` is that of the memory.  Raises errors of several classes for other data."""
+    made = ScanInputs(number(row["scan"]))
+    for name, data in row.items():
+        if name in _WRITES:
+            setattr(made, name, [_write(size, *write) for write in data])
+        elif read := _DECODED.get(name):
+            setattr(made, name, read(data))
+    return made
+
+
+_WRITES = ("writes", "results", "refreshed")
+_DECODED: dict[str, Callable[[Any], object]] = {
+    "forces": dict,
+    "budget": number,
+    "settings": lambda rows: {number(unit): dict(given) for unit, given in rows},
+    "events": lambda rows: {number(unit): [to_event(event) for event in events] for unit, events in rows},
+    "traffic": lambda rows: [_passed(*passing) for passing in rows],
+    "watch": lambda row: (number(row[0]), number(row[1])),
+}
 
 
 def _write(size: int, offset: int, data: str) -> tuple[int, bytes]:
@@ -116,5 +154,13 @@ def _passing(now_ns: int, unit: str, event: TapEvent) -> list[Any]:
 
 def _passed(now_ns: int, unit: str, kind: str, host: str, port: int, other: str, other_port: int, out: int, mirrored: int,
             data: str) -> tuple[int, str, TapEvent]:  # fmt: skip
-    return number(now_ns), str(unit), TapEvent(TapKind(kind), Peer(str(host), int(port)), Peer(str(other), int(other_port)),
-                                                bool(out), bytes.fromhex(data), bool(mirrored))  # fmt: skip
+    event = TapEvent(_KINDS[kind], _peer(host, port), _peer(other, other_port), bool(out), bytes.fromhex(data), bool(mirrored))
+    return number(now_ns), str(unit), event
+
+
+_KINDS = {kind.value: kind for kind in TapKind}
+
+
+@lru_cache
+def _peer(host: str, port: int) -> Peer:
+    return Peer(str(host), int(port))
