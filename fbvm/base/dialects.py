@@ -75,6 +75,8 @@ class Dialect:
     bits_by_name: bool = False
     generic_functions: bool = False
     own_in_outs: bool = False
+    steps_apart: bool = False
+    locals_hide_results: bool = False
 
 
 QUESTIONS = {
@@ -174,6 +176,10 @@ QUESTIONS = {
     "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
     "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
                     "a variable of the program, with a warning (S0193)"),
+    "steps_apart": ("a step and a variable of one name: Init", "an error",
+                    "Init is the variable, Init.X and Init.T are the flags of the step, with a warning (S0193)"),
+    "locals_hide_results": ("FUNCTION Test with VAR Test: a local variable named as the function", "an error",
+                            "the variable, and the function returns the first value of its type, with a warning (S0193)"),
     "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -188,7 +194,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
-                   padding_is_written=True)
+                   padding_is_written=True, steps_apart=True, locals_hide_results=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

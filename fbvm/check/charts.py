@@ -31,7 +31,7 @@ class _Rules:
         """True if no variable has the name of a step or an action; if one has, that is reported already."""
         name = declared.names[0]
         found = self.pou.variables.get(fold(name.text))
-        return found is not None and found.node is name
+        return found is not None and name in (found.node, found.step.node if found.step is not None else None)
 
     def transition(self, transition: sfc.Transition) -> bool:
         return self._is_bool(transition.condition, "a transition")

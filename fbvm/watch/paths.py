@@ -224,7 +224,7 @@ def _top(symbols: Mapping[str, Field], text: str) -> tuple[Field, int] | None:
 
 def _walk(field: Field, at: int, text: str) -> Place:
     """Follows a path step by step through the types, from a symbol on."""
-    place = _of(Place(field.name, field.type, 0), field, field.name, field.offset)
+    place = whole = _of(Place(field.name, field.type, 0), field, field.name, field.offset)
     dot = False
     while at < len(text.rstrip()):
         match = _TOKEN.match(text, at)
@@ -234,11 +234,23 @@ def _walk(field: Field, at: int, text: str) -> Place:
         if match["dot"]:
             dot = True
         else:
-            place = _step(place, match)
+            whole, place = place, _step(_named_step(whole, place, match["name"]), match)
             dot = False
     if dot:
         raise UnknownPlace(f"{text.strip()!r} ends too early")
     return place
+
+
+def _named_step(whole: Place, place: Place, member_name: str | None) -> Place:
+    """In front of `.X`: the flags of the step that is called as the variable `place` of the POU `whole`; else `place`.
+
+    See check/declarations/same_names.py."""
+    if member_name is None or not isinstance(whole.type, StructType) or whole is place:
+        return place
+    flags = whole.type.member(f"{place.name.rpartition('.')[2]} step")
+    if flags is None or not isinstance(flags.type, StructType) or flags.type.member(member_name) is None:
+        return place
+    return member(whole, flags.name)
 
 
 def _step(place: Place, match: re.Match[str]) -> Place:

@@ -23,7 +23,7 @@ from fbvm.base.types import (
     fold,
     followed,
 )
-from fbvm.check.declarations import construction, initializers
+from fbvm.check.declarations import construction, initializers, same_names
 from fbvm.check.declarations.hidden import add_hidden
 from fbvm.check.declarations.inheritance import refuse_abstract, resolve_head
 from fbvm.check.declarations.specs import resolve
@@ -314,18 +314,15 @@ class _Interface:
 
     def _register(self, variable: Variable) -> None:
         other = self.pou.variables.get(fold(variable.name))
-        if other is None and fold(variable.name) == fold(self.pou.tree.name.text) and self.pou.tree.result is not None:
-            self._error("S0202", variable.node, f"{variable.name} is the name of the function itself",
-                        "that name stands for the result; rename the variable")
-            self.pou.failed_names.add(fold(variable.name))
+        if other is None and fold(variable.name) == fold(self.pou.tree.name.text) and self.pou.tree.result is not None and \
+                not same_names.hides_result(self.scope, self.pou, variable):
             return
         if other is not None and other.owner is not self.pou and not self.pou.is_routine and other.owner is not None:
             self._error("S1005", variable.node, f"{other.owner.name} has a variable {other.name} already, which {self.pou.name} "
                         "inherits", "rename it", (other.source, other.node.start, "declared here"))
             return
         if other is not None:
-            self._error("S0202", variable.node, f"{variable.name} is declared twice in {self.pou.name}", "",
-                        (other.source, other.node.start, "first declared here"))
+            same_names.declared_twice(self.scope, self.pou, variable, other)
             return
         self.pou.variables[fold(variable.name)] = variable
         self.pou.order.append(variable)

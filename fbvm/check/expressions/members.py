@@ -51,7 +51,7 @@ def member(scope: Scope, expr: tree.Member, want: Type | None) -> Type | None:
     is_property, kind = objects.value_of_property(scope, expr)
     if is_property:
         return kind
-    whole = objects.instance_of(scope, of) if objects.is_self(scope, of) else scope.infer(of)
+    whole = objects.instance_of(scope, of) if objects.is_self(scope, of) else _step_of(scope, expr) or scope.infer(of)
     if isinstance(whole, RefType) and whole.interface:
         whole = whole.target
     if isinstance(whole, StructType):
@@ -59,6 +59,18 @@ def member(scope: Scope, expr: tree.Member, want: Type | None) -> Type | None:
     if isinstance(whole, AnyType):
         return _of_any(scope, expr, whole)
     return _of_value(scope, expr, whole, want) if whole is not None else None
+
+
+def _step_of(scope: Scope, expr: tree.Member) -> Type | None:
+    """The type of the flags of a step, if `expr` is one of them and a variable has the step's name; None for all else."""
+    if not isinstance(expr.of, tree.NameRef) or scope.pou is None:
+        return None
+    variable = scope.pou.variables.get(fold(expr.of.text))
+    if variable is None or variable.step is None or not isinstance(variable.step.type, StructType) or \
+            variable.step.type.member(expr.name.text) is None:
+        return None
+    scope.facts.variables[expr.of], scope.facts.types[expr.of] = variable.step, variable.step.type
+    return variable.step.type
 
 
 def _report_unlisted(scope: Scope, space: str, name: tree.Name) -> None:

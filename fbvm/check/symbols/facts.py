@@ -64,6 +64,8 @@ class Variable:
     role: str = ""
     """"step" or "action" for the flags of one, which programs only read."""
     written: bool = False
+    step: Variable | None = None
+    """Of a variable that is called as a step of its POU, in a dialect that takes this: the flags of the step."""
     eno: Variable | None = None
     """Of an instance of whose last call `name.ENO` is read: the hidden variable that says whether it ran."""
     space: str = ""

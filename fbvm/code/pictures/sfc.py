@@ -43,5 +43,6 @@ def _condition(transition: sfc.Transition) -> Node:
 def _flag(pou: Pou, step: sfc.Step) -> int:
     """The offset of the flag of a step (`step.X`) in an instance."""
     variable = pou.variables[fold(step.name.text)]
+    variable = variable.step or variable
     assert isinstance(variable.type, StructType)
     return variable.offset + variable.type.fields["X"].offset

@@ -31,6 +31,8 @@ from fbvm.syntax.tree import (
     While,
 )
 
+_TYPES = frozenset(ELEMENTARY) - {"T", "D", "LT", "LD"}
+"""Words that cannot be names of variables; the four short ones mean a type in front of `#` only."""
 Value = tuple[Expr, Expr | None]
 Branch = tuple[Expr, Block]
 
@@ -96,7 +98,7 @@ class Statements(Expressions):
             return False
         if "\n" in self.source.text[label.start:first.start]:
             return False
-        if isinstance(first, NameRef) and first.text.upper() in {*ELEMENTARY, "STRING", "WSTRING"}:
+        if isinstance(first, NameRef) and first.text.upper() in _TYPES:
             self.report("S0101", label.start, first.end, "a declaration stands in front of all statements",
                         f"write it between VAR and END_VAR: {value.text} : {first.text.upper()};", False)
             return True
