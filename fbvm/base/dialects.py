@@ -76,6 +76,8 @@ class Dialect:
     generic_functions: bool = False
     own_in_outs: bool = False
     steps_apart: bool = False
+    times_are_numbers: bool = False
+    short_names: bool = False
     locals_hide_results: bool = False
 
 
@@ -176,6 +178,9 @@ QUESTIONS = {
     "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
     "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
                     "a variable of the program, with a warning (S0193)"),
+    "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another of "
+                          "these is needed", "an error that names the conversion", "its nanoseconds"),
+    "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
     "steps_apart": ("a step and a variable of one name: Init", "an error",
                     "Init is the variable, Init.X and Init.T are the flags of the step, with a warning (S0193)"),
     "locals_hide_results": ("FUNCTION Test with VAR Test: a local variable named as the function", "an error",
@@ -210,7 +215,7 @@ _ROWS = (
             ("codesys/blocks", "matiec/additional"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
-            constants_wrap=True),
+            constants_wrap=True, short_names=True),
     Dialect("rusty", "programs for RuSTy", reals_of_other_widths=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
@@ -218,7 +223,7 @@ _ROWS = (
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bits_by_name=True, zero_durations=True,
-            generic_functions=True),
+            generic_functions=True, times_are_numbers=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

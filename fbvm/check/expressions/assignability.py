@@ -65,6 +65,8 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
     kind, target = base(kind), base(target)
     if isinstance(kind, RefType) and kind.moves and target in (ELEMENTARY["ULINT"], ELEMENTARY["LWORD"]):
         return dialect.integers_and_bits  # a pointer has 64 bits
+    if dialect.times_are_numbers and _holds_nanoseconds(kind, target):
+        return True
     return dialect.narrowing and _narrows(kind, target) or dialect.integers_and_bits and _holds_bits(kind, target)
 
 
@@ -82,6 +84,13 @@ def _holds_bits(kind: Type, target: Type) -> bool:
     if is_any(target, "ANY_REAL"):
         return is_any(kind, "ANY_INT", "ANY_REAL")
     return is_any(kind, "ANY_INT", "ANY_BIT") and is_any(target, "ANY_INT", "ANY_BIT") and kind.bits <= target.bits
+
+
+def _holds_nanoseconds(kind: Type, target: Type) -> bool:
+    """True for a conversion between durations, dates and moments, and between these and integers or bit strings."""
+    times = [is_any(each, *_TIMES) for each in (kind, target)]
+    return any(times) and all(time or is_any(each, "ANY_INT", "ANY_BIT") and each != BOOL
+                              for time, each in zip(times, (kind, target), strict=True))
 
 
 def as_number(kind: Type, dialect: Dialect) -> Type:

@@ -10,10 +10,13 @@ from fbvm.syntax import tree
 
 RESERVED = frozenset(ELEMENTARY) | {"STRING", "WSTRING", "TOD", "LTOD", "DT", "LDT"}
 """The short forms T, D, LT and LD stay usable: they mean something in front of `#` only."""
-
-
-EDITION_3 = frozenset(("LTIME", "LDT", "LTOD", "LDATE", "LDATE_AND_TIME", "LTIME_OF_DAY", "CHAR", "WCHAR"))
-"""Types that the second edition does not have: its programs may use their names."""
+_TAKEN = {
+    "names_of_edition_2": (("LTIME", "LDT", "LTOD", "LDATE", "LDATE_AND_TIME", "LTIME_OF_DAY", "CHAR", "WCHAR"),
+                           "a type of the third edition"),
+    "short_names": (("DT", "TOD", "LDT", "LTOD"), "the short name of a type"),
+}
+"""By switch of a dialect, the words that programs may declare then, and what these are: types that the second edition does not
+have, and short names of types."""
 
 
 def refuse_reserved(report: Report, source: Source, name: tree.Name, dialect: Dialect) -> None:
@@ -22,9 +25,10 @@ def refuse_reserved(report: Report, source: Source, name: tree.Name, dialect: Di
     Members of structures may have one: they stand behind a point."""
     if fold(name.text) not in RESERVED:
         return
-    newer = fold(name.text) in EDITION_3
-    if not newer or not dialect.names_of_edition_2:
+    switches = {switch: what for switch, (words, what) in _TAKEN.items() if fold(name.text) in words}
+    taken = [what for switch, what in switches.items() if getattr(dialect, switch)]
+    if not taken:
         report.add("S0101", source, name, f"`{name.text}` is a reserved word and cannot be a name",
-                   "choose another name" + (f", or take {takers('names_of_edition_2')}" if newer else ""))
+                   "".join(("choose another name", *(f", or take {takers(switch)}" for switch in switches))))
     elif not source.library:
-        report.add("S0193", source, name, f"`{name.text}` is a type of the third edition, and a name here")
+        report.add("S0193", source, name, f"`{name.text}` is {taken[0]}, and a name here")
