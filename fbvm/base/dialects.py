@@ -86,7 +86,7 @@ QUESTIONS = {
     "lenient_positions": ("a length below 0 or a position below 1 in LEFT, MID, DELETE ...", "stops the program (R0108)",
                           "0, and position 1"),
     "seconds": ("TIME_TO_REAL(T#5s), INT_TO_TIME(5000): the unit", "milliseconds", "seconds"),
-    "hexadecimal_bits": ("DWORD_TO_STRING(255)", "'255'", "'16#FF'"),
+    "hexadecimal_bits": ("DWORD_TO_STRING(255)", "'255'", "'16#ff'"),
     "real_bits_by_value": ("REAL_TO_DWORD(2.0), DWORD_TO_REAL(2), LREAL_TO_LWORD, LWORD_TO_LREAL",
                            "the bits stay: 16#40000000, 2.8E-45", "the value: 2, 2.0"),
     "reals_of_other_widths": ("WORD_TO_REAL(7), REAL_TO_BYTE, LREAL_TO_DWORD: a bit string of another width than the real",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from drawings import document, pou
+from drawings import block, document, imported, pou, result, value, variable
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -94,3 +94,11 @@ def test_declarations_tasks_and_texts_survive_the_way_there_and_back() -> None:
     assert "PROGRAM Two WITH Slow : Main;" in texts["C.st"]
     again = export_xml([Source(name, text) for name, text in back.files.items()])
     assert import_xml((again.text or "").encode()).files == back.files
+
+
+def test_the_difference_of_two_moments_is_a_duration_under_the_short_name_of_their_type_too() -> None:
+    body = (block(1, "RTC", "", "Q,CDT", "r", at="0,0") + value(2, "d", at="0,60") + value(3, "TRUE", at="0,30")
+            + block(4, "SUB", "EN=3 IN1=1.CDT IN2=2", "ENO,OUT", at="90,0") + value(5, "T#1h", at="90,60")
+            + block(6, "LT", "EN=4.ENO IN1=4.OUT IN2=5", "ENO,OUT", at="180,0") + result(7, "6.OUT", "b", at="270,0"))
+    made = imported(pou(body, variable("b") + variable("d", "DT") + variable("r", "RTC"), language="FBD"))
+    assert "Result_4 : TIME;" in made.files["Main.st"]

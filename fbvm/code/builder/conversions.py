@@ -117,7 +117,7 @@ def _to_text(emitter: Emitter, source: Type, node: Node) -> Node:
 
 
 def _hexadecimal(emitter: Emitter, node: Node) -> Node:
-    """A bit string as `16#FF`: a digit for each four bits, without leading zeros."""
+    """A bit string as `16#ff`, as matiec writes it (iec_std_lib.h): a digit for each four bits, without leading zeros."""
     form = node[1]
     value = emitter.to_temporary(node if form == "u64" else ("convert", "u64", form, node))
     digits: list[Node] = []
@@ -125,7 +125,7 @@ def _hexadecimal(emitter: Emitter, node: Node) -> Node:
     for shift in range(SIZES[form] * 8 - 4, -1, -4):
         nibble = ("and", "u64", ("shr", "u64", value, ("const", "i64", shift), 0), ("const", "u64", 15))
         position = ("add", "i64", ("convert", "i64", "u64", nibble), ("const", "i64", 1))
-        digits.append(("mid", "s8", ("const", "s8", b"0123456789ABCDEF"), ("const", "i64", 1), position, 0))
+        digits.append(("mid", "s8", ("const", "s8", b"0123456789abcdef"), ("const", "i64", 1), position, 0))
         if shift:
             more = ("convert", "i64", "b", ("ge", "b", "u64", value, ("const", "u64", 1 << shift)))
             significant = ("add", "i64", significant, more)

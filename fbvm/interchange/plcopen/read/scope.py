@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
+from fbvm.base.types import SHORT_NAMES
 from fbvm.check.calls.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
 from fbvm.interchange.plcopen.read.diagram import Object, Wire
 from fbvm.interchange.plcopen.read.document import Document, Pou
@@ -210,17 +211,22 @@ class Scope:
             for wire in data.wires:
                 found = found or self.wire_type(wire, depth + 1)
             if found:
-                return "TIME" if name == "SUB" and found in _MOMENTS and self._is_difference(item, found, depth) else found
+                return "TIME" if name == "SUB" and _whole(found) in _MOMENTS and self._is_difference(item, found, depth) else found
         return ""
 
     def _is_difference(self, item: Object, kind: str, depth: int) -> bool:
         """Whether SUB has two moments of a type as its operands: their difference is a duration."""
         behind = [pin for pin in item.inputs if pin.name.upper() not in _NO_OPERANDS][1:]
-        return any((self.type_of(pin.expression) if pin.expression else "") == kind
-                   or any(self.wire_type(wire, depth + 1) == kind for wire in pin.wires) for pin in behind)
+        return any(_whole(self.type_of(pin.expression) if pin.expression else "") == _whole(kind)
+                   or any(_whole(self.wire_type(wire, depth + 1)) == _whole(kind) for wire in pin.wires) for pin in behind)
 
 
-_MOMENTS = ("DT", "DATE_AND_TIME", "DATE", "TOD", "TIME_OF_DAY")
+def _whole(kind: str) -> str:
+    """The long name of a type: DATE_AND_TIME for DT."""
+    return SHORT_NAMES.get(kind.upper(), kind.upper())
+
+
+_MOMENTS = ("DATE_AND_TIME", "DATE", "TIME_OF_DAY")
 _NO_OPERANDS = {"EN", "G", "K", "N", "L", "P"}
 """Inputs of standard functions whose type says nothing about that of the result."""
 
