@@ -97,8 +97,8 @@ def test_declarations_tasks_and_texts_survive_the_way_there_and_back() -> None:
 
 
 def test_the_difference_of_two_moments_is_a_duration_under_the_short_name_of_their_type_too() -> None:
-    body = (block(1, "RTC", "", "Q,CDT", "r", at="0,0") + value(2, "d", at="0,60") + value(3, "TRUE", at="0,30")
+    body = (block(1, "RTC", "", "Q,CDT", "r", at="0,0") + value(2, "d", at="0,60") + value(3, "b", at="0,30")
             + block(4, "SUB", "EN=3 IN1=1.CDT IN2=2", "ENO,OUT", at="90,0") + value(5, "T#1h", at="90,60")
-            + block(6, "LT", "EN=4.ENO IN1=4.OUT IN2=5", "ENO,OUT", at="180,0") + result(7, "6.OUT", "b", at="270,0"))
-    made = imported(pou(body, variable("b") + variable("d", "DT") + variable("r", "RTC"), language="FBD"))
+            + block(6, "LT", "EN=4.ENO IN1=4.OUT IN2=5", "ENO,OUT", at="180,0") + result(7, "6.OUT", "c", at="270,0"))
+    made = imported(pou(body, variable("b") + variable("c") + variable("d", "DT") + variable("r", "RTC"), language="FBD"))
     assert "Result_4 : TIME;" in made.files["Main.st"]

@@ -148,8 +148,17 @@ def _due(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Node
     return ("const", "b", 0)
 
 
-def _bcd(name: str) -> Function:
-    return lambda emitter, a, call, site: (name, machine(call.detail[1]), machine(call.detail[0]), a[0], site)
+def _from_bcd(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Node:
+    """The number of BCD digits.  A digit above 9 traps; in a dialect all is 0 then."""
+    node, form = a[0], machine(call.detail[0])
+    if emitter.dialect.wrong_bcd_is_zero:
+        node = emitter.to_temporary(node)
+        node = ("select", form, _valid_bcd(emitter, [node], call, site), ("const", form, 0), node)
+    return ("from_bcd", machine(call.detail[1]), form, node, site)
+
+
+def _to_bcd(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Node:
+    return ("to_bcd", machine(call.detail[1]), machine(call.detail[0]), a[0], site)
 
 
 FUNCTIONS: dict[str, Function] = {
@@ -163,7 +172,7 @@ FUNCTIONS: dict[str, Function] = {
     "IS_VALID_BCD": _valid_bcd,
     "TO_BIG_ENDIAN": _swapped, "FROM_BIG_ENDIAN": _swapped,
     "TO_LITTLE_ENDIAN": lambda emitter, a, call, site: a[0], "FROM_LITTLE_ENDIAN": lambda emitter, a, call, site: a[0],
-    "TO": convert, "TRUNC": truncate, "BCD_TO": _bcd("from_bcd"), "TO_BCD": _bcd("to_bcd"),
+    "TO": convert, "TRUNC": truncate, "BCD_TO": _from_bcd, "TO_BCD": _to_bcd,
     **{name: _math(name) for name in _MATH},
     **{name: _shift(name.lower()) for name in ("SHL", "SHR", "ROL", "ROR")},
     **{name: _compare(op) for name, op in _COMPARE.items()},
