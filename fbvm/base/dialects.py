@@ -179,8 +179,8 @@ QUESTIONS = {
     "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
     "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
                     "a variable of the program, with a warning (S0193)"),
-    "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another of "
-                          "these is needed", "an error that names the conversion", "its nanoseconds"),
+    "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another "
+                          "of these is needed", "an error that names the conversion", "its nanoseconds"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
     "wrong_bcd_is_zero": ("BCD_TO_UINT(16#9A): a digit above 9", "stops the program (R0105)", "0"),
     "steps_apart": ("a step and a variable of one name: Init", "an error",

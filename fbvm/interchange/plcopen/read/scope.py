@@ -211,7 +211,8 @@ class Scope:
             for wire in data.wires:
                 found = found or self.wire_type(wire, depth + 1)
             if found:
-                return "TIME" if name == "SUB" and _whole(found) in _MOMENTS and self._is_difference(item, found, depth) else found
+                is_moment = name == "SUB" and _whole(found) in _MOMENTS
+                return "TIME" if is_moment and self._is_difference(item, found, depth) else found
         return ""
 
     def _is_difference(self, item: Object, kind: str, depth: int) -> bool:
