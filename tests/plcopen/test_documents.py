@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files, compile_sources
+from fbvm.interchange.formats.given import usual_dialect
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.machine.plc import Plc
 
@@ -126,6 +128,22 @@ def test_globals_of_other_files_of_a_beremiz_project_are_declared_and_told() -> 
     plc = Plc(compiled.image)
     plc.scan()
     assert (plc.read("Level"), plc.read("Main.py.ACK")) == (1, False)
+
+
+@each_of(("company", "dialect"), [("Beremiz", "matiec"), ("3S CODESYS", "codesys"), ("Somebody", "standard")])
+def test_a_document_has_the_dialect_of_the_tool_that_its_header_names(company: str, dialect: str, tmp_path: Path) -> None:
+    text = project(f"<localVars>{variable('n', '<INT/>')}</localVars>", "n := n + 1;",
+                   header=f'<fileHeader companyName="{company}" productName="x"/>')
+    (tmp_path / "plc.xml").write_bytes(text)
+    (tmp_path / "more.st").write_text("PROGRAM Other\nEND_PROGRAM\n")
+    assert usual_dialect([tmp_path / "more.st", tmp_path / "plc.xml"]) == dialect
+
+
+def test_an_import_names_the_dialect_of_its_sources(tmp_path: Path) -> None:
+    (tmp_path / "plc.xml").write_bytes(project("", ";", header='<fileHeader companyName="Beremiz" productName="Beremiz"/>'))
+    done = CliRunner().invoke(main, ["import", str(tmp_path / "plc.xml"), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    assert "these sources are written for --dialect matiec: the header names Beremiz" in done.output
 
 
 def test_texts_get_the_quotes_that_their_tool_leaves_out() -> None:

@@ -65,9 +65,7 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
     kind, target = base(kind), base(target)
     if isinstance(kind, RefType) and kind.moves and target in (ELEMENTARY["ULINT"], ELEMENTARY["LWORD"]):
         return dialect.integers_and_bits  # a pointer has 64 bits
-    if dialect.times_are_numbers and _holds_nanoseconds(kind, target):
-        return True
-    return dialect.narrowing and _narrows(kind, target) or dialect.integers_and_bits and _holds_bits(kind, target)
+    return any(getattr(dialect, switch) and holds_all(kind, target) for switch, holds_all in _BY_DIALECT)
 
 
 def _narrows(kind: Type, target: Type) -> bool:
@@ -91,6 +89,10 @@ def _holds_nanoseconds(kind: Type, target: Type) -> bool:
     times = [is_any(each, *_TIMES) for each in (kind, target)]
     return any(times) and all(time or is_any(each, "ANY_INT", "ANY_BIT") and each != BOOL
                               for time, each in zip(times, (kind, target), strict=True))
+
+
+_BY_DIALECT = (("times_are_numbers", _holds_nanoseconds), ("narrowing", _narrows), ("integers_and_bits", _holds_bits))
+"""Switches of dialects, and between which types each of them converts."""
 
 
 def as_number(kind: Type, dialect: Dialect) -> Type:

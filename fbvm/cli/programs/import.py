@@ -16,6 +16,7 @@ from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
 from fbvm.interchange.cx.read.importing import import_project
+from fbvm.interchange.dialect_signs import FAMILIES
 from fbvm.interchange.formats.given import is_cx_project, usual_dialect
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
@@ -60,6 +61,8 @@ def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: st
             write_file(folder / name, text)
     for name in made.files if not as_json else ():
         say(str(folder / name))
+    if not as_json and made.family in FAMILIES:
+        say(f"these sources are written for --dialect {FAMILIES[made.family]}: {made.because}", err=True)
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)
 

@@ -45,8 +45,8 @@ def _keep_in_context(context: click.Context, parameter: click.Parameter, value: 
 def compile_options(files: Sequence[Path]) -> dict[str, Any]:
     """The options --resource and --dialect of the present command, as keyword arguments of the compiler.
 
-    Without --dialect TwinCAT's files have that of TwinCAT; `--dialect auto` looks at the files, and says on stderr what it chose
-    and why."""
+    Without --dialect files of TwinCAT, and PLCopen XML whose header names the tool, have that of the tool; `--dialect auto` looks
+    at the files, and says on stderr what it chose and why."""
     meta = click.get_current_context().meta
     given = {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
     given.setdefault("dialect", usual_dialect(files))
@@ -71,7 +71,8 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
         click.option("--dialect", type=click.Choice([*DIALECTS, AUTO]), expose_value=False, callback=_keep_in_context,
                      help="How to answer what compilers disagree about; `fbvm explain dialects` says which answers, `auto` looks "
-                     "for signs in the files and says which it takes.  Without it: twincat for files of TwinCAT, else standard."),
+                     "for signs in the files and says which it takes.  Without it: that of the tool for files of TwinCAT, and "
+                     "for PLCopen XML whose header names one; else standard."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
     ):  # fmt: skip
         function = decorate(function)

@@ -12,6 +12,7 @@ from pathlib import Path
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file
 from fbvm.interchange.cx.markup import is_project
+from fbvm.interchange.dialect_signs import FAMILIES
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX, SYSTEM_SUFFIX, TASK_SUFFIX, TASKS
 
@@ -25,8 +26,24 @@ DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
 
 
 def usual_dialect(paths: Iterable[Path]) -> str:
-    """The dialect of files for which nobody has named one: that of the tool whose files they are."""
-    return "twincat" if any(path.suffix.lower() in (*PROJECT_SUFFIXES, *TWINCAT_SUFFIXES) for path in paths) else "standard"
+    """The dialect of files for which nobody has named one: that of the tool whose files they are.
+
+    For documents in PLCopen XML that is the dialect of the tool that wrote the first of them, if its header names one."""
+    paths = list(paths)
+    if any(path.suffix.lower() in (*PROJECT_SUFFIXES, *TWINCAT_SUFFIXES) for path in paths):
+        return "twincat"
+    documents = (made for path in paths if (made := _document(path)) is not None)
+    return next((FAMILIES[made.family] for made in documents if made.family in FAMILIES), "standard")
+
+
+def _document(path: Path) -> Imported | None:
+    """The sources within a document in PLCopen XML; None for all other files, and for one that cannot be read."""
+    if path.suffix.lower() in (".st", *SUFFIXES):
+        return None
+    try:
+        return within(path)
+    except OSError:
+        return None
 
 
 def is_cx_project(path: Path) -> bool:
