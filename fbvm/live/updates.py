@@ -6,6 +6,7 @@ further scans are executed."""
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from dataclasses import asdict
 from itertools import islice
 from typing import Any
 
@@ -220,7 +221,9 @@ class Updates:
                 words.append([address, said, shown(place, value), meaning])
             if number % STEP == STEP - 1:
                 yield
-        rows.append({"name": unit.name, "address": unit.address, "plugged": self._bench.is_plugged(attached), "words": words})
+        shows = getattr(unit, "front", None)
+        rows.append({"name": unit.name, "address": unit.address, "plugged": self._bench.is_plugged(attached), "words": words,
+                     "front": asdict(shows(self._memory(live))) if shows else None})
 
 
 def shown(place: Place, value: Value) -> str:

@@ -43,6 +43,6 @@ export class NetworkPanel {
       make("button", { class: "chip", title: "Look at this scan", on: { click: () => this.page.scan.view(frame.scan) } }, `scan ${frame.scan}`),
       make("span", { class: frame.out ? "out" : "in" }, `${frame.out ? "→" : "←"} ${frame.from} to ${frame.to}`), `  ${frame.info}`,
       frame.data ? make("code", {}, frame.data.replace(/(..)/g, "$1 ")) : "")));
-    if (!rows.length) at("frames").append(make("li", { class: "dim" }, "No frame has passed yet."));
+    if (!rows.length) at("frames").append(make("li", { class: "dim" }, this.frames.length ? "No frame fits the filter." : "No frame has passed yet."));
   }
 }

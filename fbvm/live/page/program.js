@@ -78,7 +78,7 @@ export class ProgramPanel {
   line(line, number) {
     const chips = line.names.map((name) => {
       const chip = make("button", { class: "chip", title: `${name}: click to watch it`, on: { click: () => this.page.panels.watch.add(name) } });
-      const short = name.split(".").pop();
+      const short = this.short(name, line.names);
       const value = make("b");
       chip.append(`${short} `, value);
       const known = this.chips.get(name) ?? [];
@@ -88,6 +88,14 @@ export class ProgramPanel {
     const row = make("tr", {}, make("td", { class: "line", title: "A breakpoint", on: { click: () => this.stop(`${this.path}:${number}`) } }, String(number)), make("td", {}, line.text), make("td", { class: "values" }, ...chips));
     this.rows.set(number, row);
     return row;
+  }
+
+  // The last part of a name; if others on the line end the same, the name as it is within the instance.
+  short(name, beside) {
+    const last = (one) => one.split(".").pop();
+    const own = `${this.instance}.`.toUpperCase();
+    if (beside.every((one) => one === name || last(one).toUpperCase() !== last(name).toUpperCase())) return last(name);
+    return name.toUpperCase().startsWith(own) ? name.slice(own.length) : name;
   }
 
   // Marks the lines of the running program that are wrong in the changed one, where they are the same.

@@ -138,16 +138,18 @@ export class TrendPanel {
     points.splice(0, Math.max(0, begin));
     if (!points.length) return null;
     const values = points.map(([, value]) => value);
-    const [low, high] = [values.reduce((x, y) => Math.min(x, y)), values.reduce((x, y) => Math.max(x, y))];
+    const now = this.samples.at(-1).values.get(name);
+    const isBit = now === "TRUE" || now === "FALSE";
+    const [low, high] = isBit ? [0, 1] : [values.reduce((x, y) => Math.min(x, y)), values.reduce((x, y) => Math.max(x, y))];
     const span = Math.max(1, last + 1 - first);
     const x = (scan) => ((scan - first) / span) * WIDTH;
-    const y = (value) => HEIGHT - 5 - (high > low ? (value - low) / (high - low) : 0) * (HEIGHT - 10);
+    const y = (value) => HEIGHT - 5 - (high > low ? (value - low) / (high - low) : 0.5) * (HEIGHT - 10);
     let path = `M${x(points[0][0]).toFixed(1)} ${y(points[0][1]).toFixed(1)}`;
     for (const [scan, value] of points.slice(1)) path += `H${x(scan).toFixed(1)}V${y(value).toFixed(1)}`;
     path += `H${WIDTH}`;
-    const now = this.samples.at(-1).values.get(name);
+    const range = isBit ? "" : `${low} … ${high}, `;
     const svg = inSvg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img",
-      "aria-label": `${name} from scan ${first} to ${last}: ${low} to ${high}, now ${now}${this.between(name)}` });
+      "aria-label": `${name} from scan ${first} to ${last}: ${range}now ${now}${this.between(name)}` });
     svg.append(inSvg("path", { d: path }));
     for (const cursor of CURSORS) {
       const scan = this.cursors[cursor];
@@ -155,8 +157,8 @@ export class TrendPanel {
       const where = { x1: x(scan + 0.5), x2: x(scan + 0.5), y1: 0, y2: HEIGHT };
       svg.append(inSvg("line", { ...where, class: cursor }));
     }
-    return make("figure", { class: `curve${now === "TRUE" || now === "FALSE" ? " bit" : ""}`, "data-name": name },
-      make("figcaption", {}, make("span", { class: "mono" }, name), make("span", { class: "dim" }, `  ${low} … ${high}, now ${now}`),
+    return make("figure", { class: `curve${isBit ? " bit" : ""}`, "data-name": name },
+      make("figcaption", {}, make("span", { class: "mono" }, name), make("span", { class: "dim" }, `  ${range}now ${now}`),
         make("b", { class: "between" }, this.between(name))), svg);
   }
 

@@ -135,7 +135,7 @@ export class WatchPanel {
     const input = make("input", { "aria-label": `New value of ${name}`, value: typed, on: { keydown: (event) => {
       if (event.key === "Enter") ask(event.shiftKey ? "force" : "write", { value: input.value });
     } } });
-    const button = (text, label, click) => make("button", { "aria-label": `${label} ${name}`, title: label, on: { click } }, text);
+    const button = (text, label, click) => make("button", { "aria-label": `${text}: ${label} ${name}`, title: label, on: { click } }, text);
     const tools = [button("write", "Write once", () => ask("write", { value: input.value })),
       button("force", "Hold at this value", () => ask("force", { value: input.value })),
       button("release", "End the force of", () => ask("release", {}))];

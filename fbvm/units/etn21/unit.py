@@ -20,10 +20,12 @@ from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.fins.service import FinsService
 from fbvm.units.etn21.fins.state import ACCESS, FinsSettings, FinsState, nodes_of
+from fbvm.units.etn21.front import front
 from fbvm.units.etn21.inside import Inside, power_on, prepare
 from fbvm.units.etn21.map import Layout
 from fbvm.units.etn21.names import descriptions, meanings
 from fbvm.units.etn21.words import Words
+from fbvm.units.front import Front
 from fbvm.wire.fins.codes import EndCode
 from fbvm.wire.fins.frames import PORT, Command
 from fbvm.wire.link import Event, Request
@@ -217,6 +219,11 @@ class Etn21:
     def meanings(self) -> dict[str, dict[int, str]]:
         """What the values of its words mean, by address."""
         return meanings(self.layout)
+
+    def front(self, memory: AreaMemory) -> Front:
+        """Its dials, lamps and sockets as the words in `memory` tell them."""
+        node = self._fins.settings.own_node if self._fins else int(self.address.rpartition(".")[2])
+        return front(self.layout, node, memory)
 
     @property
     def configuration(self) -> dict[str, Any]:

@@ -135,6 +135,12 @@ class Noc(MailboxUnit):
         serves=lambda noc: noc.configured and not noc.is_restarting,
         errors=ERRNO,
         other_error=ERRNO["EIO"],  # assumed
+        settings={"slot": lambda noc: str(noc.rack_slot), "module": lambda noc: MODULE_TYPES[noc.module_type],
+                  "MAC": lambda noc: noc.mac},
+        lamps={"RUN": (_statistic(Statistic.BOARD), RUNNING), "LINK": (_statistic(Statistic.BOARD), LINK),
+               "100 MB": (_statistic(Statistic.BOARD), FAST)},
+        told={"received": _statistic(Statistic.RECEIVER_INTERRUPTS), "sent": _statistic(Statistic.TRANSMITTER_INTERRUPTS),
+              "timed out": _statistic(Statistic.TRANSMIT_TIMEOUTS), "restarts": _statistic(Statistic.DRIVER_RESTARTS)},
         refusals=[
             (lambda noc: noc.module_type not in MODULE_TYPES, "there is no module of type {unit.module_type}"),
             (lambda noc: not re.fullmatch(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}", noc.mac),

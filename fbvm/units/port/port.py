@@ -5,8 +5,11 @@ lines that carry its number."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict
 
+from fbvm.units.addresses import host_of
+from fbvm.units.front import Socket
 from fbvm.units.port.line import Line
 from fbvm.units.port.words import Lines
 from fbvm.wire.link import Event, Request
@@ -23,7 +26,8 @@ class Port:
         self._lines = [Line(channel, lines, number_of) for channel in range(lines.count)]
         self._active: set[int] = set()
         """Lines with a connection, or a close that is not confirmed, also when they carry another number by now."""
-        at = lines.words
+        self._at = at = lines.words
+        self._states = {number: name.upper() for name, number in asdict(lines.states).items()}
         self._module = at.module
         self._modules = slice(self._first_word + at.module, self._first_word + lines.count * self._size, self._size)
         """Where in the mailbox the numbers of all lines are."""
@@ -57,6 +61,21 @@ class Port:
                 for word in self._cleared:
                     line[word] = 0
         return requests
+
+    def sockets(self, words: memoryview, errors: Mapping[int, str]) -> Iterator[Socket]:
+        """The lines of this unit that a program uses, as people read them; `errors` are the names of the unit's numbers."""
+        at = self._at
+        for channel in range(len(self._lines)):
+            line = self._line(words, channel)
+            if line[self._module] != self.number:
+                continue
+            high, low, port = line[at.peer_ip], line[at.peer_ip + 1], line[at.peer_port]
+            if not (high or low or port):
+                high, low, port = line[at.remote_ip], line[at.remote_ip + 1], line[at.remote_port]
+            error = line[at.error]
+            yield Socket(f"line {channel}", self._states.get(line[at.state], str(line[at.state])), str(line[at.local_port] or ""),
+                         f"{host_of(high, low)}:{port}" if high or low or port else "", line[at.received], line[at.sending],
+                         errors.get(error, f"16#{error:02X}") if error else "")  # fmt: skip
 
     def _line(self, words: memoryview, channel: int) -> memoryview:
         start = self._first_word + channel * self._size

@@ -30,6 +30,8 @@ class Tianxing(MailboxUnit):
             "MB_TCP_Connections": lambda port: MODELS[port.model],
             "MB_TCP_Own_IP": lambda port: port.own_ip,
         },
+        settings={"model": lambda port: port.model, "connections": lambda port: str(MODELS[port.model])},
+        lamps={"READY": ("MB_TCP_Ready", 1)},
         refusals=[
             (lambda port: port.model not in MODELS, f"there is no model {{unit.model}}; there are {' and '.join(MODELS)}"),
         ],

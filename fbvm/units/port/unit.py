@@ -15,6 +15,7 @@ from typing import Any, ClassVar, cast
 from fbvm.base.areas import NEVER
 from fbvm.units.addresses import words_of
 from fbvm.units.contract import AreaMemory
+from fbvm.units.front import Front, Lamp
 from fbvm.units.port.port import Port
 from fbvm.units.port.words import mailbox
 from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Opened, PeerClosed, Received, Request, Send
@@ -86,6 +87,12 @@ class Table:
     """The unit's numbers for POSIX errno names."""
     other_error: int = 1
     """The number of an error that it does not know."""
+    settings: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    """What stands on the unit's front, by its name."""
+    lamps: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+    """Its lamps: the word of the head and the bits of it that each shows."""
+    told: Mapping[str, str] = field(default_factory=dict)
+    """Counters that are told to people, by what they count."""
     refusals: Sequence[tuple[Callable[[Any], bool], str]] = ()
     """When an argument of the unit is wrong, and what is said then."""
 
@@ -154,6 +161,22 @@ class MailboxUnit:
     def settings(self, given: dict[str, Any]) -> None:
         for name in self._settings:
             setattr(self, name, bool(given[name]))
+
+    def front(self, memory: AreaMemory) -> Front:
+        """What it shows, as the words in `memory` tell it."""
+        table = self.table
+        settings = tuple((name, said(self)) for name, said in table.settings.items())
+        try:
+            words = memory.words(self._area)
+        except KeyError:
+            return Front(settings=(*settings, ("mailbox", f"no block of this program uses {self._area}")))
+        lamps = [(name, bool(words[self._word(word)] & bits)) for name, (word, bits) in table.lamps.items()]
+        names = {number: error for error, number in table.errors.items()}
+        return Front(
+            settings=(*settings, *((name, str(_counter(words, self._word(word)))) for name, word in table.told.items())),
+            lamps=tuple(Lamp(name, is_on, "on" if is_on else "off") for name, is_on in lamps),
+            sockets=tuple(self._port.sockets(words, names)),
+            restart=(self._variable(table.restart.asked), "1") if table.restart else None)  # fmt: skip
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on: the head as the table says, counters 0, connections broken by RST."""

@@ -167,6 +167,7 @@ def test_a_pulled_cable_lets_nothing_pass_and_the_unit_says_so(page: Page) -> No
     page.done("cable", plc="pump", unit="ETN21 0", plugged=False)
     page.scan(2)
     [unit] = page.update()["units"]
+    assert [lamp["name"] for lamp in unit["front"]["lamps"] if lamp["is_on"]] == ["RUN"]
     assert not unit["plugged"] and page.network.faults[0].silent and not page.plc.units[0].unit.settings["link_up"]
     page.done("cable", plc="pump", unit="ETN21 0", plugged=True)
     assert page.network.faults == [] and page.plc.units[0].unit.settings["link_up"]
@@ -177,9 +178,9 @@ def test_the_restart_button_of_a_unit_restarts_it(page: Page) -> None:
     page.done("look", plc="pump", names=[], units=True)
     page.scan(3)
     [unit] = page.update()["units"]
-    [restart] = [address for address, said, *_ in unit["words"] if said.endswith("Restart Bit")]
+    restart, value = unit["front"]["restart"]
     [initializing] = [address for address, said, *_ in unit["words"] if said.endswith("Initializing Flag")]
-    page.done("write", plc="pump", name=restart, value="TRUE")
+    page.done("write", plc="pump", name=restart, value=value)
     seen = [(True, False)]
     while any(seen[-1]) and len(seen) < 1000:
         page.scan()
