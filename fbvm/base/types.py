@@ -14,7 +14,9 @@ from functools import cache, lru_cache
 
 @lru_cache(1 << 16)
 def fold(name: str) -> str:
-    """A name in the form in which names are compared: in capitals, since case does not matter."""
+    """A name in the form in which names are compared: in capitals, since case does not matter.
+
+    Not for texts of a program: what was folded is kept."""
     return name.upper()
 
 

@@ -26,6 +26,7 @@ def bodies(statement: tree.Statement) -> list[tree.Block]:
     return []
 
 
+_ENO = re.compile(r"(?i)ENO")
 _ENO_OF = re.compile(r"(?i)(?<![\w.])(\w+)\s*\.\s*ENO\b")
 
 
@@ -38,7 +39,7 @@ def names_of_eno(pou: Pou) -> set[str]:
 def writes_eno(pou: Pou) -> bool:
     """True if the body of a POU assigns ENO anywhere.  Most bodies do not even name it, which a look at the text tells."""
     node = pou.tree
-    return "ENO" in fold(pou.source.text[node.start:node.end]) and _assigns_to(node.body, "ENO")
+    return _ENO.search(pou.source.text, node.start, node.end) is not None and _assigns_to(node.body, "ENO")
 
 
 def _assigns_to(statements: tree.Block, name: str) -> bool:

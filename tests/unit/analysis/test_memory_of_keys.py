@@ -1,0 +1,59 @@
+"""What a program that is being edited keeps: as much after many keys as after few."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from collections.abc import Callable
+
+import pytest
+from rows import each_of
+
+from fbvm.analysis.hover import hover
+from fbvm.analysis.program import Program
+from fbvm.analysis.references import references, use_at
+
+BODY = "".join(f"    Level := Level + {number};\n" for number in range(50))
+TEXT = f"PROGRAM Main\nVAR Level : DINT; END_VAR\n{BODY}    Level := 0;\nEND_PROGRAM\n"
+KEYS, MOST_BYTES = 40, 25_000
+"""Keys that are typed, and the bytes that may be kept of them: less than half the text of each."""
+
+
+def check_changes(program: Program) -> None:
+    assert program.check_changes()
+
+
+def look(program: Program) -> None:
+    """What somebody asks who stands at a name."""
+    assert program.check_changes()
+    place = program.files["a.st"].text.index("Level")
+    assert hover(program, "a.st", place) is not None
+    found = use_at(program, "a.st", place)
+    assert found is not None and len(references(program, found[1].key)) > 50
+
+
+WAYS = {"a POU is checked": check_changes, "everything is checked": Program.check_all, "a name is looked at": look}
+
+
+@pytest.mark.slow
+@each_of("way", WAYS.values(), ids=WAYS)
+def test_keys_leave_nothing_behind(way: Callable[[Program], None]) -> None:
+    program = Program()
+    program.replace("a.st", TEXT)
+    program.check_all()
+
+    def typed(keys: range) -> int:
+        for key in keys:
+            program.replace("a.st", TEXT.replace("Level := 0;", f"Level := {1000 + key};"))
+            way(program)
+            program.diagnostics("a.st")
+        program.check_all()
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before = typed(range(5))
+        assert typed(range(5, 5 + KEYS)) - before < MOST_BYTES
+    finally:
+        tracemalloc.stop()
