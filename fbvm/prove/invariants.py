@@ -5,7 +5,7 @@ then breaks are dropped, until none is.  What stays holds in every scan after th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -98,8 +98,8 @@ class Ordered:
 Guess = Literal | Clause | Bounds | Ordered
 
 
-def guesses(variables: Sequence[Term], samples: Sequence[Sample]) -> list[Guess]:
-    """What holds of the variables in all samples."""
+def guesses(variables: Sequence[Term], samples: Sequence[Sample], doubted: Collection[Guess] = ()) -> list[Guess]:
+    """What holds of the variables in all samples; `doubted` holds in them, and is broken by some scan all the same."""
     literals: list[Literal] = []
     found: list[Guess] = []
     for variable in variables:
@@ -113,7 +113,7 @@ def guesses(variables: Sequence[Term], samples: Sequence[Sample]) -> list[Guess]
     both = [each for literal in literals[:MOST_LITERALS] for each in (literal, Literal(literal.variable, literal.value, False))]
     found += both
     found += [Clause(a, b) for a, b in combinations(both, 2) if a.variable is not b.variable]
-    return _holding(found, samples)
+    return _holding(found, samples, doubted)
 
 
 def _about_number(variable: Term, seen: set[int]) -> list[Guess]:
@@ -124,7 +124,7 @@ def _about_number(variable: Term, seen: set[int]) -> list[Guess]:
     return [*found, Ordered(variable, None)] if variable.width == 64 else found
 
 
-def _holding(found: list[Guess], samples: Sequence[Sample]) -> list[Guess]:
+def _holding(found: list[Guess], samples: Sequence[Sample], doubted: Collection[Guess]) -> list[Guess]:
     """Those that hold in all samples; a clause of which one side always holds says nothing more."""
     kept: list[Guess] = []
     certain: set[Guess] = set()
@@ -133,7 +133,7 @@ def _holding(found: list[Guess], samples: Sequence[Sample]) -> list[Guess]:
             continue
         if all(guess.holds(sample) for sample in samples):
             kept.append(guess)
-            if isinstance(guess, Literal):
+            if isinstance(guess, Literal) and guess not in doubted:
                 certain.add(guess)
     return kept
 

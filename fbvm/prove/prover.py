@@ -18,7 +18,7 @@ from fbvm.prove.encoding.scan import WIDTHS
 from fbvm.prove.encoding.summary import Summary, summarize
 from fbvm.prove.encoding.terms import Term, TimeOver
 from fbvm.prove.induction import Induction
-from fbvm.prove.invariants import Guess, Invariants, facts_of, guesses
+from fbvm.prove.invariants import Guess, Invariants, Literal, facts_of, guesses
 from fbvm.prove.question import (
     ALWAYS,
     BROKEN,
@@ -47,8 +47,8 @@ DEPTHS = (16, 64)
 MOST_INDUCTION = 5
 MOST_LINES = 12
 """Lines that a note lists."""
-MOST_STATE = 200
-"""Variables of the state up to which invariants are guessed."""
+FEW_STATE, MOST_STATE = 24, 200
+"""Variables of the state up to which invariants are guessed before a longer search, and at all."""
 
 
 @dataclass(frozen=True)
@@ -153,15 +153,18 @@ class Prover:
         """Tries one method after the other, the cheap ones first."""
         self._note_limits()
         shallow, deeper = (min(depth, self.limits.scans) for depth in DEPTHS)
-        methods: tuple[Callable[[], Verdict | None], ...] = (
+        is_small = len(self._state()) <= FEW_STATE and self.question.kind != WITHIN
+        invariants: list[Callable[[], Verdict | None]] = [self._with_invariants]
+        methods: list[Callable[[], Verdict | None]] = [
             lambda: self._searched(shallow),
             lambda: self._induced([], 1),
             self._simulated,
+            *invariants * is_small,
             lambda: self._searched(deeper),
             lambda: self._induced([], self._deepest()),
-            self._with_invariants,
+            *invariants * (not is_small),
             lambda: self._searched(self.limits.scans),
-        )
+        ]
         for method in methods:
             if (found := method()) is not None:
                 return self._with_unreached(found) if found.word in (PROVED, UNREACHABLE) else found
@@ -273,8 +276,12 @@ class Prover:
         return Goal(terms.or_(self.goal.hit, terms.any_of(*(trap.condition for trap in self.unwound))), self.goal.stop,
                     self.goal.given)  # fmt: skip
 
+    def _state(self) -> list[Term]:
+        """The variables of the state on which the answer depends."""
+        return [variable for variable in self.search.unrolling.cone if variable in self.summary.cells]
+
     def _with_invariants(self) -> Verdict | None:
-        state = [variable for variable in self.search.unrolling.cone if variable in self.summary.cells]
+        state = self._state()
         if not state or len(state) > MOST_STATE or self.limits.expired():
             return None
         self.tell(f"guessing invariants of {len(state)} variables")
@@ -286,6 +293,9 @@ class Prover:
         self.tell(f"trying {len(found)} invariants")
         invariants = Invariants(self.summary, state, self.goal.stop, self.goal.given, self.clock, self.limits.expired)
         kept = invariants.kept(found)
+        if kept is not None and (doubted := {guess for guess in found if isinstance(guess, Literal)} - {*kept}):
+            known = {*found}
+            kept = invariants.kept([*kept, *(guess for guess in guesses(state, samples, doubted) if guess not in known)])
         return self._induced(kept, self._deepest()) if kept else None
 
     def _deepest(self) -> int:
