@@ -48,6 +48,7 @@ from fbvm.run.project_reader import (
     ip,
     moment_ns,
     one_of,
+    one_or_more,
     text,
     texts,
     texts_by_name,
@@ -96,6 +97,10 @@ UNIT: Keys = {
     "fins_node": Key(whole(0, 254), "ETN21: the FINS node, else the last part of the address; 0 is every node.", None),
     "fins_nodes": Key(texts_by_name, "ETN21: endpoints of FINS nodes that are not at their own address, such as "
                                      "{ 7 = \"192.168.251.2:9600\" }.", None),
+    "fins_clients": Key(texts_by_name, "ETN21: FINS/TCP connections, 1 to 16, that the unit opens itself, each with its server, "
+                                       "such as { 1 = \"192.168.250.2\" }; all others wait for clients.", None),
+    "fins_permitted": Key(one_or_more(ip), "ETN21: addresses of clients whose FINS/TCP connections are accepted, else all are.",
+                          None),
     "fins_access": Key(one_of(tuple(ACCESS)), "ETN21: what may be done by FINS: everything, no change of the mode, reads only.",
                        None),
     "slot": Key(whole(0, 254), "NOC: the slot in the rack, 0 to 16, or 254 for the port of the CPU.", None),

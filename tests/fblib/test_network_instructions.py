@@ -11,6 +11,7 @@ from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
+from fbvm.wire.tap import TapKind
 
 HERE, THERE = "192.168.250.1", "192.168.250.2"
 IDLE = "PROGRAM Main VAR n AT D9000 : UINT; END_VAR n := n + 1; END_PROGRAM"
@@ -283,6 +284,39 @@ def test_a_stop_of_the_own_plc_frees_its_ports() -> None:
     pair.one.mode = type(pair.one.mode).RUN
     pair.scan(1)
     assert pair.enabled(0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("steps", ["@SEND D100 D200 D0", "@RECV D100 D200 D0"])
+def test_a_node_with_a_connection_by_tcp_is_asked_over_it(steps: str) -> None:
+    pair = Pair(steps, fins_clients={"2": f"{THERE}:9600"})
+    datagrams: list[bytes] = []
+    pair.network.tap = lambda now_ns, unit, event: datagrams.append(event.data) if event.kind is TapKind.UDP else None
+    pair.control(0, [2, 0, NODE_2, 0x0200, 0])
+    writer, reader = (pair.one, pair.other) if "SEND" in steps else (pair.other, pair.one)
+    writer.write("D100..D101", [11, 12])
+    pair.scan(400)
+    assert pair.one.read("CIO 1523") == 2
+    assert pair.other.read("CIO 1523") == 1
+    pair.go(8)
+    assert reader.read("D200..D201") == [11, 12]
+    assert (pair.word(202), pair.word(219), pair.word(205)) == (0x80FF, 0, 0)
+    assert datagrams == []
+
+
+@pytest.mark.slow
+def test_a_connection_by_tcp_that_breaks_lets_the_command_go_by_udp_assumed() -> None:
+    """The command on its way is lost with the connection, and repeated by what leads to the node then."""
+    pair = Pair("@SEND D100 D200 D0", fins_clients={"2": THERE})
+    pair.scan(400)
+    pair.control(0, [1, 0, NODE_2, 0x0201, 10])
+    pair.one.write("D100", 13)
+    pair.network.faults.append(Fault(reset=True))
+    pair.go(2)
+    pair.network.faults.clear()
+    pair.scan(200)
+    assert pair.other.read("D200") == 13
+    assert (pair.word(202), pair.word(219), pair.word(205)) == (0x80FF, 0, 0)
 
 
 def test_a_node_elsewhere_is_found_by_the_address_table() -> None:

@@ -18,6 +18,7 @@ from fbvm.run.plant import Plant
 from fbvm.run.project import Project, read_project
 from fbvm.wire.fins.frames import Address, Command, Header, Response, parse_frame
 from fbvm.wire.link import Peer
+from fbvm.wire.tap import TapKind
 
 pytestmark = pytest.mark.slow
 HERE = Path(__file__).resolve().parent
@@ -159,6 +160,29 @@ def test_two_plcs_exchange_words_over_the_hosts_network(tmp_path: Path) -> None:
     desk = plant.runs[1].plc
     assert (desk.read("D110"), desk.read("A219")) == (4321, 0)
     assert desk.servicing.clock_ns > 0
+
+
+def test_they_exchange_words_over_a_connection_by_tcp_that_one_of_them_opens(tmp_path: Path) -> None:
+    doors = "".join(f'[[door]]\naddress = "192.168.250.{node}:9600"\nbind = "127.0.0.1:0"\n' for node in (1, 2))
+    project_in(tmp_path, doors)
+    text = (tmp_path / "fbvm.toml").read_text()
+    text = text.replace('fins_access = "read-only"', 'fins_clients = { 5 = "192.168.250.2" }')
+    (tmp_path / "fbvm.toml").write_text(text)
+    (tmp_path / "desk.st").write_text(DESK.replace("A202.00", "1523.04").replace("A202.01", "1523.04"))
+    found = read_project(tmp_path / "fbvm.toml")
+    assert isinstance(found, Project)
+    plant = Plant(found)
+    assert not plant.diagnostics
+    told: list[TapKind] = []
+    assert isinstance(plant.network, TcpNetwork)
+    plant.network.tap = lambda now_ns, unit, event: told.append(event.kind)
+    try:
+        run_all(plant.runs)
+    finally:
+        plant.close()
+    assert [run.reason for run in plant.runs] == ["until", "until"]
+    assert TapKind.DATA in told
+    assert TapKind.UDP not in told
 
 
 def test_udp_and_tcp_of_a_door_have_one_port() -> None:

@@ -19,7 +19,7 @@ from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.fins.service import FinsService
-from fbvm.units.etn21.fins.state import ACCESS, FinsSettings, FinsState, nodes_of
+from fbvm.units.etn21.fins.state import ACCESS, FinsSettings, FinsState, endpoints_of
 from fbvm.units.etn21.front import front
 from fbvm.units.etn21.inside import Inside, power_on, prepare
 from fbvm.units.etn21.map import Layout
@@ -47,8 +47,10 @@ class Etn21:
     what is there.
 
     `fins` lets the unit serve FINS by UDP and TCP on `fins_port`, as node `fins_node` (None: the host part of its address; 0:
-    whatever node a frame is for).  `fins_nodes` is its IP address table, `fins_access` what may be done by FINS: "full",
-    "no-control" (no change of the operating mode) or "read-only".  Raises ValueError for a wrong argument."""
+    whatever node a frame is for).  `fins_nodes` is its IP address table, `fins_clients` the FINS/TCP connections (1 to 16) that
+    it opens itself, with their servers, `fins_permitted` the addresses of FINS/TCP clients if not all may connect, `fins_access`
+    what may be done by FINS: "full", "no-control" (no change of the operating mode) or "read-only".  Raises ValueError for a
+    wrong argument."""
 
     def __init__(
         self,
@@ -64,6 +66,8 @@ class Etn21:
         fins_port: int = PORT,
         fins_node: int | None = None,
         fins_nodes: Mapping[str, str] | None = None,
+        fins_clients: Mapping[str, str] | None = None,
+        fins_permitted: Sequence[str] = (),
         fins_access: str = "full",
     ) -> None:
         if timing not in TIMINGS:
@@ -85,11 +89,16 @@ class Etn21:
         self._fins: FinsService | None = None
         if fins_access not in ACCESS:
             raise ValueError(f"fins_access {fins_access!r} is none of {', '.join(ACCESS)}")
+        if (fins_nodes or fins_clients or fins_permitted) and not fins:
+            raise ValueError("fins_nodes, fins_clients and fins_permitted are settings of FINS; write fins = true, too")
         if fins:
-            nodes = nodes_of(fins_nodes or {})
-            self._fins = FinsService(FinsSettings(address, unit_number, fins_port, fins_node, nodes, ACCESS[fins_access]))
+            nodes, clients = endpoints_of(fins_nodes or {}), endpoints_of(fins_clients or {}, "FINS/TCP connection")
+            self._fins = FinsService(
+                FinsSettings(address, unit_number, fins_port, fins_node, nodes, clients, tuple(fins_permitted),
+                                   ACCESS[fins_access]))
             self._error_status = at.DISAGREEMENT if self._fins.settings.disagrees else 0
             self._made |= {"fins": True, "fins_port": fins_port, "fins_node": fins_node, "fins_nodes": dict(fins_nodes or {}),
+                           "fins_clients": dict(fins_clients or {}), "fins_permitted": list(fins_permitted),
                            "fins_access": fins_access}  # fmt: skip
         self.changed_words = False
         self._engine = "auto"

@@ -76,6 +76,11 @@ class Message:
         return int(_NODE.unpack_from(self.body)[0])
 
     @property
+    def server(self) -> int:
+        """The second node in the body of a server's answer: the server's."""
+        return int(_NODE.unpack_from(self.body, _NODE.size)[0])
+
+    @property
     def is_wrong(self) -> bool:
         """True if the body does not have the length of its command."""
         least, most = BODY_BYTES.get(Kind(self.kind), (0, 0)) if self.kind in list(Kind) else (0, MAX_FRAME_BYTES)

@@ -72,6 +72,15 @@ def test_the_seventeenth_client_is_told_that_all_connections_are_in_use(rig: Fin
     assert TcpClient(rig, 130).connect()[-23:-12] == "00 00 00 F2"
 
 
+def test_only_permitted_addresses_get_a_connection() -> None:
+    rig = FinsRig(fins_permitted=["192.168.250.100"])
+    assert error_of(TcpClient(rig, 100).connect()) == 0
+    refused = TcpClient(rig, 101)
+    assert error_of(refused.connect()) == 0x22
+    assert refused.ended
+    assert rig.command(0x0101, "82 0064 00 0001")[0] == "0000"  # by UDP from a third address: not protected
+
+
 def test_several_messages_in_a_segment_are_answered_in_their_order(rig: FinsRig) -> None:
     client = TcpClient(rig)
     client.connect()

@@ -12,7 +12,15 @@ from dataclasses import replace
 from fbvm.base.areas import NEVER
 from fbvm.units.contract import CpuUnit
 from fbvm.units.etn21.fins import routing
-from fbvm.units.etn21.fins.state import CONNECTIONS, TCP_CHANNELS, UDP_CHANNEL, Connection, FinsSettings, FinsState
+from fbvm.units.etn21.fins.state import (
+    BEFORE_CLIENTS,
+    CONNECTIONS,
+    TCP_CHANNELS,
+    UDP_CHANNEL,
+    Connection,
+    FinsSettings,
+    FinsState,
+)
 from fbvm.wire.fins import tcp
 from fbvm.wire.fins.codes import EndCode
 from fbvm.wire.fins.frames import EVERY_NODE, LAST_NODE, Command, Response, parse_frame
@@ -21,6 +29,7 @@ from fbvm.wire.link import (
     Broken,
     Close,
     Closed,
+    Connect,
     Event,
     Failed,
     Grant,
@@ -40,10 +49,11 @@ answered at once: 0204, the destination is busy."""
 BUFFER_BYTES = 4096
 """Of each connection."""
 PATIENCE_NS = 10_000_000_000
-"""How long a client may owe its node, or the rest of a message, before the connection is broken."""
+"""How long the other side may owe its node, or the rest of a message, before the connection is broken."""
+RECONNECT_NS = 3_000_000_000
+"""After this time a connection of which the unit is the client is opened again: every few seconds, for ever (W421 7-4 p174)."""
 FIRST_ALLOTTED = 239
 """The node that connection 1 allots; W421 p174."""
-CHANNELS = frozenset((UDP_CHANNEL, *TCP_CHANNELS))
 
 
 class FinsService:
@@ -51,6 +61,9 @@ class FinsService:
 
     def __init__(self, settings: FinsSettings, state: FinsState | None = None) -> None:
         self.settings = settings
+        self._clients = {BEFORE_CLIENTS + number: number for number in settings.clients}
+        """Numbers of the connections of which this unit is the client, by channel."""
+        self._channels = frozenset((UDP_CHANNEL, *TCP_CHANNELS, *self._clients))
         self.state = state or FinsState()
         self._requests: list[Request] = []
         self._frames = 0
@@ -69,7 +82,7 @@ class FinsService:
         others = []
         for event in events:
             self.state.received += isinstance(event, Received)
-            if event.channel in CHANNELS:
+            if event.channel in self._channels:
                 self.state.events.append(event)
             else:
                 others.append(event)
@@ -83,10 +96,11 @@ class FinsService:
     def wake_ns(self) -> int:
         """When there is something to do without an event: 0 for the next scan."""
         state = self.state
-        if state.events or state.outgoing or not state.busy | state.failed >= CHANNELS:
+        if state.events or state.outgoing:
             return 0
-        return min((found.since_ns + PATIENCE_NS for found in state.connections.values() if not found.node or found.held),
-                   default=NEVER)  # fmt: skip
+        times = [found.since_ns + PATIENCE_NS for found in state.connections.values() if not found.node or found.held]
+        times += [state.retry_ns.get(channel, 0) for channel in self._channels - state.busy - state.failed]
+        return min(times, default=NEVER)
 
     def reset(self) -> list[Request]:
         """Power on or restart: breaks everything off, which the next servicing opens anew."""
@@ -136,20 +150,50 @@ class FinsService:
             self._event(event)
         if state.connections:
             self._expire()
-        if not state.busy | state.failed >= CHANNELS:
+        if state.changed_servers:
+            self._leave_former_servers()
+        if not state.busy | state.failed >= self._channels:
             self._open()
-        if state.outgoing and state.udp_open:
-            self._requests += state.outgoing
-            state.outgoing = []
+        if state.outgoing:
+            self._send_outgoing()
         self.count(self._requests)
         return self._requests
 
     def _open(self) -> None:
-        """Opens every channel that is not in use."""
+        """Opens every channel that is not in use, connections of a client not before their time."""
         state, port = self.state, self.settings.port
-        for channel in sorted(CHANNELS - state.busy - state.failed):
+        for channel in sorted(self._channels - state.busy - state.failed):
+            if channel in self._clients:
+                if self._now_ns < state.retry_ns.get(channel, 0):
+                    continue
+                state.dialled[channel] = self._server(channel)
+                self._requests.append(Connect(channel, state.dialled[channel]))
+            else:
+                self._requests.append(Bind(channel, port) if channel == UDP_CHANNEL else Listen(channel, port))
             state.busy.add(channel)
-            self._requests.append(Bind(channel, port) if channel == UDP_CHANNEL else Listen(channel, port))
+
+    def _server(self, channel: int) -> Peer:
+        """Where a connection of which this unit is the client is to lead."""
+        number = self._clients[channel]
+        return self.state.changed_servers.get(number) or self.settings.clients[number]
+
+    def _leave_former_servers(self) -> None:
+        """Closes connections to which 2730 has given another server."""
+        for channel in self.state.busy.intersection(self._clients) - self.state.closing:
+            if self.state.dialled.get(channel) != self._server(channel):
+                self._close(channel)
+
+    def _send_outgoing(self) -> None:
+        """Sends what network instructions want to send; datagrams wait until the port is open.  What is for a connection that
+        has ended is lost: the instruction repeats it."""
+        state = self.state
+        waiting: list[Send | SendTo] = []
+        for request in state.outgoing:
+            if isinstance(request, SendTo) and not state.udp_open:
+                waiting.append(request)
+            elif isinstance(request, SendTo) or request.channel in state.connections:
+                self._requests.append(request)
+        state.outgoing = waiting if UDP_CHANNEL not in state.failed else []
 
     def _event(self, event: Event) -> None:
         state, channel = self.state, event.channel
@@ -160,21 +204,42 @@ class FinsService:
                 if channel == UDP_CHANNEL:
                     state.udp_open = True
                 else:
-                    state.connections[channel] = Connection(self._free_number(), event.remote, self._now_ns)
-                    self._requests.append(Grant(channel, BUFFER_BYTES))
+                    self._opened(event)
             case PeerClosed() | Broken():
                 self._close(channel)
             case Failed(service="open"):
                 state.busy.discard(channel)
-                state.failed.add(channel)
+                if channel in self._clients:
+                    self._retry(channel)
+                else:
+                    state.failed.add(channel)
             case Failed() if channel != UDP_CHANNEL:
                 self._close(channel, reset=True)
             case Closed():
                 state.busy.discard(channel)
                 state.closing.discard(channel)
+                if channel in self._clients:
+                    self._retry(channel)
+
+    def _opened(self, event: Opened) -> None:
+        """A connection is open: its client says its node, and waits for that of the server."""
+        channel = event.channel
+        is_client = channel in self._clients
+        number = self._clients[channel] if is_client else self._free_number()
+        self.state.connections[channel] = Connection(number, event.local_port, event.remote, is_client, self._now_ns)
+        if is_client:
+            self._requests.append(Send(channel, tcp.client_node(self.settings.own_node).to_bytes()))
+        self._requests.append(Grant(channel, BUFFER_BYTES))
+
+    def _retry(self, channel: int) -> None:
+        """A connection of which this unit is the client is gone: it is opened again, one to another server at once."""
+        if self.state.dialled.pop(channel, None) == self._server(channel):
+            self.state.retry_ns[channel] = self._now_ns + RECONNECT_NS
+        else:
+            self.state.retry_ns.pop(channel, None)
 
     def _free_number(self) -> int:
-        used = {found.number for found in self.state.connections.values()}
+        used = {found.number for found in self.state.connections.values()} | set(self._clients.values())
         return next((number for number in CONNECTIONS if number not in used), 0)
 
     def _received(self, event: Received) -> None:
@@ -191,7 +256,8 @@ class FinsService:
                 self._close(channel, reset=True)
 
     def _close(self, channel: int, reset: bool = False) -> None:
-        if self.state.connections.pop(channel, None):
+        is_open = self.state.connections.pop(channel, None) is not None
+        if is_open or (channel in self._clients and channel in self.state.busy - self.state.closing):
             self.state.closing.add(channel)
             self._requests.append(Close(channel, reset))
 
@@ -217,7 +283,11 @@ class FinsService:
             self._refuse(channel, found, message.error)
         elif message.kind == tcp.Kind.ERROR:
             self._close(channel)
-        elif message.kind == tcp.Kind.CLIENT_NODE and not found.node:
+        elif found.is_client and message.kind == tcp.Kind.SERVER_NODE and not found.node:
+            self._welcome(channel, found, message)
+        elif found.is_client and message.kind == tcp.Kind.CONFIRMATION:
+            pass
+        elif message.kind == tcp.Kind.CLIENT_NODE and not found.node and not found.is_client:
             self._hello(channel, found, message)
         elif message.kind != tcp.Kind.FRAME or not found.node:
             self._refuse(channel, found, tcp.Error.NOT_SUPPORTED)
@@ -228,9 +298,10 @@ class FinsService:
                 self._requests.append(Send(channel, tcp.Message(tcp.Kind.FRAME, response).to_bytes()))
 
     def _refuse(self, channel: int, found: Connection, error: tcp.Error) -> None:
-        """Tells the client an error and closes: by an error notification, or, before its node is agreed on, in the answer."""
-        said = tcp.Message(tcp.Kind.ERROR, b"", error) if found.node or error == tcp.Error.NOT_SUPPORTED else (
-            tcp.server_node(0, 0, error))  # fmt: skip
+        """Tells the other side an error and closes: by an error notification, or, before a client's node is agreed on, in the
+        answer."""
+        by_notification = found.node or found.is_client or error == tcp.Error.NOT_SUPPORTED
+        said = tcp.Message(tcp.Kind.ERROR, b"", error) if by_notification else tcp.server_node(0, 0, error)
         self._requests.append(Send(channel, said.to_bytes()))
         self._close(channel)
 
@@ -239,6 +310,8 @@ class FinsService:
         node = FIRST_ALLOTTED + found.number - 1 if not message.is_wrong and message.node == 0 else 0
         if message.is_wrong:
             error = tcp.Error.TOO_LONG
+        elif self.settings.permitted and found.remote.host not in self.settings.permitted:
+            error = tcp.Error.NOT_PERMITTED
         elif not found.number:
             error = tcp.Error.ALL_IN_USE
         elif node:
@@ -251,6 +324,13 @@ class FinsService:
             return
         found.node = node
         self._requests.append(Send(channel, tcp.server_node(node, self.settings.own_node).to_bytes()))
+
+    def _welcome(self, channel: int, found: Connection, message: tcp.Message) -> None:
+        """Takes the node that a server says it has; without one the connection is closed, and opened again later."""
+        if message.is_wrong or message.error or not 0 < message.server <= LAST_NODE or message.server == self.settings.own_node:
+            self._close(channel)
+        else:
+            found.node = message.server
 
     def _refusal(self, node: int) -> tcp.Error:
         """Why a client cannot have the node that it asks for.  Whoever has it is asked whether it lives."""

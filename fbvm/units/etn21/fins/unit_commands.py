@@ -10,19 +10,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fbvm.units.addresses import words_of
-from fbvm.units.etn21.fins.state import CONNECTIONS, FinsSettings, FinsState
+from fbvm.units.etn21.fins.state import BEFORE_CLIENTS, CONNECTIONS, FinsSettings, FinsState
 from fbvm.wire.fins.codes import EndCode
+from fbvm.wire.link import Peer
 
 MODEL = b"CJ1W-ETN21"
 """As 0502 names it."""
 LOG_RECORDS = 64
 """Room of the error log; W420 7-3-7 p165."""
-SERVER = 3
-"""Service of a FINS/TCP connection: a server; 4 would be a client."""
-LISTENING, ESTABLISHED = 1, 4
+SERVER, CLIENT = 3, 4
+"""Services of a FINS/TCP connection."""
+CLOSED, LISTENING, SYN_SENT, ESTABLISHED = 0, 1, 2, 4
 """TCP states; W420 7-3-27 p196."""
 ERROR_FLAGS = 0xC1DE
 """Bits of n+18 that are flags of 0601, too: 1 to 4, 6 to 8, 14, 15.  W343 11-3-3 p219."""
+ANYBODY = Peer("0.0.0.0", 0)
 MOST_PACKETS = 0xFFFF_FFFF
 """Where packets are no longer counted; W420 7-3-3 p163."""
 
@@ -88,11 +90,18 @@ def clear_error_log(asked: Asked) -> bytes:
 
 
 def change_remote_node(asked: Asked) -> bytes:
-    """2730: another server for a connection that is a client.  All connections are servers, as the unit has them by default."""
+    """2730: another server for a connection of which this unit is the client, until the unit restarts.  The service closes the
+    connection and opens it to the new server."""
     number, address, port = struct.unpack(">H4sH", asked.parameters)
     if number not in CONNECTIONS or not any(address) or not port:
         raise Refused(EndCode.PARAMETER)
-    raise Refused(EndCode.NOT_A_CLIENT)
+    if number not in asked.settings.clients:
+        raise Refused(EndCode.NOT_A_CLIENT)
+    server = Peer(".".join(str(byte) for byte in address), port)
+    if any(found.is_client and found.remote == server for found in asked.state.connections.values()):
+        raise Refused(EndCode.CONNECTION_EXISTS)
+    asked.state.changed_servers[number] = server
+    return b""
 
 
 def connection_status(asked: Asked) -> bytes:
@@ -100,12 +109,17 @@ def connection_status(asked: Asked) -> bytes:
     number = asked.number(0)
     if number not in CONNECTIONS:
         raise Refused(EndCode.PARAMETER)
-    local = _packed(asked.settings.address)
-    remote, remote_port, tcp = bytes(4), 0, LISTENING
+    channel = BEFORE_CLIENTS + number
+    if number in asked.settings.clients:
+        tcp = SYN_SENT if channel in asked.state.busy - asked.state.closing else CLOSED
+        service, local_port, remote = CLIENT, 0, asked.state.dialled.get(channel, ANYBODY)
+    else:
+        service, local_port, remote, tcp = SERVER, asked.settings.port, ANYBODY, LISTENING
     for found in asked.state.connections.values():
         if found.number == number:
-            remote, remote_port, tcp = _packed(found.remote.host), found.remote.port, ESTABLISHED
-    return struct.pack(">HH4sH4sHI", number, SERVER, local, asked.settings.port, remote, remote_port, tcp)
+            local_port, remote, tcp = found.local_port, found.remote, ESTABLISHED
+    return struct.pack(">HH4sH4sHI", number, service, _packed(asked.settings.address), local_port, _packed(remote.host),
+                       remote.port, tcp)  # fmt: skip
 
 
 def address_information(asked: Asked) -> bytes:
