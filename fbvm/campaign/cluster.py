@@ -1,23 +1,29 @@
-"""Has a Dask cluster execute the tasks of a campaign: processes of this machine, or those of a scheduler somewhere.
+"""Has a Dask cluster do tasks: processes of this machine, or those of a scheduler somewhere.
 
-The bench, with its Images, travels once to each worker, also to one that comes later.  A worker that goes away loses nothing: the
-scheduler gives its tasks to another one.  A scheduler executes whatever it is sent: it belongs into a network that one trusts."""
+What the tasks need, a bench, travels once to each worker, also to one that comes later.  A worker that goes away loses nothing:
+the scheduler gives its tasks to another one.  A scheduler executes whatever it is sent: it belongs into a network that one
+trusts."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, suppress
 from itertools import islice
 from tempfile import TemporaryDirectory
-from types import TracebackType
-from typing import Any, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from distributed import Client, LocalCluster, WorkerPlugin, as_completed, get_worker
 from distributed.scheduler import KilledWorker
 
 from fbvm.base.version import VERSION
-from fbvm.campaign.work import Bench, Done, Mismatch, Task, Unreachable
+from fbvm.campaign.processes import CRASHED, Crashed, Late
+from fbvm.campaign.work import Mismatch, Unreachable
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+Given = TypeVar("Given", contravariant=True)
+Made = TypeVar("Made", covariant=True)
 
 LOCAL = "local"
 """In place of an address: processes of this machine."""
@@ -27,29 +33,46 @@ CONNECT_S = 10
 ASK_VERSION = "__import__('fbvm').__version__"
 
 
-class _Prepared(WorkerPlugin):
-    """Keeps the bench of a campaign in each worker."""
+class Workable(Protocol[Given, Made]):
+    """What does tasks in a worker; pickle has to know it.  `mark` tells it from others."""
 
-    def __init__(self, bench: Bench) -> None:
+    @property
+    def mark(self) -> str: ...
+
+    def limited(self, task: Given, limit_ns: int) -> Made:
+        """Does a task, for `limit_ns` at most where it can be ended."""
+
+    def close(self) -> None:
+        """Called in the worker when no more tasks come."""
+
+
+class _Prepared(WorkerPlugin):
+    """Keeps a bench in each worker."""
+
+    def __init__(self, bench: Workable[Any, Any]) -> None:
         self.name, self.bench = bench.mark, bench
 
+    def teardown(self, worker: Any) -> None:
+        self.bench.close()
 
-def _work(mark: str, task: Task) -> Done:
+
+def _work(mark: str, task: Any, limit_ns: int) -> Any:
     """Does a task in a worker."""
-    return cast(_Prepared, get_worker().plugins[mark]).bench.work(0, task)
+    return cast(_Prepared, get_worker().plugins[mark]).bench.limited(task, limit_ns)
 
 
-class InCluster:
-    """Does tasks in a cluster: at `address`, such as tcp://192.168.1.5:8786, or in `jobs` processes of this machine, LOCAL.
+class Cluster(Generic[Task, Result]):
+    """Does tasks in a cluster as a `Pool` does: at `address`, such as tcp://192.168.1.5:8786, or in `jobs` processes of this
+    machine, LOCAL.
 
     Raises Unreachable, and Mismatch for a worker with another version of fbvm or without it."""
 
-    def __init__(self, bench: Bench, address: str, jobs: int) -> None:
+    def __init__(self, bench: Workable[Task, Result | Late | Crashed], address: str, jobs: int) -> None:
         self._bench, self._address, self._jobs = bench, address, jobs
         self._stack = ExitStack()
         self._threads = jobs
 
-    def __enter__(self) -> InCluster:
+    def __enter__(self) -> Cluster[Task, Result]:
         with ExitStack() as stack:
             cluster = self._address if self._address != LOCAL else stack.enter_context(self._local(stack))
             try:
@@ -59,9 +82,15 @@ class InCluster:
                 raise Unreachable(f"{self._address} is no Dask scheduler that answers: {error}") from None
             self._check()
             self._client.register_plugin(_Prepared(self._bench))
+            stack.callback(self._leave)
             self._threads = sum(self._client.nthreads().values())
             self._stack = stack.pop_all()
         return self
+
+    def _leave(self) -> None:
+        """Takes the bench from the workers, as far as there are some."""
+        with suppress(Exception):  # the scheduler may have gone
+            self._client.unregister_worker_plugin(self._bench.mark)
 
     def _local(self, stack: ExitStack) -> Any:
         scratch = stack.enter_context(TemporaryDirectory())
@@ -80,17 +109,18 @@ class InCluster:
             if version != VERSION:
                 raise Mismatch(f"the worker {worker} has fbvm {version}, not {VERSION}")
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *raised: object) -> None:
         self._stack.close()
 
-    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
-        """Each task with what came of it, None for one that ends every process that tries it."""
+    def results(self, tasks: Iterable[Task], limit_ns: int) -> Iterator[tuple[Task, Result | Late | Crashed]]:
+        """Each task with what came of it, in the order in which they end, CRASHED for one that ends every worker that tries
+        it."""
         left, waiting = iter(tasks), dict[str, Task]()
 
         def sent(count: int) -> list[Any]:
             made = []
             for task in islice(left, count):
-                future = self._client.submit(_work, self._bench.mark, task, pure=False)
+                future = self._client.submit(_work, self._bench.mark, task, limit_ns, pure=False)
                 waiting[future.key] = task
                 made.append(future)
             return made
@@ -103,7 +133,7 @@ class InCluster:
             if future.status == "finished":
                 yield task, future.result()
             elif future.status == "error" and isinstance(future.exception(), KilledWorker):
-                yield task, None
+                yield task, CRASHED
             elif future.status == "error":
                 raise future.exception()
             else:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, cast
 
 from fbvm.campaign.processes import Crashed, Late, Pool
 from fbvm.campaign.work import Bench, Done, Task
@@ -38,19 +38,31 @@ class InThisProcess(Executor):
             yield task, self._bench.work(0, task)
 
 
-class InProcesses(Executor):
-    """Does so many tasks at once, each in a process of its own."""
+class Workers(AbstractContextManager["Workers"], Protocol):
+    """Who does tasks elsewhere: processes of this machine, or a cluster."""
 
-    def __init__(self, bench: Bench, jobs: int) -> None:
-        self._pool = Pool[Task, Done](jobs, bench.prepare, bench.work)
+    def results(self, tasks: Sequence[Task], limit_ns: int) -> Iterator[tuple[Task, Done | Late | Crashed]]:
+        """Each task with what came of it, in the order in which they end."""
 
-    def __enter__(self) -> InProcesses:
-        self._pool.__enter__()
+
+class ByWorkers(Executor):
+    """Has others do the tasks, many at once."""
+
+    def __init__(self, workers: Workers) -> None:
+        self._workers = workers
+
+    def __enter__(self) -> ByWorkers:
+        self._workers.__enter__()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._pool.__exit__(kind, error, trace)
+        self._workers.__exit__(kind, error, trace)
 
     def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
-        for task, found in self._pool.results(tasks, LIMIT_NS):
+        for task, found in self._workers.results(tasks, LIMIT_NS):
             yield task, None if isinstance(found, Late | Crashed) else found
+
+
+def in_processes(bench: Bench, jobs: int) -> Executor:
+    """Does so many tasks at once, each in a process of its own."""
+    return ByWorkers(cast(Workers, Pool[Task, Done](jobs, bench.prepare, bench.work)))

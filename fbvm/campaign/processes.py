@@ -1,16 +1,20 @@
-"""Tasks done by processes of this machine, each within a limit of time; a process that does not answer is ended and replaced."""
+"""Tasks done by processes of this machine, each within a limit of time; a process that does not answer is ended and replaced.
+
+Processes are started as programs of their own, not by `multiprocessing`: a worker of Dask, which may start none by that, needs
+them, too."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
+import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from multiprocessing import connection, resource_tracker
+from functools import cached_property
+from multiprocessing import connection
 from types import FrameType
 from typing import Any, Generic, TypeAlias, TypeVar
 
@@ -20,7 +24,17 @@ from fbvm.run.time_limit import time_limit
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 Line: TypeAlias = Any
-"""One end of a pipe of `multiprocessing`, whose class differs by system."""
+"""One end of a connection of `multiprocessing`, whose class differs by system."""
+CODE = """import sys
+from multiprocessing.connection import Client
+line = Client({address!r})
+sys.stdout.buffer.write(b"+")
+sys.stdout.flush()
+sys.path[:] = {path!r}
+from fbvm.campaign.processes import serve
+serve(line)
+"""
+"""What a process executes: it connects first, so that nobody waits for one that ends before."""
 
 POLL_S = 0.2
 """How often limits are looked at while nobody answers."""
@@ -39,23 +53,45 @@ class Crashed:
 LATE, CRASHED = Late(), Crashed()
 
 
+class NotStarted(OSError):
+    """A process could not be started: it has ended before it connected."""
+
+
 @dataclass
 class _Worker(Generic[Task]):
     """A process, the task it does, and whether its time is over.  The time of a task begins when the process is ready."""
 
-    process: multiprocessing.process.BaseProcess
-    line: Line
+    process: subprocess.Popen[bytes]
+    door: connection.Listener
     task: Task | None = None
     is_ready: bool = False
     expired: Callable[[], bool] = lambda: False
+
+    @cached_property
+    def line(self) -> Line:
+        """The connection to the process, which is awaited at its first use.  Raises NotStarted."""
+        assert self.process.stdout
+        if not self.process.stdout.read(1):
+            raise NotStarted(f"{sys.executable} ended with status {self.process.wait()} before it began")
+        return self.door.accept()
+
+    def end(self) -> None:
+        """Ends the process, whatever it does."""
+        self.process.kill()
+        self.process.wait()
+        if "line" in vars(self):
+            self.line.close()
+        self.door.close()
+        assert self.process.stdout
+        self.process.stdout.close()
 
 
 @dataclass
 class Pool(Generic[Task, Result]):
     """Processes that do tasks by `work(number, task)`; `number` is that of the process, from 0 on, also of its replacement.
 
-    `prepare` and `work` have to be functions that pickle knows, with parts that it knows.  Each process calls `prepare(number)`
-    first.  Use it in a `with` statement: all processes are ended behind it."""
+    `prepare` and `work` have to be functions that pickle knows, with parts that it knows, of modules that can be imported.  Each
+    process calls `prepare(number)` first.  Use it in a `with` statement: all processes are ended behind it."""
 
     count: int
     prepare: Callable[[int], None]
@@ -73,12 +109,14 @@ class Pool(Generic[Task, Result]):
 
     def results(self, tasks: Iterable[Task], limit_ns: int) -> Iterator[tuple[Task, Result | Late | Crashed]]:
         """Each task with what came of it, in the order in which they end.  A task has `limit_ns`
-        from its beginning on, without the start of a process."""
+        from its beginning on, without the start of a process.  Raises NotStarted."""
         left, begun = deque(tasks), dict[int, int]()
         while left or any(worker and worker.task is not None for worker in self._workers):
-            for number in range(self.count):
-                if left and ((worker := self._workers[number]) is None or worker.task is None):
-                    self._begin(number, left.popleft(), limit_ns)
+            idle = [number for number, worker in enumerate(self._workers) if worker is None or worker.task is None][: len(left)]
+            for number in idle:
+                self._workers[number] = self._workers[number] or self._started()
+            for number in idle:
+                self._begin(number, left.popleft(), limit_ns)
             busy = {worker.line: number for number, worker in enumerate(self._workers) if worker and worker.task is not None}
             ready = connection.wait(list(busy), POLL_S)
             for line, number in busy.items():
@@ -106,35 +144,32 @@ class Pool(Generic[Task, Result]):
                     yield task, LATE
 
     def _begin(self, number: int, task: Task, limit_ns: int) -> None:
-        worker = self._workers[number] or self._started(number)
+        worker = self._workers[number]
+        assert worker
         worker.task = task
         if worker.is_ready:
             worker.expired = time_limit(limit_ns)
-        with suppress(OSError):  # it has ended, which its line tells, too
+        with suppress(BrokenPipeError, ConnectionResetError):  # it has ended, which its line tells, too
+            if "line" not in vars(worker):
+                worker.line.send((number, self.prepare, self.work))
             worker.line.send(task)
 
-    def _started(self, number: int) -> _Worker[Task]:
-        """A new process.  It is spawned, not forked: threads of the compiler may hold locks."""
-        context = multiprocessing.get_context("spawn")
-        resource_tracker.ensure_running()  # its start would let held signals through
+    def _started(self) -> _Worker[Task]:
+        """A new process."""
         with signals_held():
-            near, far = context.Pipe()
-            process = context.Process(target=_serve, args=(far, number, self.prepare, self.work), daemon=True)
-            process.start()
-            worker = self._workers[number] = _Worker[Task](process, near)
-        far.close()
-        return worker
+            door = connection.Listener()  # where only this user comes in
+            code = CODE.format(address=door.address, path=sys.path)
+            process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                       stderr=subprocess.DEVNULL)  # fmt: skip
+            return _Worker[Task](process, door)
 
     def _end(self, number: int) -> None:
         worker, self._workers[number] = self._workers[number], None
         if worker:
-            worker.process.kill()
-            worker.process.join()
-            worker.line.close()
+            worker.end()
 
 
-def _serve(line: Line, number: int, prepare: Callable[[int], None],
-           work: Callable[[int, Task], Result]) -> None:  # fmt: skip
+def serve(line: Line) -> None:
     """What a process does: tasks, until nobody asks any more.  What they print is dropped."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
@@ -142,8 +177,9 @@ def _serve(line: Line, number: int, prepare: Callable[[int], None],
     sys.stdin = open(0, closefd=False)  # noqa: SIM115 - lives as long as the process
     with handling([signal.SIGINT], _wait_for_the_end):
         let_signals_through()
-        prepare(number)
         with suppress(EOFError, OSError):
+            number, prepare, work = line.recv()
+            prepare(number)
             line.send(None)
             while True:
                 line.send(work(number, line.recv()))

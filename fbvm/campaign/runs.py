@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from fbvm.campaign.execution import Result
-from fbvm.campaign.executors import Executor, InProcesses, InThisProcess
+from fbvm.campaign.executors import Executor, InThisProcess, in_processes
 from fbvm.campaign.groups import Group, grouped
 from fbvm.campaign.judge import CRASHED, Failure
 from fbvm.campaign.plan import Plan
@@ -75,7 +75,7 @@ def conduct(bench: Bench, outcome: Outcome, jobs: int, take: Callable[[Sequence[
     if others is None and (jobs == 1 or once_ns * len(left) < QUICK_NS):
         others, size = InThisProcess(bench), 1
     else:
-        others = others or InProcesses(bench, jobs)
+        others = others or in_processes(bench, jobs)
         size = max(1, min(BATCH_NS // max(once_ns, 1), MOST_IN_BATCH, len(left) // jobs))
     with others:
         _execute(others, left, size, take)

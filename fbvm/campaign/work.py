@@ -78,6 +78,14 @@ class Bench:
             _executions[self.mark] = Execution(self.plan, images)
         return _executions[self.mark]
 
+    def limited(self, task: Task, limit_ns: int) -> Done:
+        """Does a task in a worker of a cluster, where nothing that hangs can be ended: scans have a budget of statements."""
+        return self.work(0, task)
+
+    def close(self) -> None:
+        """Called in a worker of a cluster when no more tasks come."""
+        _executions.pop(self.mark, None)
+
     def variant(self, number: int) -> Variant:
         """The run with this number."""
         return draw(self.plan, number)

@@ -16,7 +16,7 @@ HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 
 from fbvm.campaign.execution import Result  # noqa: E402
-from fbvm.campaign.executors import Executor, InProcesses, InThisProcess  # noqa: E402
+from fbvm.campaign.executors import ByWorkers, Executor, InThisProcess, in_processes  # noqa: E402
 from fbvm.campaign.plan_file import Written, any_cuts, any_faults, with_about  # noqa: E402
 from fbvm.campaign.planning import images_of, plan_of, program_project  # noqa: E402
 from fbvm.campaign.runs import Outcome, conduct  # noqa: E402
@@ -57,11 +57,11 @@ def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else RUNS
     bench = demo(runs)
     ways: dict[str, tuple[Executor, int]] = {
-        "one process": (InThisProcess(bench), 1), f"{WORKERS} processes": (InProcesses(bench, WORKERS), WORKERS)}  # fmt: skip
+        "one process": (InThisProcess(bench), 1), f"{WORKERS} processes": (in_processes(bench, WORKERS), WORKERS)}  # fmt: skip
     if find_spec("distributed") is not None:
-        from fbvm.campaign.cluster import LOCAL, InCluster
+        from fbvm.campaign.cluster import LOCAL, Cluster
 
-        ways[f"{WORKERS} Dask workers"] = InCluster(bench, LOCAL, WORKERS), WORKERS
+        ways[f"{WORKERS} Dask workers"] = ByWorkers(Cluster(bench, LOCAL, WORKERS)), WORKERS
     first: list[Result] = []
     alone = 0.0
     for name, (executor, jobs) in ways.items():

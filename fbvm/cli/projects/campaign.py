@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,15 +13,15 @@ import click
 import fbvm
 from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
 from fbvm.cli.shared import status
+from fbvm.cli.shared.cluster import cluster_of, cluster_option
 from fbvm.cli.shared.files import growing_file, writing
-from fbvm.cli.shared.options import time_ns
+from fbvm.cli.shared.options import moment_ns
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.run_recording import record_plant
 from fbvm.cli.shared.terminal import named, say, say_json
 
 if TYPE_CHECKING:
     from fbvm.campaign.execution import Execution, Result
-    from fbvm.campaign.executors import Executor
     from fbvm.campaign.groups import Group
     from fbvm.campaign.plan_file import Written
     from fbvm.campaign.runs import Outcome
@@ -49,8 +48,7 @@ FOLDER = Path("campaign-results")
 @click.option("--cuts", type=click.IntRange(min=0), default=0, metavar="N", help="Power cuts in each run.")
 @click.option("--timing", type=click.Choice(["exact", "real"]), default=None,
               help="How units answer: real, late and out of step by the seed of the run, is what they do by themselves.")
-@click.option("--cluster", metavar="local|tcp://HOST:PORT",
-              help="Have Dask execute the runs: in processes of this machine, or by the workers of a scheduler.")
+@cluster_option
 @click.option("--out", "folder", type=click.Path(file_okay=False, path_type=Path), default=FOLDER, show_default=True,
               metavar="DIR", help="Where results and recordings are kept; the same campaign goes on there.")
 @click.option("--fresh", is_flag=True, help="Begin anew, in place of results that are there.")
@@ -108,7 +106,7 @@ def _changed(written: Written, project: Project, options: dict[str, Any]) -> Wri
     for_ns = about["for"] or project.for_ns
     if (options["faults"] or options["cuts"]) and for_ns is None:
         raise click.UsageError("say how long a run takes at most, by --for: faults come at any time of it")
-    responses = [Response(trigger, answer, time_ns(limit)) for trigger, answer, limit in options["within"]]
+    responses = [Response(trigger, answer, moment_ns(limit)) for trigger, answer, limit in options["within"]]
     faults = [any_faults(options["faults"], for_ns or 0)] * bool(options["faults"])
     cuts = [any_cuts(options["cuts"], for_ns or 0)] * bool(options["cuts"])
     written = with_about(written, never=(*about["never"], *options["never"]), always=(*about["always"], *options["always"]),
@@ -132,6 +130,7 @@ def _open(make: type[Store], folder: Path, mark: str, fresh: bool) -> Store:
 
 def _conduct(bench: Bench, outcome: Outcome, store: Store, jobs: int, cluster: str | None) -> None:
     """Executes what is left of a campaign, and shows how it goes."""
+    from fbvm.campaign.executors import ByWorkers
     from fbvm.campaign.runs import conduct
     from fbvm.run.time_limit import stopwatch
 
@@ -146,16 +145,7 @@ def _conduct(bench: Bench, outcome: Outcome, store: Store, jobs: int, cluster: s
             rate = (done - there) * 1_000_000_000 / max(elapsed(), 1)
             update(f"{done:,} of {known:,} runs, {outcome.failing:,} failing, {rate:.0f} a second,", done, known)
 
-        conduct(bench, outcome, jobs, take, _cluster(bench, cluster, jobs) if cluster else None)
-
-
-def _cluster(bench: Bench, address: str, jobs: int) -> Executor:
-    """The cluster at an address.  Raises UsageError if Dask is not installed."""
-    if find_spec("distributed") is None:
-        raise click.UsageError("--cluster needs Dask: pip install 'fbvm[cluster]'")
-    from fbvm.campaign.cluster import InCluster
-
-    return InCluster(bench, address, jobs)
+        conduct(bench, outcome, jobs, take, ByWorkers(cluster_of(bench, cluster, jobs)) if cluster else None)
 
 
 # --- what is left behind ----------------------------------------------------------------------------------------------

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fbvm.cli.shared import status
-from fbvm.cli.shared.options import CYCLE_NS, time_ns
+from fbvm.cli.shared.cluster import cluster_of, cluster_option
+from fbvm.cli.shared.options import CYCLE_NS, moment_ns, time_ns
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.terminal import named, say, say_json
 
 if TYPE_CHECKING:
     from fbvm.base.diagnostics import Source
-    from fbvm.campaign.mutants import Tried
-    from fbvm.campaign.mutation import Outcome
+    from fbvm.campaign.mutation.mutants import Tried
+    from fbvm.campaign.mutation.session import Outcome
 
 PROOF_NS = 5_000_000_000
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -32,10 +33,11 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes; as many as there are processors by itself.")
 @click.option("--limit", "limit_ns", type=time_ns, default=0, metavar="TIME",
               help="How long the tests may take with a mutant; ten times as long as without one by itself.")
-@click.option("--budget", "budget_ns", type=time_ns, default=PROOF_NS, show_default="5s", metavar="TIME",
+@click.option("--budget", "budget_ns", type=moment_ns, default=PROOF_NS, show_default="5s", metavar="TIME",
               help="How long to look for a proof that a mutant which survives is equal; 0s proves nothing.")
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="How often the PLC scans, for these proofs.")
+@cluster_option
 @click.option("--tests", "arguments", multiple=True, metavar="PATH", help="Tests to run; all of this folder by itself.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, with all mutants.")
 def command(files: tuple[Path, ...], as_json: bool, **options: Any) -> None:
@@ -44,10 +46,11 @@ def command(files: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     FILEs are the sources to change; all .st files but tests by themselves.  The tests of the folder run on each mutant in a copy
     of the folder.  A mutant that is proved to give the same outputs does not count, if the solver is there (fbvm[prove]).
 
-    Status 0 if the tests found all mutants, 1 if some survived, 2 if the tests fail without one."""
+    Status 0 if the tests found all mutants, 1 if some survived, 2 if the tests fail without one, 5 if the cluster cannot be
+    used."""
     if find_spec("pytest") is None:
         raise click.UsageError("tests need pytest: pip install pytest")
-    from fbvm.campaign.mutation import (
+    from fbvm.campaign.mutation.session import (
         NotPossible,
         Outcome,
         Settings,
@@ -59,8 +62,9 @@ def command(files: tuple[Path, ...], as_json: bool, **options: Any) -> None:
         try_mutants,
     )
     from fbvm.campaign.project_copies import TooLarge
+    from fbvm.campaign.work import Mismatch, Unreachable
 
-    folder = Path.cwd()
+    folder, address = Path.cwd(), options["cluster"]
     try:
         names = _names(files, folder) or sources_of(folder)
         sources = [read_source(folder, name) for name in names]
@@ -75,12 +79,16 @@ def command(files: tuple[Path, ...], as_json: bool, **options: Any) -> None:
             if mutants:
                 with show_progress("mutants") as update:
                     try_mutants(folder, mutants, sources, settings, outcome,
-                                lambda now: update(_counted(now), len(now.tried), now.known))  # fmt: skip
+                                lambda now: update(_counted(now), len(now.tried), now.known),
+                                (lambda bench: cluster_of(bench, address, settings.jobs)) if address else None)  # fmt: skip
         finally:
             if outcome.tried or not mutants:
                 _print(outcome, sources, as_json)
     except (NotPossible, TooLarge) as error:
         raise click.UsageError(str(error)) from None
+    except (Mismatch, Unreachable) as error:
+        say(str(error), fg="red", err=True)
+        sys.exit(status.NETWORK)
     sys.exit(status.FAILED if outcome.counts["survived"] else status.GOOD)
 
 

@@ -18,15 +18,23 @@ CYCLE_NS = 10_000_000
 """Cycle of programs without a TASK if --cycle is not given."""
 
 
-def time_ns(value: str | int) -> int:
-    """The nanoseconds of `10ms`, `1.5s` or `T#10ms`.  Raises BadParameter, also for a time that is not positive."""
+def moment_ns(value: str | int) -> int:
+    """The nanoseconds of `10ms`, `1.5s`, `T#10ms` or `0s`.  Raises BadParameter, also for a negative time."""
     if isinstance(value, int):
         return value
     try:
         passed_ns = parse_time_ns(value)
     except ValueError as error:
         raise BadParameter(str(error)) from None
-    if passed_ns <= 0:
+    if passed_ns < 0:
+        raise BadParameter(f"{value} is not a time that can pass")
+    return passed_ns
+
+
+def time_ns(value: str | int) -> int:
+    """As `moment_ns`.  Raises BadParameter for 0, too."""
+    passed_ns = moment_ns(value)
+    if not passed_ns and not isinstance(value, int):
         raise BadParameter(f"{value} is not a time that can pass")
     return passed_ns
 

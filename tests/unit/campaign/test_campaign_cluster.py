@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from fbvm.campaign.executors import InThisProcess
+from fbvm.campaign.executors import LIMIT_NS, InThisProcess
 from fbvm.campaign.plan_file import Written, with_about
 from fbvm.campaign.planning import images_of, plan_of, program_project
 from fbvm.campaign.runs import Outcome
@@ -41,18 +41,18 @@ def test_a_cluster_gives_the_same_results_though_a_worker_is_killed(bench: Bench
     for _, found in InThisProcess(bench).done(batches):
         assert isinstance(found, list)
         here.add(found)
-    with cluster.InCluster(bench, cluster.LOCAL, 2) as executor:
+    with cluster.Cluster(bench, cluster.LOCAL, 2) as executor:
         client = executor._client
         victims = list(client.run(os.getpid).values())
         assert len(victims) == 2
-        for number, (_, found) in enumerate(executor.done(batches)):
+        for number, (_, found) in enumerate(executor.results(batches, LIMIT_NS)):
             assert isinstance(found, list)
             there.add(found)
             if number == 0:
                 os.kill(victims[0], signal.SIGKILL)
         assert there.rows == here.rows
         monkeypatch.setattr(cluster, "VERSION", "0.0.1")
-        with pytest.raises(Mismatch, match=r"has fbvm .*, not 0\.0\.1"), cluster.InCluster(bench, client.scheduler.address, 1):
+        with pytest.raises(Mismatch, match=r"has fbvm .*, not 0\.0\.1"), cluster.Cluster(bench, client.scheduler.address, 1):
             raise AssertionError("a worker of another version was accepted")
 
 

@@ -19,7 +19,7 @@ from click.testing import CliRunner
 from fbvm.base.data import data_folder
 from fbvm.campaign.axes import axis_from_text
 from fbvm.campaign.execution import Result
-from fbvm.campaign.executors import InProcesses, InThisProcess
+from fbvm.campaign.executors import InThisProcess, in_processes
 from fbvm.campaign.judge import CRASHED
 from fbvm.campaign.plan import Moments, PowerRule
 from fbvm.campaign.plan_file import Written, with_about
@@ -123,7 +123,7 @@ def test_processes_give_the_results_of_this_process(folder: Path) -> None:
     bench = bench_of(never=("Main.Up AND Main.Down",), runs=40)
     batches = [Batch(tuple(range(at, at + 10))) for at in range(0, 40, 10)]
     tables = []
-    for number, executor in enumerate((InThisProcess(bench), InProcesses(bench, 2))):
+    for number, executor in enumerate((InThisProcess(bench), in_processes(bench, 2))):
         outcome = Outcome(bench.plan)
         with executor:
             for _, found in executor.done(batches):
@@ -149,7 +149,7 @@ class KillsRun(Bench):
 def test_a_run_that_ends_its_process_is_a_failure_and_nothing_else_is_lost(folder: Path) -> None:
     bench = bench_of(runs=20)
     outcome = Outcome(bench.plan)
-    conduct(KillsRun(**vars(bench)), outcome, 2, outcome.add, InProcesses(KillsRun(**vars(bench)), 2))
+    conduct(KillsRun(**vars(bench)), outcome, 2, outcome.add, in_processes(KillsRun(**vars(bench)), 2))
     assert sorted(outcome.results) == list(range(20))
     assert [(result.number, result.failure.kind) for result in outcome.rows if result.failure] == [(7, CRASHED)]
 

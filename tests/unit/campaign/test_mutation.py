@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
-from fbvm.campaign.mutation import changed_lines
+from fbvm.campaign.mutation.session import changed_lines
 from fbvm.campaign.processes import CRASHED, LATE, Pool
+from fbvm.campaign.project_copies import pack_project
+from fbvm.campaign.shipped import Shipped
 from fbvm.cli.main import main
 
 pytestmark = pytest.mark.slow
@@ -97,3 +100,36 @@ def test_a_task_that_ends_its_process_or_never_ends_is_told_and_the_others_are_d
     with Pool[str, str](2, _nothing, _work) as pool:
         found = dict(pool.results(["a", "ends", "b", "stays", "c"], 3_000_000_000))
     assert found == {"a": "A", "b": "B", "c": "C", "ends": CRASHED, "stays": LATE}
+
+
+def test_a_cluster_finds_what_processes_find(project: Path) -> None:
+    pytest.importorskip("distributed", reason="the extra cluster is not installed")
+    chosen = ("--budget", "0s", "--sample", "4", "--seed", "1", "--jobs", "1")
+    here, there = mutated(*chosen), mutated(*chosen, "--cluster", "local")
+    assert here == there
+    assert here[1]["counts"]["killed"] and here[1]["counts"]["survived"]
+
+
+class Stays:
+    """A bench of tasks that say in which folder they are, or never end."""
+
+    folder = ""
+
+    def in_folders(self, folders: Sequence[str]) -> Stays:
+        self.folder = folders[0]
+        return self
+
+    def prepare(self, number: int) -> None:
+        os.chdir(self.folder)
+
+    def work(self, number: int, task: str) -> str:
+        return f"{Path.cwd().name} {Path(task).read_text()}" if task != "stays" else _work(number, task)
+
+
+def test_what_hangs_in_a_copy_that_has_travelled_is_ended(project: Path) -> None:
+    (project / "a.txt").write_text("here")
+    shipped = Shipped(Stays(), "plant", pack_project(project))
+    try:
+        assert [shipped.limited("a.txt", 60_000_000_000), shipped.limited("stays", 1_000_000)] == ["plant here", LATE]
+    finally:
+        shipped.close()

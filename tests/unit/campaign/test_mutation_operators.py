@@ -5,8 +5,8 @@ from __future__ import annotations
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
-from fbvm.campaign.mutants import Change, Mutant
-from fbvm.campaign.mutation import mutants_of
+from fbvm.campaign.mutation.mutants import Change, Mutant
+from fbvm.campaign.mutation.session import mutants_of
 
 HEAD = "PROGRAM Main\nVAR a, b, c : BOOL; n : INT; t : TIME; END_VAR\n"
 

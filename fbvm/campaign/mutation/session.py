@@ -1,26 +1,28 @@
 """Mutation testing of a project: its mutants, what the tests make of each, and how many they find.
 
-Each process has a copy of the project in a temporary folder, which is removed at the end; the project itself is only read."""
+Each process has a copy of the project in a temporary folder, which is removed at the end; the project itself is only read.
+The processes are of this machine, or of the workers of a cluster."""
 
 from __future__ import annotations
 
-import os
 import random
 import re
 import subprocess
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 from fbvm.base.diagnostics import Source
-from fbvm.campaign.mutants import COUNTED, EQUAL, FOUND, KILLED, SURVIVED, TIMED_OUT, Mutant, Tried, line_of
-from fbvm.campaign.operators import changes
+from fbvm.campaign.mutation.mutants import COUNTED, EQUAL, FOUND, KILLED, SURVIVED, TIMED_OUT, Mutant, Tried, line_of
+from fbvm.campaign.mutation.operators import changes
+from fbvm.campaign.mutation.trial import NO_TESTS, AsItIs, Bench, Equality, Result, Task
 from fbvm.campaign.processes import Crashed, Late, Pool
-from fbvm.campaign.project_copies import copy_project, files_of
-from fbvm.campaign.trial import NO_TESTS, AsItIs, Bench, Equality, Result, Task
+from fbvm.campaign.project_copies import copy_project, files_of, pack_project
+from fbvm.campaign.shipped import Shipped
 from fbvm.run.time_limit import stopwatch
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
@@ -132,33 +134,52 @@ def changed_lines(folder: Path, revision: str, names: Sequence[str]) -> dict[str
 Tell = Callable[[Outcome], None]
 
 
+class Workers(AbstractContextManager["Workers"], Protocol):
+    """Who tries mutants: processes of this machine, or a cluster."""
+
+    def results(self, tasks: Iterable[Task], limit_ns: int) -> Iterator[tuple[Task, Result | Late | Crashed]]:
+        """Each task with what came of it, in the order in which they end."""
+
+
+Elsewhere = Callable[[Shipped[Task, Result]], Workers]
+"""Has a cluster try mutants of a project that travels to it."""
+
+
 def try_mutants(folder: Path, mutants: Sequence[Mutant], sources: Sequence[Source], settings: Settings, outcome: Outcome,
-                tell: Tell = lambda outcome: None) -> None:  # fmt: skip
+                tell: Tell = lambda outcome: None, elsewhere: Elsewhere | None = None) -> None:  # fmt: skip
     """Fills `outcome` with what came of each mutant, and calls `tell` after each; what is in it at a KeyboardInterrupt is good.
 
     `folder` is the project's, `sources` are those that the mutants are made of.  Raises NotPossible if the tests fail, or take
     too long, without a mutant; TooLarge for a folder that is more than a project; OSError."""
     libraries = tuple(dict.fromkeys(Path(name).parent.as_posix() for name in sources_of(folder)))
+    bench = Bench((), {source.name: source.text for source in sources}, settings.arguments, libraries)
+    if elsewhere:
+        with elsewhere(Shipped(bench, folder.name, pack_project(folder))) as workers:
+            _try_all(workers, mutants, settings, outcome, tell)
+        return
     jobs = max(1, min(settings.jobs, len(mutants)))
-    with _workplace() as place:
-        folders = tuple(str(place / f"copy{number}" / folder.name) for number in range(jobs))
+    with tempfile.TemporaryDirectory(prefix="fbvm-mutate-", ignore_cleanup_errors=True) as place:
+        folders = [str(Path(place, f"copy{number}", folder.name)) for number in range(jobs)]
         for copy in folders:
             copy_project(folder, Path(copy))
-        bench = Bench(folders, {source.name: source.text for source in sources}, settings.arguments, libraries)
+        bench = bench.in_folders(folders)
         with Pool[Task, Result](jobs, bench.prepare, bench.work) as pool:
-            usual_ns = _usual_limit(pool)
-            limit_ns = settings.limit_ns or usual_ns
-            for task, result in pool.results(mutants, limit_ns):
-                assert isinstance(task, Mutant)
-                _enter(outcome, task, result)
-                tell(outcome)
-            left = [each.mutant for each in outcome.rows if each.result == SURVIVED]
-            asked = [Equality(mutant, settings.cycle_ns, settings.budget_ns) for mutant in left if settings.budget_ns]
-            for task, result in pool.results(asked, settings.budget_ns + PROOF_SLACK_NS):
-                assert isinstance(task, Equality)
-                if isinstance(result, str) and result:
-                    outcome.tried[task.mutant.number] = Tried(task.mutant, EQUAL, result)
-                tell(outcome)
+            _try_all(pool, mutants, settings, outcome, tell)
+
+
+def _try_all(workers: Workers, mutants: Sequence[Mutant], settings: Settings, outcome: Outcome, tell: Tell) -> None:
+    usual_ns = _usual_limit(workers)
+    for task, result in workers.results(mutants, settings.limit_ns or usual_ns):
+        assert isinstance(task, Mutant)
+        _enter(outcome, task, result)
+        tell(outcome)
+    left = [each.mutant for each in outcome.rows if each.result == SURVIVED]
+    asked = [Equality(mutant, settings.cycle_ns, settings.budget_ns) for mutant in left if settings.budget_ns]
+    for task, result in workers.results(asked, settings.budget_ns + PROOF_SLACK_NS):
+        assert isinstance(task, Equality)
+        if isinstance(result, str) and result:
+            outcome.tried[task.mutant.number] = Tried(task.mutant, EQUAL, result)
+        tell(outcome)
 
 
 def _enter(outcome: Outcome, mutant: Mutant, result: Result | Late | Crashed) -> None:
@@ -172,10 +193,10 @@ def _enter(outcome: Outcome, mutant: Mutant, result: Result | Late | Crashed) ->
     outcome.tried[mutant.number] = tried
 
 
-def _usual_limit(pool: Pool[Task, Result]) -> int:
+def _usual_limit(workers: Workers) -> int:
     """The limit for tests with a mutant, by the time that they take without.  Raises NotPossible if they fail."""
     elapsed = stopwatch()
-    (_, result), *_ = pool.results([AsItIs()], FIRST_LIMIT_NS)
+    (_, result), *_ = workers.results([AsItIs()], FIRST_LIMIT_NS)
     if not isinstance(result, tuple):
         raise NotPossible("the tests do not end, without any mutant")
     status, by = result
@@ -184,20 +205,3 @@ def _usual_limit(pool: Pool[Task, Result]) -> int:
     if status:
         raise NotPossible(f"the tests fail without any mutant{': ' * bool(by)}{by}; fbvm test shows why")
     return max(LEAST_LIMIT_NS, TIMES_AS_LONG * elapsed())
-
-
-@contextmanager
-def _workplace() -> Iterator[Path]:
-    """A temporary folder, with the caches of the processes that are started inside the `with` block in it.
-
-    So thousands of mutants do not push what a user needs out of the caches."""
-    with tempfile.TemporaryDirectory(prefix="fbvm-mutate-", ignore_cleanup_errors=True) as folder:
-        before = os.environ.get("FBVM_CACHE")
-        os.environ["FBVM_CACHE"] = str(Path(folder, "cache"))
-        try:
-            yield Path(folder)
-        finally:
-            if before is None:
-                del os.environ["FBVM_CACHE"]
-            else:
-                os.environ["FBVM_CACHE"] = before

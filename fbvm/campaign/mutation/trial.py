@@ -6,15 +6,15 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
 
 from fbvm.base.files import write_file
-from fbvm.campaign.equivalence import proof_of_equality
-from fbvm.campaign.mutants import EQUAL, INVALID, KILLED, SURVIVED, Mutant
+from fbvm.campaign.mutation.equivalence import proof_of_equality
+from fbvm.campaign.mutation.mutants import EQUAL, INVALID, KILLED, SURVIVED, Mutant
 from fbvm.code.image import Image
 from fbvm.testing.subject import SubjectError, subject
 
@@ -54,9 +54,16 @@ class Bench:
     arguments: tuple[str, ...]
     libraries: tuple[str, ...]
 
+    def in_folders(self, folders: Sequence[str]) -> Bench:
+        """The same in other copies of the project."""
+        return replace(self, folders=tuple(folders))
+
     def prepare(self, number: int) -> None:
-        """Makes a copy whole again, which a process may have left changed, and goes into it."""
+        """Makes a copy whole again, which a process may have left changed, and goes into it.
+
+        What is compiled goes into a cache beside it, so that mutants do not push what a user needs out of the user's."""
         sys.dont_write_bytecode = True
+        os.environ["FBVM_CACHE"] = str(Path(self.folders[number]).parent / "cache")
         os.chdir(self.folders[number])
         for name, text in self.texts.items():
             write_file(Path(name), text)

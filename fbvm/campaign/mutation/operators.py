@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import TypeAlias
 
 from fbvm.base.types import fold
-from fbvm.campaign.mutants import Change
+from fbvm.campaign.mutation.mutants import Change
 from fbvm.syntax import tree
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
 from fbvm.syntax.tree.node import Node, names_of

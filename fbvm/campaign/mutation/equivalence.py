@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
-from fbvm.campaign.mutants import Mutant
+from fbvm.campaign.mutation.mutants import Mutant
 from fbvm.code.compiler import compile_sources
 from fbvm.prove import equality
 from fbvm.prove.encoding.execution import Refused
