@@ -9,7 +9,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -110,38 +110,48 @@ class Pool(Generic[Task, Result]):
     def results(self, tasks: Iterable[Task], limit_ns: int) -> Iterator[tuple[Task, Result | Late | Crashed]]:
         """Each task with what came of it, in the order in which they end.  A task has `limit_ns`
         from its beginning on, without the start of a process.  Raises NotStarted."""
-        left, begun = deque(tasks), dict[int, int]()
+        left, begun = deque(tasks), Counter[int]()
         while left or any(worker and worker.task is not None for worker in self._workers):
-            idle = [number for number, worker in enumerate(self._workers) if worker is None or worker.task is None][: len(left)]
-            for number in idle:
-                self._workers[number] = self._workers[number] or self._started()
-            for number in idle:
-                self._begin(number, left.popleft(), limit_ns)
+            self._hand_out(left, limit_ns)
             busy = {worker.line: number for number, worker in enumerate(self._workers) if worker and worker.task is not None}
             ready = connection.wait(list(busy), POLL_S)
             for line, number in busy.items():
                 worker = self._workers[number]
                 assert worker is not None and worker.task is not None
                 task = worker.task
-                if line in ready:
-                    try:
-                        result = worker.line.recv()
-                    except (EOFError, OSError):
-                        self._end(number)
-                        begun[id(task)] = begun.get(id(task), 0) + 1
-                        if begun[id(task)] < TRIES:
-                            left.appendleft(task)
-                        else:
-                            yield task, CRASHED
-                        continue
-                    if not worker.is_ready:
-                        worker.is_ready, worker.expired = True, time_limit(limit_ns)
-                        continue
-                    worker.task = None
-                    yield task, result
+                found = self._heard(number, worker, limit_ns) if line in ready else None
+                if isinstance(found, Crashed):
+                    begun[id(task)] += 1
+                    if begun[id(task)] < TRIES:
+                        left.appendleft(task)
+                    else:
+                        yield task, found
+                elif found:
+                    yield task, found[0]
                 elif worker.expired():
                     self._end(number)
                     yield task, LATE
+
+    def _hand_out(self, left: deque[Task], limit_ns: int) -> None:
+        """Gives each process that does nothing a task, as far as there are some.  Processes that are missing start together."""
+        idle = [number for number, worker in enumerate(self._workers) if worker is None or worker.task is None][: len(left)]
+        for number in idle:
+            self._workers[number] = self._workers[number] or self._started()
+        for number in idle:
+            self._begin(number, left.popleft(), limit_ns)
+
+    def _heard(self, number: int, worker: _Worker[Task], limit_ns: int) -> tuple[Result] | Crashed | None:
+        """What a process has sent: a result, None if it is ready to begin; CRASHED if it has ended."""
+        try:
+            result = worker.line.recv()
+        except (EOFError, OSError):
+            self._end(number)
+            return CRASHED
+        if not worker.is_ready:
+            worker.is_ready, worker.expired = True, time_limit(limit_ns)
+            return None
+        worker.task = None
+        return (result,)
 
     def _begin(self, number: int, task: Task, limit_ns: int) -> None:
         worker = self._workers[number]

@@ -9,8 +9,8 @@ from typing import Any
 
 from fbvm.campaign.plan import CYCLE, EXACT, PHASE, TIMING, VALUE, Axis, Moments, Plan
 from fbvm.engine.native import engine as native
-from fbvm.machine.backplane import KINDS
 from fbvm.net.faults import FOREVER, Fault
+from fbvm.run.plant import timed
 from fbvm.run.project import PlcRow, Project, SetRow
 from fbvm.watch.values import show_time
 
@@ -108,23 +108,20 @@ def _fault(dice: Random, kinds: Any, choices: Any, from_ns: int, until_ns: int) 
 def project_of(plan: Plan, variant: Variant) -> Project:
     """The project with what a run varies in it."""
     faults = tuple(named.fault for named in variant.faults)
-    project = replace(plan.project, net="loop", seed=variant.seed, faults=faults + plan.project.faults)
-    return replace(project, plcs=tuple(_row(plan, variant, row) for row in project.plcs))
+
+    def setting(plc: str, what: str, usual: Any) -> Any:
+        return next((value for axis, value in reversed(list(settings_of(plan, variant, plc))) if axis.what == what), usual)
+
+    project = timed(plan.project, variant.seed, lambda plc: setting(plc, TIMING, variant.timing),
+                    lambda plc, usual_ns: setting(plc, CYCLE, usual_ns))  # fmt: skip
+    rows = tuple(_row(plan, variant, row) for row in project.plcs)
+    return replace(project, net="loop", faults=faults + plan.project.faults, plcs=rows)
 
 
 def _row(plan: Plan, variant: Variant, row: PlcRow) -> PlcRow:
-    sets, cycle_ns, timing = list(row.sets), row.cycle_ns, variant.timing
-    for axis, value in settings_of(plan, variant, row.name):
-        if axis.what == VALUE:
-            sets.append(SetRow(axis.path, value, axis.at_ns))
-        elif axis.what == CYCLE:
-            cycle_ns = value
-        elif axis.what == TIMING:
-            timing = value
-    units = tuple(replace(unit, options={**unit.options, "timing": timing, "seed": variant.seed})
-                  if "timing" in KINDS[unit.kind][1] else unit for unit in row.units)  # fmt: skip
+    sets = [SetRow(axis.path, value, axis.at_ns) for axis, value in settings_of(plan, variant, row.name) if axis.what == VALUE]
     engine = "native" if row.engine == "auto" and native.available() else row.engine
-    return replace(row, sets=tuple(sets), cycle_ns=cycle_ns, units=units, engine=engine)
+    return replace(row, sets=(*row.sets, *sets), engine=engine)
 
 
 def settings_of(plan: Plan, variant: Variant, plc: str) -> Iterator[tuple[Axis, Any]]:

@@ -31,6 +31,10 @@ class Wires(ABC):
         self._due: list[tuple[int, int, Callable[[int], None]]] = []
         self._count = 0
 
+    def reseed(self, seed: int) -> None:
+        """Starts the random numbers anew."""
+        self._dice = random.Random(seed)
+
     @abstractmethod
     def scan_of(self, one: Peer, other: Peer) -> int:
         """The number of the present scan of the unit at `one`, or, if there is none, at `other`; 0 without either."""

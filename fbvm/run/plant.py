@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from ipaddress import IPv4Address
 
 from fbvm.base.data import data_folder
@@ -210,6 +210,19 @@ class Plant:
                 yield TimedWrite(found := plc.find(row.name), value_for(found, row.value), row.at_ns)
             except (LookupError, TypeError, ValueError) as error:
                 self._report((*where, "set", number), str(error))
+
+
+def timed(project: Project, seed: int, timing: Callable[[str], str], cycle_ns: Callable[[str, int], int]) -> Project:
+    """A project whose network and units take from `seed` what they leave to chance; `timing` says for the name of a PLC how its
+    units answer, "exact" or "real", `cycle_ns` for its name and cycle time the cycle time that it gets."""
+
+    def changed(row: PlcRow) -> PlcRow:
+        how = timing(row.name)
+        units = tuple(replace(unit, options={**unit.options, "timing": how, "seed": seed})
+                      if "timing" in KINDS[unit.kind][1] else unit for unit in row.units)  # fmt: skip
+        return replace(row, cycle_ns=cycle_ns(row.name, row.cycle_ns), units=units)
+
+    return replace(project, seed=seed, plcs=tuple(map(changed, project.plcs)))
 
 
 def value_for(where: Place | Span, written: object) -> object:

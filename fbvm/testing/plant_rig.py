@@ -17,6 +17,7 @@ from fbvm.record.recording.recording import Recording
 from fbvm.run.plant import Kind, Plant
 from fbvm.run.plc_names import PlcNames
 from fbvm.run.project import FILE, Project, read_project
+from fbvm.run.varied import VariedRun
 from fbvm.syntax.text import read
 from fbvm.testing.rig import DEFAULT_LIMIT, Rig, to_ns
 from fbvm.testing.subject import Subject, SubjectError
@@ -29,14 +30,15 @@ class PlantRig:
 
     Times are text ("50ms") or integers of nanoseconds."""
 
-    def __init__(self, path: Path, allow_outside: bool = False) -> None:
-        """With `allow_outside` sources may lie outside of the project's folder.  Raises SubjectError with all that is wrong
-        with the project or its programs."""
+    def __init__(self, path: Path, allow_outside: bool = False, varied: VariedRun | None = None) -> None:
+        """With `allow_outside` sources may lie outside of the project's folder; `varied` is what a campaign varies.  Raises
+        SubjectError with all that is wrong with the project or its programs."""
         __tracebackhide__ = True
         project = read_project(path, allow_outside=allow_outside)
         if not isinstance(project, Project):
             raise _wrong(project)
-        self._plant = Plant(project, net="loop")
+        self._varied = varied
+        self._plant = Plant(varied.project(project) if varied else project, net="loop")
         if errors(self._plant.diagnostics):
             raise _wrong(self._plant.diagnostics)
         assert isinstance(self._plant.network, LoopNetwork)
@@ -55,7 +57,7 @@ class PlantRig:
             programs = [program for task in image.tasks for program in task.programs]
             prefix = f"{programs[0].name}." if len(programs) == 1 else ""
             rig = Rig(Subject(name, image, prefix, sources, kind.row.libraries), plc=run.plc, network=self.network,
-                      recording=self._recording)
+                      recording=self._recording, plc_name=name, varied=self._varied)
             for row in kind.row.sets:
                 rig.at(row.at_ns, {row.name: row.value})
             self.rigs[name] = rig
@@ -79,6 +81,8 @@ class PlantRig:
     def scan(self) -> PlantRig:
         """One scan of each PLC that is due next.  Raises Trapped."""
         __tracebackhide__ = True
+        for rig in self.rigs.values():
+            rig.disturb()
         now_ns = self.elapsed_ns
         for rig in self.rigs.values():
             if rig.elapsed_ns == now_ns:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pytest
 
 from fbvm.base.data import PACKAGE
-from fbvm.testing.session import MOST_PAGES, count_coverage, failure_page, library_folders, search_folders
+from fbvm.testing.session import MOST_PAGES, count_coverage, failure_page, library_folders, search_folders, varied_run
 from fbvm.testing.warning_plugin import NAME as WARNINGS
 from fbvm.testing.warning_plugin import WarningPlugin, add_options, warning_plugin
 
@@ -115,7 +115,8 @@ def plant(request: pytest.FixtureRequest) -> Iterator[PlantMaker]:
 
     def make(project: str = "fbvm.toml") -> PlantRig:
         __tracebackhide__ = True
-        made.append(PlantRig(project_near(search_folders(request.path, request.config.rootpath), project)))
+        near = project_near(search_folders(request.path, request.config.rootpath), project)
+        made.append(PlantRig(near, varied=varied_run(request.config)))
         _rigs(request.node).extend(made[-1].rigs.values())
         for rig in made[-1].rigs.values():
             _instrument(request, rig)
@@ -172,7 +173,7 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
         shelves = [*own, *library_folders(request.config, request.path)]
         warnings = warning_plugin(request.config)
         rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, wanted=warnings.wanted,
-                     dialect=dialect or request.config.getini("fbvm_dialect"), **given)
+                     dialect=dialect or request.config.getini("fbvm_dialect"), varied=varied_run(request.config), **given)
         warnings.add(rig.subject)
         rigs.append(rig)
         _instrument(request, rig)

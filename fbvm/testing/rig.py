@@ -24,6 +24,7 @@ from fbvm.record.draw.chart import Chart, draw
 from fbvm.record.recording.recording import PlcRecording, Recording
 from fbvm.record.trace.packets import Dissector, Packet, add_tap
 from fbvm.record.trace.recorder import Recorder
+from fbvm.run.varied import VariedPlc, VariedRun
 from fbvm.testing.pages import write_page
 from fbvm.testing.reads import VariableReads
 from fbvm.testing.report import Report
@@ -99,12 +100,15 @@ class Rig:
     _timed: list[tuple[int, str, object]]
     _report: Report
     _packets: deque[tuple[int, Packet]]
+    _varied: VariedPlc | None
 
     def __init__(self, what: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
                  units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None,
-                 plc: Plc | None = None, recording: Recording | None = None) -> None:  # fmt: skip
+                 plc: Plc | None = None, recording: Recording | None = None, plc_name: str = "",
+                 varied: VariedRun | None = None) -> None:  # fmt: skip
         set_ = object.__setattr__
-        plc = plc or Plc(what.image, to_ns(cycle))
+        cycle_ns = to_ns(cycle)
+        plc = plc or Plc(what.image, varied.cycle_ns(plc_name, cycle_ns) if varied else cycle_ns)
         set_(self, "plc", plc)
         set_(self, "subject", what)
         set_(self, "_recorded", (recording or Recording()).add(what.name, plc))
@@ -118,11 +122,13 @@ class Rig:
         set_(self, "_packets", deque(maxlen=MOST_PACKETS))
         if units or etn21 or plc.units:
             add_tap(self.network, partial(self._tap, Dissector()))
-        for unit in (*units, *([Etn21(0, etn21)] if etn21 else ())):
+        how: dict[str, Any] = {"timing": varied.timing(plc_name), "seed": varied.conditions.seed} if varied else {}
+        for unit in (*units, *([Etn21(0, etn21, **how)] if etn21 else ())):
             plc.attach(unit, self.network)
         for name in self._report.names_in(what.prefix):
             if callable(method := getattr(type(self), name, None)):
                 set_(self, name, Ambiguous(method.__get__(self), name))
+        set_(self, "_varied", varied.made(plc_name, plc, self.find, self.network) if varied else None)
 
     @classmethod
     def of(cls, what: str, cycle: str | int = "10ms", *, block: bool = True, folders: Sequence[Path] = (),
@@ -227,9 +233,9 @@ class Rig:
         self.write(named)
         if (time is None) == (scans is None):
             raise TypeError('say how long: run("1s") or run(scans=10)')
-        end_ns = self.plc.elapsed_ns + to_ns(time) if time is not None else 0
+        end_ns = self.elapsed_ns + to_ns(time) if time is not None else 0
         end = self.plc.scans + (scans or 0)
-        while self.plc.scans < end or self.plc.elapsed_ns < end_ns:
+        while self.plc.scans < end or self.elapsed_ns < end_ns:
             self._scan()
         return self
 
@@ -240,12 +246,12 @@ class Rig:
         __tracebackhide__ = True
         self.write(named)
         holds = self._holds(condition)
-        end_ns = self.plc.elapsed_ns + to_ns(max)
+        end_ns = self.elapsed_ns + to_ns(max)
         while True:
             self._scan()
             if holds():
                 return self
-            if self.plc.elapsed_ns >= end_ns:
+            if self.elapsed_ns >= end_ns:
                 said = condition if isinstance(condition, str) else getattr(condition, "__name__", "the condition")
                 raise AssertionError(f"{said} does not hold within {show_time(to_ns(max))[2:]}")
 
@@ -273,13 +279,19 @@ class Rig:
 
     def _scan(self) -> None:
         __tracebackhide__ = True
-        while self._timed and self._timed[0][0] <= self.plc.elapsed_ns:
+        self.disturb()
+        while self._timed and self._timed[0][0] <= self.elapsed_ns:
             _, name, value = self._timed.pop(0)
             self[name] = value
         self._reads.clear()
-        trap = self.plc.scan()
+        trap = self.plc.scan(self._varied.elapsed_ns if self._varied else None)
         if trap:
             raise Trapped(trap, trap.told(Names.of(self.plc.image, self.plc.memory.areas).instance))
+
+    def disturb(self) -> None:
+        """Does what a campaign does to the PLC before its next scan, which begins later if the power is cut."""
+        if self._varied:
+            self._varied.before_scan()
 
     @property
     def scans(self) -> int:
@@ -288,8 +300,8 @@ class Rig:
 
     @property
     def elapsed_ns(self) -> int:
-        """The time since power-on in nanoseconds."""
-        return self.plc.elapsed_ns
+        """The time since power-on in nanoseconds, at which the next scan begins."""
+        return self._varied.elapsed_ns if self._varied else self.plc.elapsed_ns
 
     # --- power, mode, forces
 

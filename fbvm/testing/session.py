@@ -13,15 +13,23 @@ import pytest
 if TYPE_CHECKING:
     from fbvm.machine.counting import Counting
     from fbvm.machine.plc import Plc
+    from fbvm.run.varied import VariedRun
     from fbvm.testing.coverage_plugin import CoveragePlugin
     from fbvm.testing.subject import Subject
 
 PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
 """The pages that the session has written for failed tests."""
+VARIED: pytest.StashKey[VariedRun] = pytest.StashKey()
+"""In the stash of the configuration: what the campaign that executes the session varies in the test that runs now."""
 MOST_PAGES = 20
 """Pages that one session writes unless --fbvm-pages says another number."""
 SOURCE_FOLDER = "src"
 """The folder of a project's blocks, beside its pytest.ini or pyproject.toml."""
+
+
+def varied_run(config: pytest.Config) -> VariedRun | None:
+    """What varies the test that is executed now, if a campaign does."""
+    return config.stash.get(VARIED, None)
 
 
 def search_folders(path: Path, root: Path) -> list[Path]:

@@ -25,12 +25,13 @@ from fbvm.record.trace.branches import statements
 from fbvm.record.trace.events import Call, Event, Frame, Read, Statement, Write
 from fbvm.record.trace.observing import observing
 from fbvm.record.trace.recorder import Signal
+from fbvm.run.varied import VariedPlc
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
 from fbvm.testing.rig import Trapped
-from fbvm.testing.session import add_coverage, covered, failure_page, library_folders
+from fbvm.testing.session import add_coverage, covered, failure_page, library_folders, varied_run
 from fbvm.testing.subject import LIBRARY, Subject, SubjectError, subject
 from fbvm.testing.warning_plugin import warning_plugin
 from fbvm.watch.names import Names, is_single
@@ -89,13 +90,15 @@ class StItem(pytest.Item):
             made = compiled(alone=True)  # what is wrong with other programs is said by their tests
         self.subject = made
         warnings.add(made)
-        plc = Plc(made.image, CYCLE_NS)
+        varied = varied_run(self.config)
+        plc = Plc(made.image, varied.cycle_ns("", CYCLE_NS) if varied else CYCLE_NS)
         watch = Assertions(plc, made.prefix)
         recorded = Recording().add(self.name, plc)
+        disturbed = varied.made("", plc, lambda name: plc.find(made.path(name)), None) if varied else None
         try:
             with counting(plc, watch.files | covered(self.config, made)) as counts:
                 try:
-                    _run(plc, watch, counts, f"{made.prefix}Done")
+                    _run(plc, watch, counts, f"{made.prefix}Done", disturbed)
                 finally:
                     add_coverage(self.config, made, counts)
         except AssertFailed as failed:
@@ -127,8 +130,8 @@ class StItem(pytest.Item):
         return self.path, self.line - 1, self.name
 
 
-def _run(plc: Plc, watch: Assertions, counts: Counting, done: str) -> None:
-    """Executes one scan, or, for a program with Done, scans until Done is TRUE.
+def _run(plc: Plc, watch: Assertions, counts: Counting, done: str, varied: VariedPlc | None) -> None:
+    """Executes one scan, or, for a program with Done, scans until Done is TRUE; `varied` is what a campaign varies.
 
     A scan in which an ASSERT has failed is done again, for `watch` to see."""
     program = plc.find(done.rpartition(".")[0])
@@ -137,14 +140,16 @@ def _run(plc: Plc, watch: Assertions, counts: Counting, done: str) -> None:
     waits = field is not None and field.type is BOOL
     failures, before = counts.counters_at(watch.failing), counts.read()
     while True:
-        state = plc.snapshot()
-        trap = plc.scan()
+        if varied:
+            varied.before_scan()
+        now_ns, state = varied.elapsed_ns if varied else None, plc.snapshot()
+        trap = plc.scan(now_ns)
         after = counts.read()
         if any(after[number] for number in failures):
             plc.restore(state)
             counts.back_to(before)
             with observing(plc, watch, stands_still=True):  # what stands behind the ASSERT is not executed
-                plc.scan()
+                plc.scan(now_ns)
         before = after
         if trap:
             raise Trapped(trap)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import fbvm
+from fbvm.cli.projects.cluster import cluster_of, cluster_option
 from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
 from fbvm.cli.shared import status
-from fbvm.cli.shared.cluster import cluster_of, cluster_option
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.options import moment_ns
 from fbvm.cli.shared.progress import show_progress

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fbvm.cli.projects.cluster import cluster_of, cluster_option
 from fbvm.cli.shared import status
-from fbvm.cli.shared.cluster import cluster_of, cluster_option
 from fbvm.cli.shared.options import CYCLE_NS, moment_ns, time_ns
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.terminal import named, say, say_json
