@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fbvm.analysis.names import Key, declared_name, method_of
 from fbvm.base.diagnostics import Source
@@ -30,7 +30,8 @@ class Declared:
 
 def find(checker: Checker, key: Key) -> Declared | None:
     """The declaration that a key means; None if there is none any more, and for standard functions."""
-    return _FIND[key[0]](checker, key)
+    found = _FIND[key[0]](checker, key)
+    return replace(found, source=found.source.whole) if found is not None else None
 
 
 def _pou(checker: Checker, key: Key) -> Declared | None:
@@ -52,7 +53,7 @@ def _method(checker: Checker, key: Key) -> Declared | None:
 
 def _owner(checker: Checker, key: Key) -> Pou | None:
     """The POU of a variable: a method, or an accessor of a property, too."""
-    block, _, rest = key[2].partition(".")
+    block, _, rest = key[2].rpartition(".")
     found = checker.project.pous.get((key[1], key[2])) or checker.project.pous.get((key[1], block))
     if found is None or not rest or fold(found.name) == key[2]:
         return found

@@ -109,7 +109,7 @@ def _removals(program: Program, name: str, diagnostic: Diagnostic) -> Iterator[F
 
 
 def _variables(part: Part) -> Iterator[tree.VarDecl]:
-    for declared in part.syntax.declarations:
+    for declared in part.syntax.everything():
         sections = declared.sections if isinstance(declared, tree.Pou) else ()
         for section in sections:
             yield from section.variables

@@ -14,7 +14,9 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, Elementary, EnumType, OpenArrayType, RefType, StructType, Type, fold
 from fbvm.check.calls.standard import is_known
 from fbvm.check.checker import Checker
+from fbvm.check.expressions.qualified import dotted
 from fbvm.check.symbols.facts import Pou, PouCall, Variable
+from fbvm.check.symbols.namespaces import Namespaces, full_name
 from fbvm.syntax import tree
 from fbvm.syntax.tree import sfc
 from fbvm.syntax.tree.node import names_of
@@ -119,9 +121,11 @@ class _Names:
 
     def all(self) -> Iterator[Use]:
         last: Pou | None = None
-        for declared in self.part.syntax.declarations:
+        for declared, source in Namespaces.each(self.part.syntax.declarations, self.part.source):
+            self.source = source
             if isinstance(declared, tree.Pou):
-                last = self.pou = self.project.pous.get((self.source.library, fold(declared.name.text)))
+                last = self.pou = self.project.pous.get((self.source.library, fold(full_name(declared.name.text, self.source))))
+                self.source = last.source if last is not None else self.source
             elif isinstance(declared, tree.Action | tree.Actions):
                 self.pou = last if declared.owner is None else self.project.pou(declared.owner.text, self.source)
             else:
@@ -144,10 +148,11 @@ class _Names:
 
     def method(self, node: tree.Pou) -> Iterator[Use]:
         """The names in a method or accessor."""
-        block = self.pou
+        block, source = self.pou, self.source
         self.pou = next((each for each in block.methods.values() if each.tree is node), None) if block is not None else None
+        self.source = self.pou.source if self.pou is not None else source
         yield from self.walk(node)
-        self.pou = block
+        self.pou, self.source = block, source
 
     # --- what expressions are -----------------------------------------------------------------------------------------
 
@@ -208,7 +213,7 @@ class _Names:
             if known is not None and known.resolved is not None and isinstance(whole := known.resolved[0], StructType) and \
                     whole.member(member) is not None:
                 return self.in_type(base.text, member)
-        return "member", entry.source.library, fold(name), member
+        return "member", entry.source.library, fold(entry.name), member
 
     def role(self, expr: tree.Node) -> str:
         return "written" if expr in self.targets else "called" if expr in self.callees else "read"
@@ -248,7 +253,7 @@ class _Names:
         if (pou := project.pou(node.text, self.source)) is not None:
             return key_of_pou(pou)
         if (entry := project.type_entry(node.text, self.source)) is not None:
-            return "type", entry.source.library, name
+            return "type", entry.source.library, fold(entry.name)
         if members := project.enum_members.get(name):
             return self.in_type(members[0][0].name, name)
         return ("standard", "", name) if is_known(node.text) else None
@@ -265,8 +270,19 @@ class _Names:
                 key = self.member_key(entry.resolved[0], node.name.text)
             elif (pou := self.project.pous.get(("", fold(node.name.text)))) is not None and self.variable(node.of) is None:
                 key = key_of_pou(pou)
+        if key is None and (space := dotted(node.of)) and self.project.namespaces.space(space, self.source) is not None:
+            key = self._key_of_name(f"{space}.{node.name.text}")
+        if key is None and (name := dotted(node.of)) and (entry := self.project.type_entry(name, self.source)) is not None:
+            key = self.member_key(entry.resolved[0], node.name.text) if entry.resolved is not None else None
         if key is not None:
             yield Use(node.name.start, node.name.end, key, self.role(node))
+
+    def _key_of_name(self, name: str) -> Key | None:
+        """The key of the type or POU that a name with its namespace means."""
+        if (entry := self.project.type_entry(name, self.source)) is not None:
+            return "type", entry.source.library, fold(entry.name)
+        pou = self.project.pou(name, self.source)
+        return key_of_pou(pou) if pou is not None else None
 
     def call(self, node: tree.Call) -> Iterator[Use]:
         self.callees.add(node.callee)
@@ -299,17 +315,14 @@ class _Names:
     def enum_literal(self, node: tree.EnumLiteral) -> Iterator[Use]:
         entry = self.project.type_entry(node.type_name.text, self.source)
         if entry is not None:
-            owner = fold(node.type_name.text)
+            owner = fold(entry.name)
             yield Use(node.type_name.start, node.type_name.end, ("type", entry.source.library, owner))
             yield Use(node.member.start, node.member.end, ("member", entry.source.library, owner, fold(node.member.text)))
 
     def type_name(self, node: tree.NamedType) -> Iterator[Use]:
         name = node.text.rpartition(".")[2]
-        start = node.end - len(name)
-        if (entry := self.project.type_entry(name, self.source)) is not None:
-            yield Use(start, node.end, ("type", entry.source.library, fold(name)))
-        elif (pou := self.project.pou(name, self.source)) is not None:
-            yield Use(start, node.end, key_of_pou(pou))
+        if (key := self._key_of_name(node.text) or self._key_of_name(name)) is not None:
+            yield Use(node.end - len(name), node.end, key)
 
     def structure(self, node: tree.StructInit) -> Iterator[Use]:
         for name, _ in node.fields:
@@ -320,7 +333,7 @@ class _Names:
         if self.pou is not None and self.pou.block is not None:
             yield Use(node.name.start, node.name.end, key_of_pou(self.pou), "declared")
         elif self.pou is not None and node.kind != "ACTION":
-            yield Use(node.name.start, node.name.end, ("pou", self.source.library, fold(node.name.text)), "declared")
+            yield Use(node.name.start, node.name.end, ("pou", self.source.library, fold(self.pou.name)), "declared")
 
     def action(self, node: tree.Action) -> Iterator[Use]:
         if node.owner is not None and (pou := self.project.pou(node.owner.text, self.source)) is not None:
@@ -348,7 +361,7 @@ class _Names:
         return found
 
     def type_head(self, node: tree.TypeDecl) -> Iterator[Use]:
-        owner = fold(node.name.text)
+        owner = fold(full_name(node.name.text, self.source))
         yield Use(node.name.start, node.name.end, ("type", self.source.library, owner), "declared")
         names: list[tree.Name] = []
         if isinstance(node.spec, tree.StructSpec | tree.UnionSpec):

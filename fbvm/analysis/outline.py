@@ -27,7 +27,8 @@ class Symbol:
     name: str
     kind: str
     """"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "INTERFACE", "CLASS", "METHOD", "PROPERTY", "ACTION", "TYPE", "CONFIGURATION",
-    "VAR_GLOBAL", "variable", "constant", "member", "enumerator", "rung", "step", "resource", "task" or "instance"."""
+    "NAMESPACE", "VAR_GLOBAL", "variable", "constant", "member", "enumerator", "rung", "step", "resource", "task" or
+    "instance"."""
     detail: str
     start: int
     end: int
@@ -57,6 +58,10 @@ def _declaration(part: Part, declared: tree.Declaration) -> Iterator[Symbol]:
         yield _action(part, declared)
     elif isinstance(declared, tree.Actions):
         yield from (_action(part, action) for action in declared.actions)
+    elif isinstance(declared, tree.Namespace):
+        made = _symbol(part, declared, declared.name, declared.name.text, "NAMESPACE")
+        made.children = [symbol for each in declared.declarations for symbol in _declaration(part, each)]
+        yield made
     elif isinstance(declared, tree.TypeDecl):
         made = _symbol(part, declared, declared.name, declared.name.text, "TYPE")
         made.children = list(_members(part, declared.spec))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.namespaces import Surroundings
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.comments import comment_end
@@ -168,6 +169,13 @@ class File:
             part.base, part.source.first_line = base, line
             base, line = base + len(part.source.text), line + len(part.source.line_starts) - 1
         return made
+
+    def share_usings(self) -> None:
+        """Let names in all parts be looked up with the USINGs of the file, which stand in one or two parts."""
+        usings = tuple(name.text for part in self.parts for declared in part.syntax.declarations
+                       if isinstance(declared, tree.Using) for name in declared.names)
+        for part in self.parts:
+            part.source.surroundings = Surroundings("", usings) if usings else None
 
     def copied(self) -> File:
         """The same file with the same parts, which changes apart from this one."""

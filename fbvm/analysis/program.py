@@ -164,6 +164,10 @@ class Program:
         for part in parts:
             if "_parsed" not in vars(part):
                 yield
+                _ = part.syntax
+        for file in self.files.values():
+            file.share_usings()
+        for part in parts:
             project.collect(part.syntax, part.source)
         before_check = len(report.diagnostics)
         checker = Checker(project, evaluate)
@@ -215,7 +219,7 @@ class Program:
         known = checked.project.pous.get(("", fold(after.name.text)))
         if _is_object(before) or _is_object(after) or any(pou.base is known for pou in checked.project.pous.values()):
             return False  # what derived blocks inherit, and which bodies calls may mean, is worked out for all
-        return known is not None and known.source is old.source and not generics.is_generic(known, checked.project) and \
+        return known is not None and known.source.whole is old.source and not generics.is_generic(known, checked.project) and \
             not generics.variables(after) and not external(new.syntax, after)
 
     def _signature(self, part: Part, pou: tree.Pou) -> object:
@@ -227,7 +231,8 @@ class Program:
         actions = [fold(action.name.text) for action in _actions(part)]
         result = text[pou.result.start:pou.result.end] if pou.result is not None else ""
         lost = any(not mistake.lossless for mistake in errors(part.mistakes) if _in_head(pou, mistake.start))
-        return pou.kind, fold(pou.name.text), result, sections, actions, len(pou.refused), lost
+        usings = tuple(name.text for using in pou.usings for name in using.names)
+        return pou.kind, fold(pou.name.text), result, sections, actions, usings, len(pou.refused), lost
 
     def _check_pou(self, checked: Checked, old: Part, new: Part) -> None:
         """Check one POU, whose signature has not changed, in place of what it was."""
@@ -238,6 +243,7 @@ class Program:
         checker.global_order[:] = [variable for variable in checker.global_order if variable.owner is not former]
         project.report = checker.report = report
         project.size_limits = SizeLimits(report, project.dialect.large_memory)
+        new.source.surroundings = old.source.surroundings
         project.collect(new.syntax, new.source)
         before_check = len(report.diagnostics)
         project.new_pous.clear()
@@ -263,7 +269,8 @@ class Program:
 
     def place(self, source: Source) -> tuple[File, int] | None:
         """The file of a part's text and where that begins in it; None for the text of a library."""
-        return next(((file, part.base) for file in self.files.values() for part in file.parts if part.source is source), None)
+        whole = source.whole
+        return next(((file, part.base) for file in self.files.values() for part in file.parts if part.source is whole), None)
 
     # --- diagnostics ------------------------------------------------------------------------------------------------
 

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from fbvm.analysis.names import Key, inherited, key_of_pou, method_of
 from fbvm.analysis.parts import Part
 from fbvm.analysis.program import Program
+from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, EnumType, OpenArrayType, RefType, StructType, Type, fold, pointer
 from fbvm.check.checker import Checker
 from fbvm.check.expressions.members import READABLE
 from fbvm.check.expressions.objects import WORDS
 from fbvm.check.symbols.facts import Pou, Variable
+from fbvm.check.symbols.namespaces import Namespaces, full_name
 from fbvm.syntax import tree
 
 PATH = re.compile(r"([A-Za-z_]\w*(?:\s*\[[^\[\]]*\]|\^|\s*\.\s*[A-Za-z_]\w*)*)\s*\Z")
@@ -39,6 +41,11 @@ class Scope:
     pou: Pou | None
 
     @property
+    def source(self) -> Source:
+        """The source in which names are looked up here."""
+        return self.pou.source if self.pou is not None else self.part.source
+
+    @property
     def block(self) -> Pou | None:
         """The POU whose instance the place is about: of a method its block."""
         return self.pou.own_block if self.pou is not None else None
@@ -47,7 +54,7 @@ class Scope:
         """The variable that a name means here."""
         own = self.pou.owner.variables.get(fold(name)) if self.pou is not None else None
         own = own or inherited(self.block, fold(name))
-        return own or self.checker.global_variable(name, self.part.source)
+        return own or self.checker.global_variable(name, self.source)
 
     def variables(self) -> list[Variable]:
         """The variables that can be named here without a point."""
@@ -90,7 +97,7 @@ class Scope:
         if variable is not None:
             return variable.type
         project = self.checker.project
-        entry = project.type_entry(name, self.part.source)
+        entry = project.type_entry(name, self.source)
         if entry is not None and entry.resolved is not None:
             return entry.resolved[0]
         pou = project.pous.get(("", fold(name)))
@@ -112,9 +119,9 @@ class Scope:
         kind = self.kind(path)
         if isinstance(kind, StructType) and kind.block:
             return self.checker.block_of(kind)
-        pou = self.checker.project.pou(path.strip(), self.part.source) if path.strip().isidentifier() else None
+        pou = self.checker.project.pou(path.strip(), self.source) if path.strip().isidentifier() else None
         if pou is not None and not pou.resolved:
-            self.checker.interface(pou, self.part.source, pou.tree.name)
+            self.checker.interface(pou, self.source, pou.tree.name)
         return pou
 
     def members(self, path: str) -> list[Member]:
@@ -133,10 +140,10 @@ class Scope:
             return pins + actions + self.methods(block)
         if isinstance(kind, StructType):
             return [Member(field.name, "field", str(field.type)) for field in kind.fields.values()]
-        if kind is None and path.strip().isidentifier() and self.checker.project.is_space(path.strip()):
+        if kind is None and path.strip().isidentifier() and self.checker.project.is_space(path.strip(), self.source):
             project = self.checker.project
             return [Member(name, "field", str(found.type)) for name in project.names_in(path.strip())
-                    if (found := self.checker.listed(fold(path.strip()), fold(name), self.part.source)) is not None]
+                    if (found := self.checker.listed(fold(path.strip()), fold(name), self.source)) is not None]
         return []
 
     def methods(self, block: Pou | None = None) -> list[Member]:
@@ -169,8 +176,10 @@ def scope_at(program: Program, name: str, offset: int) -> Scope | None:
         return None
     part = program.files[name].part_at(offset)
     at = offset - part.base
-    pous = [each for each in part.syntax.declarations if isinstance(each, tree.Pou) and each.start <= at]
-    pou = checked.project.pous.get(("", fold(pous[-1].name.text))) if pous else None
+    named = [(each, full_name(each.name.text, source)) for each, source in Namespaces.each(part.syntax.declarations, part.source)
+             if isinstance(each, tree.Pou) and each.start <= at]
+    pous = [each for each, _ in named]
+    pou = checked.project.pous.get(("", fold(named[-1][1]))) if named else None
     inside = [each for each in pous[-1].methods if each.start <= at <= each.end] if pous else []
     if pou is not None and inside:
         method = min(inside, key=lambda each: each.end - each.start)

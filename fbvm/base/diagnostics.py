@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from fbvm.base.codes import CODES
+from fbvm.base.namespaces import Surroundings
 from fbvm.base.printable import one_line, printable
 
 
@@ -33,9 +34,20 @@ class Source:
     """Name of the library that the text belongs to, "" for the user's own."""
     first_line: int = 1
     """The number of the first line, for a text that is a part of a longer one."""
+    surroundings: Surroundings | None = field(default=None, repr=False)
+    """The namespaces in which names of the text are looked up; None where there are none."""
+    whole: Source = field(init=False, repr=False)
+    """The source itself; of one that stands for what is inside a NAMESPACE, the source of the whole text."""
 
     def __post_init__(self) -> None:
         self.text = whole_lines(self.text)
+        self.whole = self
+
+    def inside(self, surroundings: Surroundings) -> Source:
+        """The same text with other namespaces around it: places in it are those of the whole text."""
+        made = Source(self.name, self.text, self.library, self.first_line, surroundings)
+        made.whole = self.whole
+        return made
 
     @cached_property
     def line_starts(self) -> list[int]:

@@ -58,7 +58,7 @@ class Checker(Context):
         globals.enroll(self)
         for entry in list(self.project.types.values()):
             if not entry.source.library:
-                self.declared_type(entry.tree.name.text, entry.source)
+                self.declared_type(entry.name, entry.source)
         globals.declare(self)
         yield from self._bodies()
         configurations.resolve(program)
@@ -67,6 +67,7 @@ class Checker(Context):
         construction.construct_at_start(self)
         yield from self._bodies()
         globals.declare(self)
+        self.check_usings()
         if program is None:
             self.var_config.resolve()
         self.check_starts()
@@ -80,6 +81,14 @@ class Checker(Context):
             pou = self.project.new_pous.popleft()
             if (not pou.source.library or pou.block is not None) and not generics.is_generic(pou, self.project):
                 self.check_body(pou)
+
+    def check_usings(self) -> None:
+        """Report names behind USING that are no namespace."""
+        project = self.project
+        for name, source in project.namespaces.usings:
+            if not project.is_space(name.text, source) and not project.libraries.declares_space(name.text):
+                self.report.add("S0211", source, name, f"there is no NAMESPACE {name.text}",
+                                project.nearest(name.text, project.namespaces.declared.values()))
 
     def check_starts(self, first: int = 0) -> None:
         """Check the references in initial values, from the one with the number `first` in `Facts.starts` on."""

@@ -90,7 +90,7 @@ def contents(sources: Iterable[Source]) -> Contents:
     for source in sources:
         text, diagnostics = parse(source)
         made.diagnostics += errors(diagnostics)
-        for part in text.declarations:
+        for part in text.everything():
             if isinstance(part, tree.GlobalVars) and not _is_constant(part.section):
                 made.symbols.update((name.casefold(), (source, one)) for name, one in _declared(source, part.section).items())
             elif isinstance(part, tree.Pou) and part.kind == "PROGRAM" and any(isinstance(one, Ladder) for one in part.body):

@@ -27,7 +27,7 @@ _KINDS = {
     "FUNCTION": types.SymbolKind.Function, "FUNCTION_BLOCK": types.SymbolKind.Class, "PROGRAM": types.SymbolKind.Module,
     "CLASS": types.SymbolKind.Class, "INTERFACE": types.SymbolKind.Interface, "METHOD": types.SymbolKind.Method,
     "PROPERTY": types.SymbolKind.Property, "ACTION": types.SymbolKind.Method,
-    "TYPE": types.SymbolKind.Struct, "CONFIGURATION": types.SymbolKind.Package,
+    "TYPE": types.SymbolKind.Struct, "CONFIGURATION": types.SymbolKind.Package, "NAMESPACE": types.SymbolKind.Namespace,
     "VAR_GLOBAL": types.SymbolKind.Namespace, "variable": types.SymbolKind.Variable, "constant": types.SymbolKind.Constant,
     "member": types.SymbolKind.Field, "enumerator": types.SymbolKind.EnumMember, "rung": types.SymbolKind.Event,
     "step": types.SymbolKind.Event, "task": types.SymbolKind.Event, "instance": types.SymbolKind.Object}

@@ -86,13 +86,13 @@ def _call(block: Block, side: str) -> str:
 
 def _block(sources: Sequence[Source], name: str, libraries: Sequence[Path]) -> Block:
     for source in sources:
-        for node in parse(source)[0].declarations:
+        for node in parse(source)[0].everything():
             if isinstance(node, tree.Pou) and fold(node.name.text) == fold(name):
                 return _read(node, source)
     shelves, report = Libraries(libraries), Report()
     for owner in shelves.names:
         for source, text in shelves.load(name, owner, report):
-            for node in text.declarations:
+            for node in text.everything():
                 if isinstance(node, tree.Pou) and fold(node.name.text) == fold(name):
                     return _read(node, source)
     raise Unlike(f"there is no {name} in the files, nor in a library")

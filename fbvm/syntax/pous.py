@@ -19,13 +19,16 @@ from fbvm.syntax.tree import (
     Block,
     Declaration,
     Form,
+    GlobalVars,
     Name,
     NamedType,
+    Namespace,
     Pou,
     Refused,
-    RefusedStatement,
     SourceText,
+    TypeDecl,
     TypeSpec,
+    Using,
     VarDecl,
     VarSection,
 )
@@ -38,25 +41,63 @@ Element = Action | Step | Transition | Refused | Members
 
 
 class Head(NamedTuple):
-    """The head of a POU: its name, the words in front of that, and what it EXTENDS and IMPLEMENTS."""
+    """The head of a POU: its name, the words in front of that, what it EXTENDS and IMPLEMENTS, and its USINGs."""
 
     name: Name
     modifiers: tuple[Name, ...]
     bases: tuple[NamedType, ...]
     interfaces: tuple[NamedType, ...]
+    usings: tuple[Using, ...] = ()
+
+    def with_usings(self, more: list[Using] | None) -> tuple[Using, ...]:
+        """Its USINGs and those behind the type of its result."""
+        return (*self.usings, *(more or ()))
+
+
+Inherited = list[tuple[str, NamedType] | Using]
+"""What stands behind the name of a POU: EXTENDS and IMPLEMENTS with a name each, and USING."""
 
 
 class SourceBuilder(SfcElements):
     """The functions of the rules of POUs; with those that it inherits, the functions of all rules of the grammar."""
 
     def source_text(self, declarations: list[Declaration]) -> SourceText:
+        self._usings_in_front(declarations)
         return SourceText(0, len(self.source.text), tuple(declarations))
+
+    # --- namespaces ---
+
+    def namespace(self, word: Token, modifiers: list[Token], name: NamedType, declarations: list[Declaration],
+                  end: Token) -> Namespace:
+        words = tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers)
+        for each in words:
+            if each.text != "INTERNAL":
+                self.report("S0211", each.start, each.end, f"a NAMESPACE is not {each.text}", "it may be INTERNAL")
+        kept = [each for each in declarations if isinstance(each, _IN_NAMESPACE) and not _is_program(each)]
+        for outer in (each for each in declarations if each not in kept and not isinstance(each, Using)):
+            what = "a PROGRAM" if isinstance(outer, Pou) else "VAR_GLOBAL" if isinstance(outer, GlobalVars) else "this"
+            self.report("S0211", outer.start, outer.end, f"{what} cannot stand in a NAMESPACE", "put it behind END_NAMESPACE")
+        return Namespace(word.start, end.end, name, words, self._usings_in_front(declarations), tuple(kept))
+
+    def using(self, word: Token, names: list[NamedType], end: Token) -> Using:
+        return Using(word.start, end.end, tuple(names))
+
+    def _usings_in_front(self, declarations: list[Declaration]) -> tuple[Using, ...]:
+        """The USINGs among some declarations; one that stands behind another declaration is reported."""
+        other = next((each.start for each in declarations if not isinstance(each, Using)), len(self.source.text))
+        usings = tuple(each for each in declarations if isinstance(each, Using))
+        for late in (each for each in usings if each.start > other):
+            self.report("S0211", late.start, late.end, "USING stands behind a declaration", "put it in front of the first one")
+        return usings
 
     # --- heads ---
 
-    def add_inheritance(self, parts: list[tuple[str, NamedType]], word: Token,
-                        names: list[NamedType]) -> list[tuple[str, NamedType]]:
+    def add_inheritance(self, parts: Inherited, word: Token, names: list[NamedType]) -> Inherited:
         parts += [(word.text.upper(), name) for name in names]
+        return parts
+
+    def add_using(self, parts: Inherited, using: Using) -> Inherited:
+        parts.append(using)
         return parts
 
     def generic_type(self, token: Token, colon: Token, kind: Token) -> tuple[Token, Token]:
@@ -71,25 +112,27 @@ class SourceBuilder(SfcElements):
             self.report("S0901", opener.start, closer.end, "two generic types of one kind are not told apart",
                         "give them two kinds, such as ANY_NUM and ANY_INT")
 
-    def pou_head(self, modifiers: list[Token], token: Token, generics: None, inheritance: list[tuple[str, NamedType]]) -> Head:
+    def pou_head(self, modifiers: list[Token], token: Token, generics: None, inheritance: Inherited) -> Head:
         words = tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers)
-        return Head(self.declared(token), words, tuple(each for word, each in inheritance if word == "EXTENDS"),
-                    tuple(each for word, each in inheritance if word == "IMPLEMENTS"))
+        named = [each for each in inheritance if not isinstance(each, Using)]
+        return Head(self.declared(token), words, tuple(each for word, each in named if word == "EXTENDS"),
+                    tuple(each for word, each in named if word == "IMPLEMENTS"),
+                    tuple(each for each in inheritance if isinstance(each, Using)))
 
     # --- POUs ---
 
     def pou(self, word: Token, head: Head, sections: list[Section], items: Items, actions: list[Element],
             end: Token) -> Pou:
-        return self.function(word, head, None, None, sections, items, actions, end)
+        return self.function(word, head, None, None, None, sections, items, actions, end)
 
-    def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None,
+    def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None, usings: list[Using] | None,
                  sections: list[Section], items: Items, elements: list[Element], end: Token) -> Pou:
         refused: list[Refused] = []
         accesses = tuple(each for each in sections if isinstance(each, AccessVars) and word.type == "PROGRAM")
         refused += [_out_of_place(part) for part in (*sections, *elements)
                     if part not in accesses and not isinstance(part, VarSection | Action | Step | Transition | Members)]
         methods = [method for each in (*items, *elements) if isinstance(each, Members) for method in each.methods]
-        body = self.block([each for each in _without_blocks(items, refused) if not isinstance(each, Members)])
+        body = self.block([each for each in items if not isinstance(each, Members)])
         declared = [each for each in sections if isinstance(each, VarSection)]
         actions = [each for each in elements if isinstance(each, Action)]
         self._add_ladders(word, actions, declared)
@@ -101,19 +144,20 @@ class SourceBuilder(SfcElements):
         self.generic_types = {}
         kind = "FUNCTION_BLOCK" if word.type == "FUNCTION_BLOCK" else word.text.upper()
         return Pou(word.start, end.end, kind, head.name, result, tuple(declared), body, tuple(refused),
-                   tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods))
+                   tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods),
+                   head.with_usings(usings))
 
     def interface(self, word: Token, head: Head, members: list[Members], end: Token) -> Pou:
         methods = tuple(method for each in members for method in each.methods)
         return Pou(word.start, end.end, "INTERFACE", head.name, None, (), (), modifiers=head.modifiers, bases=head.bases,
-                   interfaces=head.interfaces, methods=methods)
+                   interfaces=head.interfaces, methods=methods, usings=head.usings)
 
     # --- methods and properties ---
 
-    def method(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None, sections: list[Section],
-               items: Items, end: Token) -> Members:
+    def method(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None, usings: list[Using] | None,
+               sections: list[Section], items: Items, end: Token) -> Members:
         with self._apart(word.start):
-            made = self.function(word, head, colon, result, sections, items, [], end)
+            made = self.function(word, head, colon, result, usings, sections, items, [], end)
         return Members(word.start, end.end, (made,))
 
     def accessor(self, modifiers: list[Token], word: Token, sections: list[Section], items: Items, end: Token) -> Pou:
@@ -121,7 +165,7 @@ class SourceBuilder(SfcElements):
         start = modifiers[0].start if modifiers else word.start
         head = Head(self.name(word), tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers), (), ())
         with self._apart(start):
-            made = self.function(word, head, None, None, sections, items, [], end)
+            made = self.function(word, head, None, None, None, sections, items, [], end)
         if end.text.upper() != f"END_{word.text.upper()}":
             self.report("S0101", end.start, end.end, f"END_{word.text.upper()} expected, but {end.text} found", "")
         return made
@@ -246,21 +290,15 @@ class SourceBuilder(SfcElements):
 _ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
 
 
-def _without_blocks(items: Items, refused: list[Refused]) -> Items:
-    """A list of statements without NAMESPACEs and the like, which are added to `refused`: these belong to the POU, not to
-    its body."""
-    blocks = [item for item in items if isinstance(item, RefusedStatement) and _is_block(item)]
-    refused += [Refused(block.start, block.end, block.what, block.code) for block in blocks]
-    return [item for item in items if item not in blocks] if blocks else items
+_IN_NAMESPACE = (Pou, TypeDecl, Namespace, Action, Actions)
 
 
-def _is_block(statement: RefusedStatement) -> bool:
-    """Whether a refused statement is a NAMESPACE or the like."""
-    return statement.what not in ("JMP", "__TRY") and not statement.what.startswith("label")
+def _is_program(declaration: Declaration) -> bool:
+    return isinstance(declaration, Pou) and declaration.kind == "PROGRAM"
 
 
 def _out_of_place(item: Refused | Settings) -> Refused:
     """The refusal of a part that a POU cannot have."""
     if isinstance(item, Refused):
         return item
-    return Refused(item.start, item.end, f"{'VAR_ACCESS' if isinstance(item, AccessVars) else 'VAR_CONFIG'} of a POU", "S0901")
+    return Refused(item.start, item.end, f"{'VAR_ACCESS' if isinstance(item, AccessVars) else 'VAR_CONFIG'} of a POU")

@@ -50,7 +50,7 @@ def proof_of_equality(mutant: Mutant, text: str, libraries: Sequence[Path], cycl
 def _renamed(mutant: Mutant, text: str) -> str | None:
     """The text of the changed block alone, under another name; None for a PROGRAM."""
     applied = mutant.applied(text)
-    for node in parse(Source(mutant.file, applied))[0].declarations:
+    for node in parse(Source(mutant.file, applied))[0].everything():
         if isinstance(node, tree.Pou) and node.name.text == mutant.change.pou and node.kind in ("FUNCTION_BLOCK", "FUNCTION"):
             new = RENAMED.format(node.name.text)
             own = {(node.name.start, node.name.end)}

@@ -99,7 +99,7 @@ def mutants_of(sources: Sequence[Source], lines: dict[str, set[int]] | None = No
     """All mutants of some sources in the order of the texts; with `lines`, only those at these lines of each file."""
     found: list[Mutant] = []
     for source in sources:
-        for node in parse(source)[0].declarations:
+        for node in parse(source)[0].everything():
             for change in changes(source.text, node) if isinstance(node, tree.Pou) else ():
                 line = line_of(source, change)
                 if lines is None or line in lines.get(source.name, ()):

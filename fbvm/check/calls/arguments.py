@@ -7,6 +7,7 @@ from itertools import count, islice
 
 from fbvm.base.dialects import Dialect, takers
 from fbvm.base.types import BOOL, Type, base, fold
+from fbvm.check.expressions import qualified
 from fbvm.check.expressions.assignability import assignable, converted_by_dialect, holds
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import warn_of_written_counter, writable
@@ -136,7 +137,7 @@ class Arguments:
 
 def callee(call: tree.Call) -> str:
     """The name of what is called, for messages."""
-    return call.callee.text if isinstance(call.callee, tree.NameRef) else "this"
+    return qualified.dotted(call.callee) or "this"
 
 
 def output(scope: Scope, argument: tree.Argument, kind: Type, name: str) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, RefType, StructType, Type, string
 from fbvm.check.calls.arguments import Arguments
+from fbvm.check.expressions import qualified
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.expressions.writes import writable
@@ -148,9 +149,9 @@ def _bound(scope: Scope, call: tree.Call, name: str, value: tree.Expr, dimension
 def _size(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
     """SIZEOF(x) of a variable or a type: bytes, as a literal would be written but for ANY."""
     kind: Type | None = None
-    if isinstance(value, tree.NameRef) and scope.variable(value.text) is None:
-        kind = scope.named_type(value.text)
-        pou = scope.project.pou(value.text, scope.source) if kind is None else None
+    if (name := qualified.bare(scope, value)) is not None:
+        kind = scope.named_type(name)
+        pou = scope.project.pou(name, scope.source) if kind is None else None
         if pou is not None and pou.kind == "FUNCTION_BLOCK" and scope.context.interface(pou, scope.source, value):
             kind = pou.type
     if kind is None:

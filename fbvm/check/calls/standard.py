@@ -97,6 +97,9 @@ def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value
     if unknown_names.is_reported(scope, call.callee):
         return None
     project = scope.project
+    if (why := project.why_unseen(callee(call), scope.source)) is not None:
+        scope.error(why[0], call.callee, *why[1:])
+        return None
     known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
     scope.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
                 vendor_names.FUNCTIONS.get(name) or vendor_names.library_of(callee(call)) or

@@ -54,7 +54,10 @@ def _without_query(specs: Iterable[tree.NamedType]) -> Iterator[tree.NamedType]:
 def _named(context: Context, pou: Pou, spec: tree.NamedType, kinds: tuple[str, ...]) -> Pou | None:
     """The resolved POU of one of `kinds` that a head names, or None after a diagnostic."""
     name = spec.text.rpartition(".")[2]
-    found = context.project.pou(name, pou.source)
+    found = context.project.pou(spec.text, pou.source) or context.project.pou(name, pou.source)
+    if found is None and (why := context.project.why_unseen(spec.text, pou.source)) is not None:
+        context.report.add(why[0], pou.source, spec, *why[1:])
+        return None
     if found is None or found.kind not in kinds:
         known = [each.name for each in context.project.pous.values() if each.kind in kinds]
         what = f"{found.name} is a {found.kind}" if found is not None else f"there is no {' or '.join(kinds)} {spec.text}"

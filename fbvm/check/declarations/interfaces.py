@@ -152,7 +152,8 @@ class _Interface:
                 self._error("S1005", written.name, f"{written.name.text} is declared twice in {pou.name}",
                             "variables, actions, methods and properties of a block share their names")
                 continue
-            made = Pou(shown if written.kind == "METHOD" else f"{shown}.{written.kind.capitalize()}", written.kind, pou.source,
+            source = self.context.project.namespaces.used_by(written, pou.source)
+            made = Pou(shown if written.kind == "METHOD" else f"{shown}.{written.kind.capitalize()}", written.kind, source,
                        written, block=pou, modifiers=_modifiers(pou, written))
             pou.methods[key] = made
             for refused in written.refused:
@@ -369,9 +370,8 @@ class _Interface:
         if is_block(resolved[0]) and not self.scope.dialect.instances_are_values:
             self._error("S0901", spec, f"an instance as a result is not taken here: {takers('instances_are_values')}")
             return
-        name = pou.tree.name.text if pou.block is not None else pou.name
-        pou.result = Variable(name, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])
-        pou.variables.setdefault(fold(name), pou.result)
+        pou.result = Variable(pou.tree.name.text, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])
+        pou.variables.setdefault(fold(pou.tree.name.text), pou.result)
         pou.order.append(pou.result)
 
     # --- layout -----------------------------------------------------------------------------------------------------

@@ -50,9 +50,9 @@ def type_declaration(context: Context, entry: TypeEntry) -> Resolved | None:
     declared, spec = entry.tree, entry.tree.spec
     scope = Scope(context, entry.source, None)
     if isinstance(spec, tree.UnionSpec | tree.StructSpec):
-        resolved = _structure(scope, spec, declared.name.text, entry.pack)
+        resolved = _structure(scope, spec, entry.name, entry.pack)
     else:
-        resolved = resolve(scope, spec, declared.name.text)
+        resolved = resolve(scope, spec, entry.name)
     if resolved is None or declared.initial is None:
         return resolved
     kind, initial = resolved
@@ -100,7 +100,7 @@ def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:
         pou = scope.project.pou(target.text, scope.source) if entry is None else None
         awaiting = entry if entry is not None and entry.busy else pou if pou is not None and pou.busy else None
         if awaiting is not None and not (pou is not None and pou.kind == "INTERFACE"):
-            name = awaiting.tree.name.text
+            name = awaiting.name
             made = RefType(f"{spec.kind} {name}", 8, 8, None, spec.kind == "POINTER TO", spec.kind == "REFERENCE TO")
             awaiting.awaited.append(made)
             return made, bytes(8)
@@ -130,7 +130,9 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     if folded in GENERIC:
         scope.error("S0205", spec, f"{folded} is no type of a variable", "it is one of a parameter only")
         return None
-    if not scope.project.is_refused(folded, scope.source):
+    if (why := scope.project.why_unseen(spec.text, scope.source)) is not None:
+        scope.error(why[0], spec, *why[1:])
+    else:
         scope.error("S0204", spec, f"there is no type or block {spec.text}", _hint(scope, spec.text))
     return None
 
@@ -140,9 +142,10 @@ _ARGUMENTS = {*ELEMENTARY, "STRING"}
 
 
 def _without_space(scope: Scope, name: str) -> str:
-    """A folded name of a type without the name of a library in front."""
+    """A folded name of a type without the name of a library in front; one in a namespace stays as it is."""
     space, dot, rest = name.rpartition(".")
-    return rest if dot and scope.project.is_space(space) else name
+    project, source = scope.project, scope.source
+    return rest if dot and project.namespaces.space(space, source) is None and project.is_space(space, source) else name
 
 
 def _hint(scope: Scope, name: str) -> str:

@@ -31,7 +31,8 @@ def name(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
 def _enumerated(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
     """The type of a name that is a member of an enumeration, else a diagnostic."""
     own = scope.source.library
-    members = [m for m in scope.project.enum_members.get(fold(expr.text), ()) if m[2] or not own]
+    members = [m for m in scope.project.enum_members.get(fold(expr.text), ()) if (m[2] or not own)
+               and (m[0] == want or "." not in m[0].name or scope.named_type(m[0].name.rpartition(".")[2]) == m[0])]
     near = [m for m in members if m[2] == own]
     wanted = [m for m in members if m[0] == want] or near or members
     if len({kind.name for kind, _, _ in wanted}) == 1:

@@ -164,8 +164,8 @@ def may_name(scope: Scope, node: tree.Node, method: Pou) -> bool:
         word, who = "PRIVATE", f"{home.name} alone names it"
     elif "PROTECTED" in words and home not in lineage:
         word, who = "PROTECTED", f"{home.name} and blocks that extend it name it"
-    elif "INTERNAL" in words and method.source.library != scope.source.library:
-        word, who = "INTERNAL", "its own library names it"
+    elif "INTERNAL" in words and not scope.project.is_seen(method.source, scope.source):
+        word, who = "INTERNAL", "its own library or namespace names it"
     else:
         return True
     scope.error("S1006", node, f"the {what} {method.tree.name.text} of {home.name} is {word}", who,

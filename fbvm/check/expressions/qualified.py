@@ -20,20 +20,35 @@ from fbvm.syntax import tree
 
 
 def bare(scope: Scope, expr: tree.Expr) -> str | None:
-    """The name that an expression is, without a name space in front; None for anything else."""
+    """The name that an expression is, without a library in front, but with a namespace; None for anything else."""
     if isinstance(expr, tree.NameRef):
         return expr.text if scope.variable(expr.text) is None else None
     if isinstance(expr, tree.Member) and is_space(scope, expr.of):
-        return expr.name.text
+        space = dotted(expr.of)
+        return f"{space}.{expr.name.text}" if scope.project.namespaces.space(space, scope.source) is not None else expr.name.text
     return None
 
 
+def dotted(expr: tree.Expr) -> str:
+    """What names with points between them are as one name; "" for anything else."""
+    if isinstance(expr, tree.NameRef):
+        return expr.text
+    outer = dotted(expr.of) if isinstance(expr, tree.Member) else ""
+    return f"{outer}.{expr.name.text}" if isinstance(expr, tree.Member) and outer else ""
+
+
+def _first(expr: tree.Expr) -> tree.Expr:
+    while isinstance(expr, tree.Member):
+        expr = expr.of
+    return expr
+
+
 def is_space(scope: Scope, expr: tree.Expr) -> bool:
-    """True for the name of a library or of a list of global variables, where no variable is called so; also behind the name
-    of a library, as in SysFile.SysTypes."""
-    if isinstance(expr, tree.Member):
-        return scope.project.is_space(expr.name.text) and is_space(scope, expr.of)
-    return isinstance(expr, tree.NameRef) and scope.variable(expr.text) is None and scope.project.is_space(expr.text)
+    """True for the name of a library, of a list of global variables or of a namespace, where no variable is called so; also
+    behind another one, as in SysFile.SysTypes."""
+    first, name = _first(expr), dotted(expr)
+    return bool(name) and isinstance(first, tree.NameRef) and scope.variable(first.text) is None and \
+        scope.project.is_space(name, scope.source)
 
 
 def last_name(space: tree.Expr) -> str:

@@ -35,7 +35,9 @@ def report_unknown(scope: Scope, expr: tree.NameRef) -> None:
         return
     name = expr.text
     pou = scope.project.pou(name, scope.source)
-    if pou is None:
+    if pou is None and (why := scope.project.why_unseen(name, scope.source)) is not None:
+        scope.error(why[0], expr, *why[1:])
+    elif pou is None:
         scope.error("S0201", expr, f"{name} is not declared", _hint(scope, expr))
     else:
         scope.error("S0201", expr, f"{name} is a {pou.kind} and has no value", _USES[pou.kind].format(pou.name))

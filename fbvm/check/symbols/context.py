@@ -119,7 +119,7 @@ class Context:
         self.project.dependencies.record("declared", name)
         if entry.busy:
             self.report.add("S0207", entry.source, entry.tree.name,
-                            f"{entry.tree.name.text} contains itself", "a type cannot hold a value of its own type")
+                            f"{entry.name} contains itself", "a type cannot hold a value of its own type")
             return None
         if not entry.done:
             entry.busy = True

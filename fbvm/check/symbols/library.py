@@ -266,6 +266,17 @@ class Libraries:
         library = self._libraries.get(owner)
         return library.writes if library else ()
 
+    def is_shipped(self, name: str) -> bool:
+        """True for a library that comes with fbvm."""
+        return self._libraries[name].shipped
+
+    def declares_space(self, name: str) -> bool:
+        """True if the text of a user's library has a NAMESPACE that is called or contains `name`, with points between."""
+        pattern = re.compile(rf"(?i)\bNAMESPACE\s+(?:INTERNAL\s+)?(?:\w+\s*\.\s*)*{re.escape(name.rpartition('.')[2])}\b")
+        texts = (read(path, path.name) for library in self._libraries.values() if not library.shipped
+                 for path in library.files.values())
+        return any(isinstance(each, Source) and pattern.search(each.text) is not None for each in texts)
+
     def is_by_dialect(self, name: str) -> bool:
         """True for a library whose blocks stand in place of others in what users write, and not in libraries."""
         return self._libraries[name].by_dialect

@@ -15,6 +15,8 @@ class Report:
 
     def add(self, code: str, source: Source, node: tree.Node, message: str, hint: str = "",
             related: tuple[Source, int, str] | None = None) -> None:
+        source = source.whole
+        related = related and (related[0].whole, *related[1:])
         key = (code, source, node.start)
         if key not in self._seen:
             self._seen.add(key)
@@ -22,6 +24,4 @@ class Report:
 
     def refuse(self, source: Source, node: tree.Refused | tree.RefusedStatement) -> None:
         """Report why something that was read is not executed."""
-        why = "is object-oriented text, which fbvm does not execute" if node.code == "S0902" else \
-            "is understood but not executed by this version"
-        self.add(node.code, source, node, f"{node.what} {why}")
+        self.add("S0901", source, node, f"{node.what} is understood but not executed by this version")

@@ -5,7 +5,6 @@ A user's own POU or type shadows a library's of the same name, except for names 
 from __future__ import annotations
 
 import difflib
-import re
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -15,10 +14,12 @@ from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect, takers
+from fbvm.base.namespaces import Surroundings
 from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.symbols.dependencies import Dependencies, Key
 from fbvm.check.symbols.facts import Facts, Pou, Variable
 from fbvm.check.symbols.library import Libraries
+from fbvm.check.symbols.namespaces import Namespaces, full_name
 from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.check.symbols.size_limits import SizeLimits
@@ -33,6 +34,8 @@ Resolved = tuple[Type, bytes]
 class TypeEntry:
     """A declared type; `resolved` is set at its first use, and stays None if the declaration has an error."""
 
+    name: str
+    """Its name with its namespace in front."""
     tree: tree.TypeDecl
     source: Source
     pack: int | None = None
@@ -61,6 +64,8 @@ COMPARISONS = 50_000
 LISTED = 8
 """How many names a hint lists."""
 T = TypeVar("T")
+Seen = tuple[str, Surroundings | None]
+"""The library and the namespaces from which a name is seen."""
 
 
 class SymbolTable:
@@ -69,6 +74,7 @@ class SymbolTable:
     def __init__(self, libraries: Libraries, report: Report, dialect: Dialect = STANDARD) -> None:
         self.dialect = dialect
         self.libraries = libraries
+        self.namespaces = Namespaces()
         self.report = report
         self.facts = Facts()
         self.size_limits = SizeLimits(report, dialect.large_memory)
@@ -97,12 +103,10 @@ class SymbolTable:
         self.dependencies = Dependencies()
         """What the check of the present body looks up."""
         self._loaded: set[str] = set()
-        self._refused: set[tuple[str, str]] = set()
-        """Library and folded name of what was declared and refused: an INTERFACE, a structure that EXTENDS another."""
         self._owners: dict[str, tuple[str, ...]] = {}
-        self._found_pous: dict[str, dict[str, Pou | None]] = {}
-        self._found_types: dict[str, dict[str, TypeEntry | None]] = {}
-        """Results of look-ups: by folded name, and by the library in which the name is used."""
+        self._found_pous: dict[str, dict[Seen, Pou | None]] = {}
+        self._found_types: dict[str, dict[Seen, TypeEntry | None]] = {}
+        """Results of look-ups: by folded name, and by the library and the namespaces in which the name is used."""
         self._compared = 0
         self.operator_types: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
         """By operator and elementary types of its operands, if none is constant: the types of the operation and the result."""
@@ -124,11 +128,15 @@ class SymbolTable:
     def collect(self, text: tree.SourceText, source: Source) -> None:
         """Add the declarations of one text; report names that are declared twice."""
         self._report_forms(text, source)
+        self.namespaces.used_in(text, source)
+        self._collect(text.declarations, text, source)
+
+    def _collect(self, declarations: Iterable[tree.Declaration], text: tree.SourceText, source: Source) -> None:
+        """Add the declarations of a text, or of a NAMESPACE in it."""
         last: Pou | None = None
-        for declaration in text.declarations:
-            if isinstance(declaration, tree.Refused):
-                self.report.refuse(source, declaration)
-                self._refused.add((source.library, _refused_name(declaration, source)))
+        for declaration in declarations:
+            if isinstance(declaration, tree.Namespace):
+                self._collect(declaration.declarations, text, self.namespaces.declare(declaration, source))
             elif isinstance(declaration, tree.Pou):
                 last = self._add_pou(declaration, source)
                 if self.dialect.pragmas_act and external(text, declaration):
@@ -143,10 +151,11 @@ class SymbolTable:
                 for action in declaration.actions:
                     self._add_action(action, source, declaration.owner, last)
             elif isinstance(declaration, tree.TypeDecl):
-                key = (source.library, fold(declaration.name.text))
+                full = full_name(declaration.name.text, source)
+                key = (source.library, fold(full))
                 if not self._twice(key, declaration.name, source, "type"):
-                    self._found_types.pop(key[1], None)
-                    self.types[key] = TypeEntry(declaration, source, pack_mode(text, declaration))
+                    self._forget(self._found_types, key[1])
+                    self.types[key] = TypeEntry(full, declaration, source, pack_mode(text, declaration))
             elif isinstance(declaration, tree.GlobalVars):
                 self.sections.append((declaration.section, source))
                 self.lists.add(list_name(source))
@@ -172,7 +181,7 @@ class SymbolTable:
 
     def _add_action(self, action: tree.Action, source: Source, owner: tree.Name | None, last: Pou | None) -> None:
         """Add an ACTION to the POU that it names, else to the POU in front of it."""
-        pou = self.pous.get((source.library, fold(owner.text))) if owner is not None else last
+        pou = self.pous.get((source.library, fold(full_name(owner.text, source)))) if owner is not None else last
         if pou is not None and not pou.is_function:
             pou.written_actions.append((action, source))
             return
@@ -181,19 +190,26 @@ class SymbolTable:
         self.report.add("S0205", source, action.name, f"the ACTION {action.name.text} belongs to no block or program", named)
 
     def _add_pou(self, declaration: tree.Pou, source: Source) -> Pou | None:
-        key = (source.library, fold(declaration.name.text))
+        name = full_name(declaration.name.text, source)
+        key = (source.library, fold(name))
         for refused in declaration.refused:
             self.report.refuse(source, refused)
         if not self._twice(key, declaration.name, source, "POU"):
-            self._found_pous.pop(key[1], None)
-            self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
+            self._forget(self._found_pous, key[1])
+            self.pous[key] = pou = Pou(name, declaration.kind, self.namespaces.used_by(declaration, source), declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
             pou.modifiers = frozenset(word.text for word in declaration.modifiers)
-            pou.failed_names |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
             pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)
             return pou
         return None
+
+    @staticmethod
+    def _forget(known: dict[str, dict[Seen, T | None]], full: str) -> None:
+        """Forget what the names meant that may mean a declaration with this folded full name."""
+        while full:
+            known.pop(full, None)
+            full = full.partition(".")[2]
 
     def _twice(self, key: tuple[str, str], name: tree.Name, source: Source, what: str) -> bool:
         refuse_reserved(self.report, source, name, self.dialect)
@@ -243,35 +259,87 @@ class SymbolTable:
     def type_entry(self, name: str, source: Source) -> TypeEntry | None:
         return self._find(self.types, self._found_types, name, source, "type")
 
-    def _find(self, table: dict[tuple[str, str], T], known: dict[str, dict[str, T | None]], name: str, source: Source,
+    def _find(self, table: dict[tuple[str, str], T], known: dict[str, dict[Seen, T | None]], name: str, source: Source,
               what: str) -> T | None:
         folded = fold(name)
         found = known.setdefault(folded, {})
-        if source.library not in found:
-            found[source.library] = self._look(table, folded, source)
-        answer = found[source.library]
+        seen = source.library, source.surroundings
+        if seen not in found:
+            found[seen] = self._look(table, folded, source)
+        answer = found[seen]
         if answer is not None or self.libraries.has_file(folded):
             self.dependencies.record(what, folded)
         return answer
 
     def _look(self, table: dict[tuple[str, str], T], folded: str, source: Source) -> T | None:
         """What a name means in `source`; reads the libraries' files of that name first."""
-        in_file = self.libraries.has_file(folded)
+        last = folded.rpartition(".")[2]
+        in_file = self.libraries.has_file(last)
+        if source.surroundings is not None or last != folded:
+            if in_file:
+                self._load_own(last, source)
+            if (meant := self._in_namespaces(folded, source)) is not None:
+                return table.get(meant[0]) if len(meant) == 1 else None
         for owner in self.owners(source):
-            if in_file and owner and (owner, folded) not in table:
+            if in_file and owner and last == folded and (owner, folded) not in table:
                 self._load(folded, owner)
-            if (owner, folded) in table:
+            if (owner, folded) in table and self._kept_by((owner, folded), source) is None:
                 return table[owner, folded]
         return None
 
-    def is_refused(self, name: str, source: Source) -> bool:
-        """True for a folded name whose declaration was refused."""
-        return any((owner, name) in self._refused for owner in self.owners(source))
+    def _load_own(self, name: str, source: Source) -> None:
+        """Read the files of that name in the user's libraries, since they may declare it in a NAMESPACE."""
+        for owner in self.owners(source):
+            if owner and not self.libraries.is_shipped(owner):
+                self._load(name, owner)
 
-    def is_space(self, name: str) -> bool:
-        """True for the name of a list of global variables or of a library, which may qualify other names; also for
-        several of them with points between."""
-        return all(part in self.lists or self.libraries.has_space(part) or self.load_list(part) for part in fold(name).split("."))
+    def _in_namespaces(self, folded: str, source: Source) -> list[Key] | None:
+        """The declarations that a name may mean by the namespaces around it and by USING; None if these say nothing of it."""
+        for group in self.namespaces.candidates(folded, source):
+            found: dict[str, Key] = {}
+            for full in group:
+                for key in ((owner, full) for owner in (self.owners(source) if "." in full else (source.library,))):
+                    if (key in self.pous or key in self.types) and self._kept_by(key, source) is None:
+                        found.setdefault(full, key)
+            if found:
+                return list(found.values())
+        return None
+
+    def _is_internal(self, key: Key) -> bool:
+        if key in self.types:
+            return self.types[key].tree.internal
+        return "INTERNAL" in self.pous[key].modifiers
+
+    def is_seen(self, internal: Source, source: Source) -> bool:
+        """True if `source` may name what is INTERNAL in another source: it is of the same library and in the same namespace."""
+        around = internal.surroundings
+        return internal.library == source.library and \
+            (around is None or not around.space or self.namespaces.keeps(fold(f"{around.space}.x"), True, source) is None)
+
+    def _kept_by(self, key: Key, source: Source) -> str | None:
+        """What keeps an INTERNAL declaration to itself though `source` names it; None if nothing does."""
+        internal = self._is_internal(key)
+        if internal and key[0] != source.library:
+            return key[0]
+        return self.namespaces.keeps(key[1], internal, source)
+
+    def why_unseen(self, name: str, source: Source) -> tuple[str, str, str] | None:
+        """Code, message and hint if a name that means nothing in `source` is ambiguous or INTERNAL; else None."""
+        folded = fold(name)
+        meant = self._in_namespaces(folded, source)
+        if meant is not None and len(meant) > 1:
+            full = [self.types[key].name if key in self.types else self.pous[key].name for key in meant]
+            return "S0211", f"{name} may be {' or '.join(full)}", "write which, with its namespace in front"
+        wanted = [key for group in [*self.namespaces.candidates(folded, source), [folded]] for full in group
+                  for owner in self.owners(source) for key in [(owner, full)] if key in self.pous or key in self.types]
+        keepers = [keeper for key in wanted if (keeper := self._kept_by(key, source)) is not None]
+        return ("S1006", f"{name} is INTERNAL", f"{keepers[0]} alone names it") if keepers else None
+
+    def is_space(self, name: str, source: Source) -> bool:
+        """True for the name of a list of global variables, of a library or of a namespace, which may qualify other names; also
+        for several of them with points between."""
+        return self.namespaces.space(name, source) is not None or \
+            all(part in self.lists or self.libraries.has_space(part) or self.load_list(part) for part in fold(name).split("."))
 
     def is_failed_global(self, name: str, source: Source) -> bool:
         """True if a global variable that `source` sees under this name has an error that was reported."""
@@ -316,17 +384,6 @@ class SymbolTable:
             return ""
         close = difflib.get_close_matches(fold(name), list(shown), n=3, cutoff=0.7)
         return "did you mean " + " or ".join(shown[c] for c in close) + "?" if close else ""
-
-
-_PART = re.compile(r"\w+\s+(?:(?:PUBLIC|PRIVATE|PROTECTED|INTERNAL|FINAL|ABSTRACT|OVERRIDE)\s+)*(\w+)", re.I)
-
-
-def _refused_name(node: tree.Refused, source: Source) -> str:
-    """The name of an ACTION, METHOD or INTERFACE that is refused, folded: uses of it are not reported again."""
-    if node.what.endswith("of a structure"):
-        return fold(source.text[node.start:node.end].split(None, 1)[0].rstrip(":"))
-    match = _PART.match(source.text, node.start)
-    return fold(match[1]) if match else ""
 
 
 def list_name(source: Source) -> str:

@@ -23,19 +23,33 @@ class DeclarationLayout(TypeLayout, SfcLayout):
         return tuple(parts[1:])
 
     def apart(self, items: list[Phrase]) -> list[Row]:
-        """Items with at least one empty line between them."""
+        """Items with at least one empty line between them, but for USINGs."""
         rows: list[Row] = []
-        for item in items:
+        for before, item in zip([None, *items], items, strict=False):
             new = self.rows([item])
-            if rows and not any(row.blank for row in new):
+            together = item.level == "using" and before is not None and before.level == "using"
+            if rows and not together and not any(row.blank for row in new):
                 new[0] = new[0]._replace(blank=True)
             rows += new
         return rows
+
+    # --- namespaces ---
+
+    def namespace(self, word: Token, modifiers: list[Leaf], name: Phrase, declarations: list[Phrase], end: Token) -> Phrase:
+        words = tuple(part for each in modifiers for part in (each, " "))
+        return Phrase(word.start, self.leaf(word), " ", *words, name.doc, lines(self.apart(declarations) + self.before_end(end)),
+                      HARD, self.leaf(end))
+
+    def using(self, word: Token, names: list[Phrase], end: Token) -> Phrase:
+        return Phrase(word.start, self.leaf(word), " ", self.listed(names, fill=True), self.closer(end), level="using")
 
     # --- POUs ---
 
     def add_inheritance(self, parts: list[Doc], word: Token, names: list[Phrase]) -> list[Doc]:
         return [*parts, " ", self.leaf(word), " ", self.listed(names, fill=True)]
+
+    def add_using(self, parts: list[Doc], using: Phrase) -> list[Doc]:
+        return [*parts, " ", using.doc]
 
     def generic_type(self, token: Token, colon: Token, kind: Token) -> Phrase:
         return Phrase(token.start, self.leaf(token), " ", self.leaf(colon), " ", self.leaf(kind))
@@ -50,13 +64,14 @@ class DeclarationLayout(TypeLayout, SfcLayout):
 
     def pou(self, word: Token, head: Doc, sections: list[Phrase], items: list[Phrase], actions: list[Phrase],
             end: Token) -> Phrase:
-        return self.function(word, head, None, None, sections, items, actions, end)
+        return self.function(word, head, None, None, None, sections, items, actions, end)
 
-    def function(self, word: Token, head: Doc, colon: Token | None, result: Phrase | None, sections: list[Phrase],
-                 items: list[Phrase], actions: list[Phrase], end: Token) -> Phrase:
+    def function(self, word: Token, head: Doc, colon: Token | None, result: Phrase | None, usings: list[Phrase] | None,
+                 sections: list[Phrase], items: list[Phrase], actions: list[Phrase], end: Token) -> Phrase:
         phrase = Phrase(word.start, self.leaf(word), " ", head)
         if colon and result:
             phrase.parts += (" ", self.leaf(colon), " ", result.doc)
+        phrase.parts += [part for using in usings or () for part in (" ", using.doc)]
         declared, body = self.rows(sections), self.with_methods(items)
         if not actions:
             body += self.before_end(end)
@@ -83,9 +98,9 @@ class DeclarationLayout(TypeLayout, SfcLayout):
         return Phrase(word.start, self.leaf(word), " ", head, Indent(lines(self.with_methods(members) + self.before_end(end))),
                       HARD, self.leaf(end))
 
-    def method(self, word: Token, head: Doc, colon: Token | None, result: Phrase | None, sections: list[Phrase],
-               items: list[Phrase], end: Token) -> Phrase:
-        made = self.function(word, head, colon, result, sections, items, [], end)
+    def method(self, word: Token, head: Doc, colon: Token | None, result: Phrase | None, usings: list[Phrase] | None,
+               sections: list[Phrase], items: list[Phrase], end: Token) -> Phrase:
+        made = self.function(word, head, colon, result, usings, sections, items, [], end)
         made.level = "method"
         return made
 
@@ -95,7 +110,7 @@ class DeclarationLayout(TypeLayout, SfcLayout):
 
     def accessor(self, modifiers: list[Leaf], word: Token, sections: list[Phrase], items: list[Phrase], end: Token) -> Phrase:
         words = tuple(part for each in modifiers for part in (each, " "))
-        made = self.function(word, (), None, None, sections, items, [], end)
+        made = self.function(word, (), None, None, None, sections, items, [], end)
         made.parts[:2] = (*words, made.parts[0])
         return made
 

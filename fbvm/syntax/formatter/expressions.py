@@ -102,10 +102,6 @@ class ExpressionLayout:
         names.append(self.leaf(token))
         return names
 
-    def add_refused(self, items: list[Phrase], token: Token) -> list[Phrase]:
-        items.append(self.refused(token))
-        return items
-
     def listed(self, items: Sequence[Phrase] | None, *, fill: bool = False) -> Doc:
         """The members of a list, behind its bracket: on one line, or one a line, or filled."""
         docs = [item.doc for item in items or ()]
@@ -136,6 +132,9 @@ class ExpressionLayout:
 
     def member(self, of: Phrase, dot: Token, token: Token) -> Phrase:
         return Phrase(of.start, of.doc, self.leaf(dot), self.leaf(token))
+
+    def member_literal(self, of: Phrase, dot: Token, token: Token) -> Phrase:
+        return Phrase(of.start, of.doc, self.leaf(dot), self.typed_literal(token).doc)
 
     def part(self, of: Phrase, token: Token) -> Phrase:
         return Phrase(of.start, of.doc, self.leaf(token, "." + token.text[1:].lstrip().upper()))

@@ -17,7 +17,7 @@ from fbvm.syntax.parser import parse
 from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.lexer import Lexer
 
-REFUSED = {"S0901", "S0902"}
+REFUSED = {"S0901"}
 """Errors of texts that are parsed all the same, and can therefore be formatted."""
 
 

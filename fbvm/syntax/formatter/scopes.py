@@ -37,7 +37,7 @@ Scope = dict[str, Entry]
 def global_scope(tree: SourceText) -> Scope:
     """The names of the whole text: types, POUs, global variables, members of enumerations, tasks."""
     scope: Scope = {}
-    for declaration in tree.declarations:
+    for declaration in tree.everything():
         if isinstance(declaration, TypeDecl):
             scope.setdefault(fold(declaration.name.text), Entry(declaration.name.text, declaration.spec))
             _enumerated(scope, declaration.spec)

@@ -316,7 +316,7 @@ class Recovery:
         symbol = anchor(self.states).symbol
         while True:
             kind = token.type
-            if kind in UNITS or kind.startswith("REFUSED"):
+            if kind in UNITS or kind == "TRY":
                 return [token]
             if symbol != "declarations":
                 if kind == "SEMICOLON":

@@ -9,11 +9,10 @@ from fbvm.syntax.st.tables import tables
 
 GROUPS = (
     ("a declaration (FUNCTION, FUNCTION_BLOCK, PROGRAM, TYPE, VAR_GLOBAL, CONFIGURATION)", {"FUNCTION", "TYPE"}, {
-        "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "REFUSED_SECTION",
-        "REFUSED_BLOCK", "CLASS", "INTERFACE", "ACTION", "ACTIONS", "VAR_CONFIG", "SEMICOLON", "$END"}),
+        "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "NAMESPACE", "END_NAMESPACE",
+        "USING", "CLASS", "INTERFACE", "ACTION", "ACTIONS", "VAR_CONFIG", "SEMICOLON", "$END"}),
     ("a statement", {"IF", "FOR", "SEMICOLON"}, {
-        "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK",
-        "METHOD", "PROPERTY",
+        "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "METHOD", "PROPERTY",
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
         "NOT", "DIRECT", "LADDER", "INSTRUCTION_LIST"}),
     ("an expression", {"NAME", "NUMBER", "LPAR"}, {
@@ -37,7 +36,7 @@ STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "DIRECT"}
 LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
-UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "JMP", "QUALIFIER", "EDGE",
+UNSAID = {"NAMESPACE", "USING", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "JMP", "QUALIFIER", "EDGE",
           "OVERLAP", "ACTION", "DIRECTION", "STEP", "TRANSITION", "METHOD", "PROPERTY", "ACCESSOR", "CLASS", "INTERFACE"}
 """Terminals that are allowed and never mentioned: they would be refused later, or are seldom meant."""
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.st.refused import refused_what
-from fbvm.syntax.tree import Expr, Form, Name, Refused, Statement
+from fbvm.syntax.tree import Expr, Form, Name, Statement
 from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 
@@ -150,15 +149,6 @@ class Builder:
     def add_name(self, names: list[Name], token: Token) -> list[Name]:
         names.append(Name(token.start, token.end, token.text.upper()))
         return names
-
-    def refused(self, token: Token) -> Refused:
-        """A whole NAMESPACE .. END_NAMESPACE and its like."""
-        what, code = refused_what(token.text)
-        return Refused(token.start, token.end, what, code)
-
-    def add_refused(self, items: list[Any], token: Token) -> list[Any]:
-        items.append(self.refused(token))
-        return items
 
     def deepen(self, node: Expr, left: Expr, right: Expr | None = None) -> None:
         """Note the depth of a new node over one or two parts."""

@@ -100,6 +100,18 @@ class Expressions(Builder):
         self.deepen(node, of)
         return node
 
+    def member_literal(self, of: Expr, dot: Token, token: Token) -> Expr:
+        """`Plant.Color#Red`, which means Plant.Color.Red."""
+        literal = self.typed_literal(token)
+        if not isinstance(literal, EnumLiteral):
+            self.report("S0101", token.start, token.end, f"a name expected, but `{token.text}` found", "")
+            return of
+        kind = Member(of.start, literal.type_name.end, of, literal.type_name)
+        self.deepen(kind, of)
+        node = Member(of.start, token.end, kind, literal.member)
+        self.deepen(node, kind)
+        return node
+
     def part(self, of: Expr, token: Token) -> Part:
         text = token.text[1:].lstrip()
         size, digits = (text[1].upper(), text[2:]) if text[0] == "%" else ("X", text)

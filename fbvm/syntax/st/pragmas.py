@@ -130,5 +130,5 @@ def _in_front(text: SourceText, declaration: Declaration) -> Iterator[str]:
     """The contents of the pragmas directly in front of a declaration."""
     if not text.pragmas:
         return
-    before = max((d.end for d in text.declarations if d.end <= declaration.start), default=0)
+    before = max((d.end for d in text.everything() if d.end <= declaration.start), default=0)
     yield from (p.text for p in text.pragmas if before <= p.start and p.end <= declaration.start)

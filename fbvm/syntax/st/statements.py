@@ -7,7 +7,6 @@ from itertools import pairwise, zip_longest
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY
-from fbvm.syntax.st.refused import refused_what
 from fbvm.syntax.tree import (
     Assign,
     Block,
@@ -154,8 +153,7 @@ class Statements(Expressions):
         return members
 
     def refused_statement(self, token: Token) -> RefusedStatement:
-        """A NAMESPACE, __TRY ... among statements; directly in a body its POU takes it."""
-        return RefusedStatement(token.start, token.end, *refused_what(token.text))
+        return RefusedStatement(token.start, token.end, token.text.split(None, 1)[0].split("(")[0].upper())
 
     # --- compound statements ---
 

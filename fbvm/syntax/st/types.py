@@ -25,6 +25,7 @@ from fbvm.syntax.tree import (
     UnionSpec,
     VarDecl,
 )
+from fbvm.syntax.tree.node import changed
 
 EnumMember = tuple[Name, Expr | None]
 
@@ -37,7 +38,8 @@ class Types(Statements):
 
     def modified_type_declaration(self, word: Token, modifiers: list[Token], declarations: list[Declaration],
                                   end: Token) -> list[Declaration]:
-        return declarations
+        internal = any(each.text.upper() == "INTERNAL" for each in modifiers)
+        return [changed(each, internal=internal) if isinstance(each, TypeDecl) else each for each in declarations]
 
     def type_decl(self, token: Token, colon: Token, spec: TypeSpec, sign: Token | None, initial: Initial | None,
                   end: Token) -> TypeDecl:

@@ -7,6 +7,7 @@ Names are kept as written; comparing them without case is the checker's work.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from fbvm.syntax.tree.expressions import Argument, ArrayInit, Expr, Name
@@ -223,10 +224,9 @@ class Empty(Statement):
 
 @_node
 class RefusedStatement(Statement):
-    """Understood but never executed (a JMP into a block, NAMESPACE ...): `what` names it, `code` is S0901 or S0902."""
+    """Understood but never executed (a JMP into a block, __TRY ...): `what` names it."""
 
     what: str
-    code: str = "S0901"
 
 
 # --- declarations (6.6, 6.8) ---------------------------------------------------------------------------------------
@@ -239,10 +239,26 @@ class Declaration(Node):
 
 @_node
 class Refused(Declaration):
-    """Understood but not executed: NAMESPACE, USING, VAR_ACCESS of a block ...; code S0901 or S0902."""
+    """Understood but not executed, such as VAR_ACCESS of a block: `what` names it."""
 
     what: str
-    code: str
+
+
+@_node
+class Using(Declaration):
+    """`USING A.B, C;` in front of what may then name the declarations of these namespaces without them."""
+
+    names: tuple[NamedType, ...]
+
+
+@_node
+class Namespace(Declaration):
+    """`NAMESPACE A.B .. END_NAMESPACE`: `modifiers` may be INTERNAL; of POUs it has no PROGRAM."""
+
+    name: NamedType
+    modifiers: tuple[Name, ...]
+    usings: tuple[Using, ...]
+    declarations: tuple[Declaration, ...]
 
 
 @_node
@@ -250,6 +266,7 @@ class TypeDecl(Declaration):
     name: Name
     spec: TypeSpec
     initial: Initial | None
+    internal: bool = False
 
 
 @_node
@@ -272,6 +289,7 @@ class Pou(Declaration):
     bases: tuple[NamedType, ...] = ()
     interfaces: tuple[NamedType, ...] = ()
     methods: tuple[Pou, ...] = ()
+    usings: tuple[Using, ...] = ()
 
 
 @_node
@@ -411,3 +429,13 @@ class SourceText(Node):
     declarations: tuple[Declaration, ...]
     pragmas: tuple[Pragma, ...] = ()
     forms: tuple[Form, ...] = ()
+
+    def everything(self) -> Iterator[Declaration]:
+        """All declarations, those in namespaces too, but no NAMESPACE and no USING."""
+        waiting = list(reversed(self.declarations))
+        while waiting:
+            each = waiting.pop()
+            if isinstance(each, Namespace):
+                waiting += reversed(each.declarations)
+            elif not isinstance(each, Using):
+                yield each

@@ -229,8 +229,28 @@ def test_lines_of_a_comment_keep_their_places_to_one_another() -> None:
 
 
 def test_what_is_refused_is_not_touched() -> None:
-    refused = "NAMESPACE  m\n   x:=1 ;\nEND_NAMESPACE"
+    refused = "__TRY\n   x:=1 ;\n__CATCH(e)\n__ENDTRY"
     assert body(refused + "\na;") == refused + "\na;\n"
+
+
+# --- namespaces ---
+
+
+def test_usings_stand_together_and_namespaces_apart() -> None:
+    assert written("using A ;using B.C,D;namespace internal A function F:int using B; F:=1;end_function end_namespace "
+                   "namespace B end_namespace") == """\
+USING A;
+USING B.C, D;
+
+NAMESPACE INTERNAL A
+FUNCTION F : INT USING B;
+    F := 1;
+END_FUNCTION
+END_NAMESPACE
+
+NAMESPACE B
+END_NAMESPACE
+"""
 
 
 # --- names ---

@@ -67,7 +67,7 @@ def export_xml(sources: Sequence[Source | Path | str], name: str = "project", cr
 
 def _source(parts: _Parts, source: Source) -> None:
     text, diagnostics = parse(source)
-    wrong = [d for d in errors(diagnostics) if d.code not in ("S0901", "S0902")]
+    wrong = [d for d in errors(diagnostics) if d.code != "S0901"]
     parts.diagnostics += wrong
     if wrong:
         return  # there will be no document, and a damaged tree has no drawing
@@ -104,8 +104,8 @@ def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: 
         parts.globals.append(types.section(declared.section, name))
     elif isinstance(declared, tree.Configuration):
         parts.configurations.append(_configuration(types, declared))
-    elif isinstance(declared, tree.Refused):
-        raise NotExportable(declared, f"{declared.what} is not exported", "")
+    elif isinstance(declared, tree.Namespace | tree.Using):
+        raise NotExportable(declared, "NAMESPACE and USING are not exported", "PLCopen XML has none: declare it outside")
     else:
         raise NotExportable(declared, "what stands outside of its POU is not exported", "put ACTIONs into their POU")
 
