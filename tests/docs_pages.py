@@ -216,7 +216,7 @@ class Reader:
             return
         text = block.text
         bare = re.sub(r"^\s*(//.*\n|\(\*.*?\*\)\s*)*", "", text)
-        if not re.match(r"(PROGRAM|FUNCTION|FUNCTION_BLOCK|TYPE|CONFIGURATION|VAR_GLOBAL|CLASS|INTERFACE)\b", bare):
+        if not re.match(r"(PROGRAM|FUNCTION(_BLOCK)?|TYPE|CONFIGURATION|VAR_GLOBAL|CLASS|INTERFACE|NAMESPACE|USING)\b", bare):
             text = f"PROGRAM Main\n{'' if bare.startswith('VAR') else self.declared}{text}\nEND_PROGRAM\n"
         self.declared = "".join(re.findall(r"^VAR\b.*?^END_VAR\n", text, re.M | re.S))
         beside = [Source(str(path), other) for path in Path().rglob("*.st") if not path.is_relative_to("examples")

@@ -53,9 +53,10 @@ def _method(checker: Checker, key: Key) -> Declared | None:
 
 def _owner(checker: Checker, key: Key) -> Pou | None:
     """The POU of a variable: a method, or an accessor of a property, too."""
-    block, _, rest = key[2].rpartition(".")
-    found = checker.project.pous.get((key[1], key[2])) or checker.project.pous.get((key[1], block))
-    if found is None or not rest or fold(found.name) == key[2]:
+    parts = key[2].split(".")
+    names = (".".join(parts[:count]) for count in range(len(parts), 0, -1))
+    found = next((checker.project.pous[key[1], name] for name in names if (key[1], name) in checker.project.pous), None)
+    if found is None or fold(found.name) == key[2]:
         return found
     return next((method for method in found.methods.values() if fold(method.name) == key[2]), None)
 

@@ -113,7 +113,7 @@ def _check_meaning(program: Program, places: list[Place], key: Key, new: str) ->
         for each in errors(other.diagnostics(file)):
             if (each.code, _without_name(each, fold(new), key[-1])) not in known:
                 raise Refusal(f"{each.source.name}:{each.line}: {each.message}")
-    renamed = (*key[:-1], fold(new))
+    renamed = (*key[:-1], f"{key[-1].rpartition('.')[0]}.{fold(new)}".lstrip("."))
     if len(references(other, renamed)) != len(places):
         raise Refusal(f"`{new}` means something else in a place where the name stands")
 

@@ -1,0 +1,95 @@
+"""Names of namespaces in a program that is edited: definitions, places, renaming, what can be written, changes."""
+
+from __future__ import annotations
+
+from editing import MARK, at_mark
+from rows import each_of
+
+from fbvm.analysis.completion import complete
+from fbvm.analysis.outline import outline
+from fbvm.analysis.program import Program
+from fbvm.analysis.references import declared_at, references, rename
+
+PLANT = """\
+USING Plant;
+NAMESPACE Plant
+TYPE Mode : (Idle, Busy); END_TYPE
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+    Twice := 2 * x;
+END_FUNCTION
+NAMESPACE Pumps
+FUNCTION_BLOCK Pump
+VAR_OUTPUT q : INT; m : Mode; END_VAR
+    q := q + Twice(1);
+    Run();
+METHOD Run
+VAR_INPUT y : INT; END_VAR
+    m := Mode#Busy;
+END_METHOD
+END_FUNCTION_BLOCK
+END_NAMESPACE
+END_NAMESPACE
+FUNCTION_BLOCK Pump
+VAR_OUTPUT q : INT; END_VAR
+    q := Plant.Twice(3);
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR p : Plant.Pumps.Pump; o : Pump; n : INT; END_VAR
+    p(); o(); n := Twice(x := p.q); p.Run(y := n);
+END_PROGRAM
+"""
+
+
+def plant(before: str, word: str) -> tuple[Program, int]:
+    """The plant, and the place of a word that stands behind a piece of its text."""
+    at = PLANT.index(before) + PLANT[PLANT.index(before):].index(word)
+    return at_mark(PLANT[:at] + MARK + PLANT[at:])
+
+
+@each_of("before, word, line, count", [
+    ("p : Plant.Pumps", "Pump;", 9, 2),
+    ("o : Pump", "Pump", 20, 2),
+    ("Plant.Twice", "Twice", 4, 5),
+    ("n := Twice", "Twice", 4, 5),
+    ("Twice(x", "x", 5, 3),
+    ("p.q", "q", 10, 4),
+    ("Mode#Busy", "Mode", 3, 3),
+    ("Mode#Busy", "Busy", 3, 2),
+    ("p.Run", "Run", 13, 3),
+    ("p.Run", "y", 14, 2),
+])
+def test_a_name_leads_to_its_declaration_in_its_namespace(before: str, word: str, line: int, count: int) -> None:
+    program, offset = plant(before, word)
+    declared = declared_at(program, "pump.st", offset)
+    assert declared is not None
+    placed = program.place(declared.source)
+    assert placed is not None
+    assert placed[0].source.place(placed[1] + declared.node.start)[0] == line
+    assert len(references(program, declared.key)) == count
+
+
+def test_what_is_renamed_is_what_the_namespace_declares() -> None:
+    program, offset = plant("p : Plant.Pumps", "Pump;")
+    places = rename(program, "pump.st", offset, "Motor")
+    assert [PLANT[:place.start].count("\n") + 1 for place in places] == [9, 25]
+
+
+def test_the_outline_has_what_stands_in_namespaces() -> None:
+    program, _ = plant("p()", "p")
+    spaces = [symbol for symbol in outline(program.files["pump.st"]) if symbol.kind == "NAMESPACE"]
+    assert [(each.name, [child.name for child in each.children]) for each in spaces] == [("Plant", ["Mode", "Twice", "Pumps"])]
+
+
+def test_what_can_be_written_inside_of_a_namespace() -> None:
+    program, offset = at_mark(PLANT.replace("m := Mode#Busy", f"{MARK}m := Mode#Busy"))
+    assert {"y", "q", "m", "Run"} <= {each.label for each in complete(program, "pump.st", offset)}
+
+
+def test_names_are_looked_up_anew_when_a_using_changes() -> None:
+    program, _ = plant("p()", "p")
+    assert program.diagnostics("pump.st") == []
+    program.replace("pump.st", PLANT.replace("USING Plant;", ""))
+    assert not program.check_changes()
+    program.check_all()
+    assert [each.code for each in program.diagnostics("pump.st")] == ["S0401"]
