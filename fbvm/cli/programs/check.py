@@ -14,7 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.lint.suppression import Wanted
 from fbvm.cli.shared import status
 from fbvm.cli.shared.given_sources import inputs
-from fbvm.cli.shared.paths import SourcePath
+from fbvm.cli.shared.paths import SourcePath, taken_folders
 from fbvm.cli.shared.project_arguments import allow_outside_option, check_project_options, project_argument, read_given_project
 from fbvm.cli.shared.sources import compile_options, report_diagnostics, source_options
 from fbvm.code.compiler import LONG, compile_files
@@ -25,7 +25,7 @@ PROJECT_OPTIONS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-
 
 @click.command("check")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath(), callback=taken_folders)
 @click.option("--no-warn", metavar="CODE", multiple=True,
               help="Do not warn of that, such as S0390, or of `all`; may be repeated, or a list with commas.")
 @click.option("--warnings-as-errors", is_flag=True, help="A warning counts as an error.")

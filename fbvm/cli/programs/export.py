@@ -13,7 +13,7 @@ from fbvm.base.files import SOURCE_BYTES, read_file, write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.given_sources import inputs
-from fbvm.cli.shared.paths import ExistingPath, SourcePath
+from fbvm.cli.shared.paths import ExistingPath, SourcePath, sources_in
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
 from fbvm.interchange.cx.write.exporting import UNTRIED, export_into
@@ -35,7 +35,7 @@ def command(files: tuple[Path, ...], document: Path, saved: Path | None, plc: st
 
     Structured Text stays as it is, LADDER .. END_LADDER and charts are drawn. With --into, what differs from the project that
     CX-Programmer saved is replaced in a copy of it, and every other byte stays. Status 3 if something is left out."""
-    files = tuple(file for given in files for file in (sorted(given.glob("*.st")) if given.is_dir() else [given]))
+    files = tuple(file for given in files for file in (sources_in(given) if given.is_dir() else [given]))
     if not files:
         raise click.UsageError("there is no source in this folder")
     if saved:

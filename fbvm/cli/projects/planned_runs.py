@@ -14,7 +14,7 @@ import click
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.cli.shared import status
 from fbvm.cli.shared.options import cycle_option, mapping, show_option, time_ns
-from fbvm.cli.shared.paths import SourcePath
+from fbvm.cli.shared.paths import SourcePath, taken_folders
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument, read_given_project
 from fbvm.cli.shared.sources import compile_options, report_diagnostics, show_diagnostic, source_options
 from fbvm.cli.shared.terminal import named
@@ -31,7 +31,7 @@ OUTPUT = click.Path(dir_okay=False, path_type=Path)
 def plan_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """What is run, for how long, what is varied and shown, and by how many processes."""
     for decorate in (
-        click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | CAMPAIGN]", type=SourcePath()),
+        click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | CAMPAIGN]", type=SourcePath(), callback=taken_folders),
         source_options,
         cycle_option,
         click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=peer",

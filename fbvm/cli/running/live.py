@@ -21,7 +21,7 @@ from fbvm.cli.shared.options import (
     map_option,
     net_option,
 )
-from fbvm.cli.shared.paths import SourcePath
+from fbvm.cli.shared.paths import SourcePath, taken_folders
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_options
 from fbvm.code.image import Image
@@ -34,7 +34,7 @@ from fbvm.run.running import Running
 
 @click.command("live")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath(), callback=taken_folders)
 @cycle_option
 @net_option
 @map_option

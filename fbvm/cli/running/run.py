@@ -35,7 +35,7 @@ from fbvm.cli.shared.options import (
     time_ns,
     watch_cycle_option,
 )
-from fbvm.cli.shared.paths import SourcePath
+from fbvm.cli.shared.paths import SourcePath, taken_folders
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument
 from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, recording_options, write_page
 from fbvm.cli.shared.run_result import RunProgress, RunResult
@@ -64,7 +64,7 @@ NEVER_WITH_DEBUG = {"journal": "--journal", "trace": "--trace", "html": "--html"
 
 @click.command("run")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath(), callback=taken_folders)
 @cycle_option
 @click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")
 @click.option("--for", "for_ns", type=time_ns, metavar="TIME", help="End after this time.")
@@ -105,7 +105,8 @@ def command(
     **options: Any,
 ) -> None:  # fmt: skip
     """Compile the files and run them, with an ETN21 (unit number 0) on the backplane; or run a PROJECT: a folder with an
-    fbvm.toml, or that file.  Without either it is the folder where you are.
+    fbvm.toml, or that file.  Without either it is the folder where you are.  A folder without such a file stands for the sources
+    in it (.st).
 
     Beside it is the unit of each mailbox that the program uses, such as the Ethernet module of MBP_MSTR in slot 7.
 

@@ -33,6 +33,7 @@ from fbvm.cli.shared.options import (
     time_ns,
     watch_cycle_option,
 )
+from fbvm.cli.shared.paths import SourcePath, taken_folders
 from fbvm.cli.shared.run_recording import RunRecording, described, program_text, record_run, recording_file_options
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, source_options
 from fbvm.cli.shared.terminal import named, say
@@ -68,7 +69,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 
 @click.command("serve")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE...]", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("files", nargs=-1, metavar="[FILE...]", type=SourcePath(), callback=taken_folders)
 @bind_option
 @click.option("--port", type=click.IntRange(0, 65535), default=1502, show_default=True, help="0: any free port.")
 @click.option("--sockets", type=click.IntRange(1, 8), default=1, show_default=True, help="Clients at once.")

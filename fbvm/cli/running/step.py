@@ -16,7 +16,7 @@ from fbvm.cli.shared.debug.worlds import NetworkPackets, ProgramErrors, ProjectW
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.given_sources import given_sources
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
-from fbvm.cli.shared.paths import SourcePath
+from fbvm.cli.shared.paths import SourcePath, taken_folders
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument, read_given_project
 from fbvm.cli.shared.prompt import prompt_lines
 from fbvm.cli.shared.sources import compile_or_exit, report_diagnostics, source_options
@@ -53,7 +53,7 @@ class SourceOrRecording(SourcePath):
 @click.command("step", epilog="At the prompt, `help` lists the commands.  A script: printf 'run Main.Done\\nprint D200\\n' | "
                "fbvm step FILE")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | TRACE]", type=SourceOrRecording())
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | TRACE]", type=SourceOrRecording(), callback=taken_folders)
 @click.option("--plc", "name", metavar="NAME", help="Which PLC of a project, where the others scan along; or of a trace.")
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")

@@ -64,6 +64,34 @@ class SourcePath(ExistingPath):
         return path
 
 
+PROJECTS = ("fbvm.toml", "campaign.toml")
+"""Files that make a folder a project or a campaign."""
+
+
+def sources_in(folder: Path) -> list[Path]:
+    """The sources of a folder: its files that end in .st, by name."""
+    return sorted(file for file in folder.glob("*.st") if file.is_file())
+
+
+def taken_folders(context: click.Context, parameter: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Called by click with FILE...: each folder that is no project stands for its sources.
+
+    Raises UsageError for one that has none."""
+    return tuple(file for path in files for file in (_taken(path) if _is_of_sources(path) else [path]))
+
+
+def _is_of_sources(path: Path) -> bool:
+    return path.is_dir() and not any((path / name).exists() for name in PROJECTS)
+
+
+def _taken(folder: Path) -> list[Path]:
+    found = sources_in(folder)
+    if not found:
+        raise click.UsageError(f"there is neither an fbvm.toml nor a source (.st) in {folder.resolve()}; give a FILE, or a "
+                               "folder with a project or with sources")  # fmt: skip
+    return found
+
+
 def foreign(path: Path) -> str:
     """What a file is that is no source, and what to do with it; "" for all that may be one."""
     if not path.is_file():

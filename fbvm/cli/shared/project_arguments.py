@@ -40,7 +40,8 @@ def project_argument(files: tuple[Path, ...]) -> Path | None:
 
     where = files[0] if files else Path()
     if (found := project_file(where)) is None:
-        raise click.UsageError(f"there is no {FILE} in {where.resolve()}; give a FILE, or a folder with a project")
+        raise click.UsageError(f"there is no {FILE} in {where.resolve()}; give a FILE, or a folder with a project or "
+                               "with sources (. is this one)")  # fmt: skip
     return found
 
 

@@ -14,7 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.cli.shared import status
 from fbvm.cli.shared.given_sources import families, inputs, sources_of
-from fbvm.cli.shared.paths import ExistingPath, SourcePath
+from fbvm.cli.shared.paths import ExistingPath, SourcePath, taken_folders
 from fbvm.cli.shared.terminal import say, say_json
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
@@ -28,7 +28,7 @@ AUTO = "auto"
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
     """FILE..., --program, --resource, --dialect, --library and --no-cache, which all verbs on programs share."""
     files = click.argument("files", nargs=-1, required=True, metavar="FILE...",
-                           type=SourcePath(dir_okay=False))  # fmt: skip
+                           type=SourcePath(), callback=taken_folders)  # fmt: skip
     return source_options(files(function))
 
 

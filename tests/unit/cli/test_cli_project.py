@@ -155,6 +155,20 @@ def test_where_there_is_no_project(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     result = run("--scans", "1")
     assert result.exit_code == 2
     assert f"there is no fbvm.toml in {tmp_path}; give a FILE, or a folder with a project" in result.stderr
+    assert run(".", "--scans", "1").exit_code == 2
+    assert f"neither an fbvm.toml nor a source (.st) in {tmp_path}" in run(".", "--scans", "1").stderr
+
+
+@pytest.mark.slow
+def test_a_folder_without_a_project_stands_for_its_sources(tmp_path: Path) -> None:
+    (tmp_path / "main.st").write_text("PROGRAM Main VAR n AT D5 : UINT; END_VAR n := Twice(n + 1); END_PROGRAM", encoding="utf-8")
+    (tmp_path / "twice.st").write_text("FUNCTION Twice : UINT VAR_INPUT a : UINT; END_VAR Twice := 2 * a; END_FUNCTION",
+                                       encoding="utf-8")  # fmt: skip
+    (tmp_path / "notes.txt").write_text("no source", encoding="utf-8")
+    assert run(str(tmp_path), "--scans", "2", "--show", "D5").stdout == "D5 = 6 (16#0006)\n"
+    assert check(str(tmp_path)).output == ""
+    shown = CliRunner().invoke(main, ["list", str(tmp_path)])
+    assert (shown.exit_code, "Twice" in shown.output) == (0, True)
 
 
 def check(*arguments: str) -> Result:

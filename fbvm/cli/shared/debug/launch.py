@@ -15,6 +15,7 @@ from fbvm.cli.shared.debug.attach import literal
 from fbvm.cli.shared.debug.worlds import NetworkPackets, ProgramErrors, ProjectWorld, program_world
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.options import mapping
+from fbvm.cli.shared.paths import sources_in
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.dap.target import LaunchError, Target, checked
@@ -73,7 +74,7 @@ def _sources(given: Mapping[str, Any], folder: Path) -> list[Path]:
     found: list[Path] = []
     for name in named:
         path = folder / str(name)
-        found += sorted(path.glob("*.st")) if path.is_dir() else [path]
+        found += sources_in(path) if path.is_dir() else [path]
     if not found:
         raise LaunchError(f"there are no sources in {given['program']}")
     for path in found:
