@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something of a source stands in the document of which it was made: characters from 0, and words that say it."""
+
+    document: Source
+    start: int
+    end: int
+    where: str
+
+
+Places = Mapping[str, Sequence[Place | None]]
+"""By file name, the place of each line of a source; None for a line that nothing in the document stands for."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +37,20 @@ class Imported:
     """From what the family and the order of evaluation were concluded."""
     references: tuple[str, ...] = ()
     """Names of the libraries that it refers to, as far as they are known."""
+    find_places: Callable[[], Places] | None = None
+    """Finds where the sources stand in the document; None if nobody can tell."""
+    is_text: bool = True
+    """Whether an editor can show the document; places of a compressed one are those of the text within."""
 
     @property
     def errors(self) -> list[Diagnostic]:
         """Diagnostics about parts of the program that were not taken over."""
         return errors(self.diagnostics)
+
+    @cached_property
+    def places(self) -> Places:
+        """Where the lines of the sources stand in the document."""
+        return self.find_places() if self.find_places is not None else {}
 
     @cached_property
     def sources(self) -> list[Source]:

@@ -20,8 +20,8 @@ class SourceFiles:
         self._taken: set[str] = set()
         self._numbers: dict[str, int] = {}
 
-    def add(self, name: str, lines: list[str]) -> None:
-        """Puts lines into a file of their own, which is called `name` or like it."""
+    def add(self, name: str, lines: list[str]) -> str:
+        """Puts lines into a file of their own, which is called `name` or like it.  Returns its name."""
         name = re.sub(r"[^\w-]", "_", name)[:LONGEST_NAME]
         if is_device(name):
             name += "_"
@@ -31,6 +31,7 @@ class SourceFiles:
             free = f"{name}_{number}"
         self._taken.add(free.casefold())
         self.lines[free] = lines
+        return f"{free}.st"
 
     def texts(self) -> dict[str, str]:
         """The texts by their file names, in the form in which `fmt` writes them; as they are if they cannot be read."""

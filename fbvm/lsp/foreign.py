@@ -5,12 +5,14 @@ file.  A container (a project of TwinCAT or CX-Programmer, PLCopen XML) holds so
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.interchange.formats.given import CX_SUFFIXES, sources_by_name, within
+from fbvm.interchange.imported import Imported, Place
 from fbvm.interchange.twincat import OBJECT_SUFFIXES, PROJECT_SUFFIX
 from fbvm.interchange.twincat.objects import read_object
 
@@ -54,6 +56,8 @@ class Gathered:
     """Texts of sources that are no files, by name."""
     said: dict[Path, list[Diagnostic]] = field(default_factory=dict)
     """What reading the containers has told, by container."""
+    containers: dict[Path, Imported] = field(default_factory=dict)
+    """What the containers hold."""
 
 
 def gathered(paths: Iterable[Path], resource: str | None = None) -> Gathered:
@@ -69,7 +73,9 @@ def gathered(paths: Iterable[Path], resource: str | None = None) -> Gathered:
                 continue
         within_all[path] = made
         if made is not None:
-            found.said[path] = [each for each in made.diagnostics if Path(each.source.name) == path]
+            found.containers[path] = made
+            said = [each for each in made.diagnostics if Path(each.source.name) == path]
+            found.said[path] = said if made.is_text else [replace(each, start=0, end=0) for each in said]
     for name, source in sources_by_name(within_all).items():
         if isinstance(source, Path):
             found.paths.append(source)
@@ -79,6 +85,13 @@ def gathered(paths: Iterable[Path], resource: str | None = None) -> Gathered:
             found.held[name] = source
     found.paths += [path for path in found.said if path not in found.paths]
     return found
+
+
+def narrowed(place: Place, text: str) -> tuple[int, int]:
+    """Start and end of a word in a place of a container; of all of the place if the word does not stand there."""
+    word = re.compile(rf"(?<!\w){re.escape(text)}(?!\w)") if text.strip() and "\n" not in text else None
+    found = word.search(place.document.text, place.start, place.end) if word is not None else None
+    return found.span() if found else (place.start, place.end)
 
 
 def project_with(path: Path, ends: Callable[[Path], bool]) -> Path | None:

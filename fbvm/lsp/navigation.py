@@ -155,9 +155,10 @@ def document_symbols(server: Server, params: types.DocumentSymbolParams) -> list
 
 
 def _symbol(server: Server, file: File, symbol: Symbol) -> types.DocumentSymbol:
+    name = server.range(file.source, symbol.name_start, symbol.name_end)
+    whole = name if foreign.container_of(file.name) else server.range(file.source, symbol.start, symbol.end)
     return types.DocumentSymbol(
-        symbol.name or "?", _KINDS[symbol.kind], server.range(file.source, symbol.start, symbol.end),
-        server.range(file.source, symbol.name_start, symbol.name_end), symbol.detail or None,
+        symbol.name or "?", _KINDS[symbol.kind], whole, name, symbol.detail or None,
         children=[_symbol(server, file, each) for each in symbol.children])
 
 

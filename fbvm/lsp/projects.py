@@ -15,6 +15,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import fold
 from fbvm.check.symbols.library import LibraryError
 from fbvm.interchange.formats.given import usual_dialect
+from fbvm.interchange.imported import Imported, Place
 from fbvm.lsp import foreign
 from fbvm.run.project import FILE, read_project
 from fbvm.syntax.text import read
@@ -54,6 +55,8 @@ class Project:
     held: tuple[str, ...] = ()
     """Names of sources that lie within files of other tools."""
     resource: str | None = None
+    containers: dict[Path, Imported] = field(default_factory=dict)
+    """What its containers hold."""
     file: Path | None = None
     """The project file, None without one."""
     plc: str = ""
@@ -120,6 +123,14 @@ class Projects:
         if not self.of(path):
             self.all += self._undescribed(path)
         return self.of(path)
+
+    def place_in_container(self, source: Source, offset: int) -> Place | None:
+        """Where something of a source within a container stands in the container; None if nobody knows."""
+        container = foreign.container_of(source.name)
+        made = [each.containers[container] for each in self.all if container in each.containers]
+        places = made[0].places.get(source.name, ()) if made else ()
+        line = source.place(offset)[0]
+        return places[line - 1] if line <= len(places) else None
 
     def close(self, open_paths: Iterable[Path]) -> list[Project]:
         """Forget the programs of which no file is open any more; returns these."""
@@ -195,7 +206,8 @@ class Projects:
             made = Program(dialect=dialect, program=program, resource=resource)
         paths = list(paths)
         gathered = foreign.gathered(paths, resource)
-        project = Project(made, [], [path.absolute() for path in paths[:1]], gathered.said, tuple(gathered.held), resource)
+        project = Project(made, [], [path.absolute() for path in paths[:1]], gathered.said, tuple(gathered.held), resource,
+                          gathered.containers)
         for name, text in gathered.held.items():
             made.replace(name, text)
         project.paths = [path for path in gathered.paths if self.take(project, path) or foreign.is_container(path)]

@@ -194,20 +194,26 @@ class Server(LanguageServer):
         self._tell_libraries(project)
 
     def _within(self, project: Project, container: Path) -> list[types.Diagnostic]:
-        """What is wrong with the sources within a container, at its beginning: their places are none of its own."""
+        """What is wrong with the sources within a container, where it stands in it; at its beginning if that cannot be told."""
         found = []
         for name in project.held:
             for each in project.program.diagnostics(name) if container in Path(name).parents else ():
+                made, place = self.diagnostic(each, each.source), self.projects.place_in_container(each.source, each.start)
                 line, column = each.source.place(each.start)
-                made = self.diagnostic(each, each.source)
-                made.message = f"{Path(name).relative_to(container)}:{line}:{column}: {made.message}"
-                made.range = START
+                where = place.where if place is not None else f"{Path(name).relative_to(container)}:{line}:{column}"
+                made.message = f"{where}: {made.message}"
+                made.range = self.range(each.source, each.start, each.end)
                 found.append(made)
         return found
 
     def range(self, source: Source, start: int, end: int) -> types.Range:
-        """A piece of a source; of one within a container its beginning."""
-        return START if foreign.container_of(source.name) else self.positions(source).range(start, end)
+        """A piece of a source; of one within a container where it stands in it, or the container's beginning."""
+        if foreign.container_of(source.name) is None:
+            return self.positions(source).range(start, end)
+        place = self.projects.place_in_container(source, start)
+        if place is None:
+            return START
+        return self.positions(place.document).range(*foreign.narrowed(place, source.text[start:end]))
 
     def _tell_libraries(self, project: Project) -> None:
         """Tell what is wrong with the files of libraries that a program uses."""

@@ -384,3 +384,26 @@ def test_diagnostics_stand_in_the_project_at_the_rung() -> None:
     assert isinstance(made.errors[0], Diagnostic)
     line, _ = made.errors[0].source.place(made.errors[0].start)
     assert made.errors[0].source.line(line).strip() == "R[0]:="
+
+
+def test_each_line_of_a_source_has_its_place_in_the_project() -> None:
+    made = import_project(SAMPLE.bytes(), "line3.cxt")
+    found = {line.strip(): place for file, text in made.files.items()
+             for line, place in zip(text.splitlines(), made.places.get(file, ()), strict=False)}
+
+    def at(line: str) -> tuple[str, str]:
+        place = found[line]
+        assert place is not None
+        return place.where, place.document.text[place.start:place.end]
+
+    pumping = "program NewProgram1, section Pumping"
+    assert at("OUT     Pump") == (f"{pumping}, rung 0, step 4 (OUT Pump)", "OUT Pump")
+    assert at("ANDNOT  Stop_PB  // opens the hold") == (f"{pumping}, rung 0, step 3 (ANDNOT Stop_PB)", "ANDNOT Stop_PB")
+    where, element = at("FBCALL  DOUBLE Dbl1 X:=D100 Y=>D101")
+    assert where.startswith(f"{pumping}, rung 1, step 2 (FBCALL") and "FBCALL" in element and "Dbl1" in element
+    assert at("RUNG 2") == ("program NewProgram1, section END, rung 0", "R[0]:=")
+    assert at("+(400)  X X Y") == ("function block DOUBLE, rung 0, step 4 (+(400) X X Y)", "1,2,1,0,4,5,+(400), 0,X, 0,X, 0,Y, 0")
+    assert at("Runs : UINT := 0;") == ("function block DOUBLE, symbol Runs", "0,Runs,2,,0,0,1,;")
+    assert at("Start_PB AT CIO 0.00   : BOOL;  // start button")[1] == "Start_PB,0.00,BOOL,,,start button;"
+    assert at(',D100,CHANNEL,,,,"raw level";') == ("program NewProgram1, symbol D100", ",D100,CHANNEL,,,raw level;")
+    assert at("PROGRAM NewProgram1") == ("program NewProgram1", "Program[0]:=")

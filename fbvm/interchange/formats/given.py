@@ -99,7 +99,8 @@ def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: b
 
 def _below(name: str, made: Imported) -> Imported:
     """The same with names of files that lie below the document."""
-    return replace(made, files={f"{name}/{file}": text for file, text in made.files.items()})
+    return replace(made, files={f"{name}/{file}": text for file, text in made.files.items()},
+                   find_places=lambda: {f"{name}/{file}": places for file, places in made.places.items()})
 
 
 def given_sources(paths: Sequence[Path], resource: str | None = None, memory: bool = False) -> dict[str, Path | str]:

@@ -6,10 +6,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from cx_text import SAMPLE
+from cx_text import SAMPLE, Cxt
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 from test_server import Editor, conversation
+
+from fbvm.interchange.cx.compression import compress
 
 pytestmark = pytest.mark.slow
 
@@ -58,7 +60,7 @@ def test_a_project_of_twincat_tells_of_what_it_cannot_read(twincat: Path) -> Non
     conversation(twincat, talk, "Conveyor.plcproj")
 
 
-def test_a_project_of_cx_programmer_has_diagnostics_at_its_beginning_symbols_and_hover(tmp_path: Path) -> None:
+def test_a_project_of_cx_programmer_has_diagnostics_at_their_places_symbols_and_hover(tmp_path: Path) -> None:
     async def talk(editor: Editor) -> None:
         name = "line3.cxt"
         uri = editor.at(name, 0, 0)["text_document"]
@@ -66,6 +68,11 @@ def test_a_project_of_cx_programmer_has_diagnostics_at_its_beginning_symbols_and
         assert symbols is not None and {"NewProgram1", "DOUBLE"} <= {each.name for each in symbols}
         await editor.codes(name, ["S0290"])
         lines = SAMPLE.text.splitlines()
+        unused = editor.diagnostics[uri.uri][0]
+        assert lines[unused.range.start.line] == "   Helper,,BOOL,,A,;"
+        assert unused.message.startswith("program NewProgram1, symbol Helper: ")
+        section = next(each for each in symbols if each.name == "NewProgram1")
+        assert lines[section.range.start.line].strip() == "Program[0]:="
         line = next(number for number, each in enumerate(lines) if "LD Start_PB" in each)
         for word, said in (("Start_PB", "start button"), ("LD", "Begins a block with a bit")):
             shown = await editor.text_document_hover_async(types.HoverParams(**editor.at(name, line, lines[line].index(word))))
@@ -73,3 +80,22 @@ def test_a_project_of_cx_programmer_has_diagnostics_at_its_beginning_symbols_and
 
     (tmp_path / "line3.cxt").write_bytes(SAMPLE.bytes())
     conversation(tmp_path, talk, "line3.cxt")
+
+
+def test_a_mistake_in_a_rung_is_shown_at_its_step_and_of_a_compressed_project_in_words(tmp_path: Path) -> None:
+    rungs = "LD Start_PB\nOUT 100.00", "LD Start_PB\nOUT Pmp"
+    project = Cxt(symbols=("Start_PB,0.00,BOOL,,,",), sections=(("Pumping", rungs),))
+    where = "program NewProgram1, section Pumping, rung 1, step 2 (OUT Pmp): "
+
+    async def talk(editor: Editor) -> None:
+        editor.open("line3.cxt")
+        editor.open("line4.cxp", "")
+        for name, line, column in (("line3.cxt", project.text.splitlines().index("OUT Pmp"), 4), ("line4.cxp", 0, 0)):
+            await editor.codes(name, ["S0201"])
+            told = editor.diagnostics[editor.uri(name)][0]
+            assert told.range.start == types.Position(line, column) and told.message.startswith(where)
+
+    (tmp_path / "line3.cxt").write_bytes(project.bytes())
+    (tmp_path / "line4.cxp").write_bytes(compress(project.bytes()))
+
+    conversation(tmp_path, talk)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.interchange.cx.markup import read_markup
+from fbvm.interchange.cx.read.places import places
 from fbvm.interchange.cx.read.project import Plc, Reading, read_plcs
 from fbvm.interchange.cx.read.sources import sources
 from fbvm.interchange.imported import Imported
@@ -24,8 +25,9 @@ def import_project(data: bytes, name: str, plc: str | None = None, encoding: str
         return Imported({}, [text])
     reading = Reading(text)
     found = _chosen(reading, read_plcs(text), plc)
-    files = sources(reading, found, memory) if found else {}
-    return Imported(files, sorted(reading.diagnostics, key=Diagnostic.order))
+    files, origins = sources(reading, found, memory) if found else ({}, {})
+    return Imported(files, sorted(reading.diagnostics, key=Diagnostic.order), is_text=not text.compressed,
+                    find_places=lambda: {file: places(files[file], origin, text) for file, origin in origins.items()})
 
 
 def _chosen(reading: Reading, plcs: list[Plc], name: str | None) -> Plc | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.base.digits import whole_number
-from fbvm.interchange.cx.markup import CxText, Value
+from fbvm.interchange.cx.markup import CxText, Row, Value
 from fbvm.interchange.cx.read.symbols import Symbol, symbols
 
 CYCLIC = range(256, 384)
@@ -84,6 +84,7 @@ class Program:
 class BlockVariable:
     """A row of a function block's variables."""
 
+    row: Row
     usage: str
     name: str
     type: str
@@ -169,12 +170,13 @@ def _block(wrapper: Value) -> FunctionBlock:
     return FunctionBlock(
         value, value.string("Name"), wrapper.string("FBType"), value.string("Comment"),
         value.string("Protection", "Enabled") == "1",
-        tuple(_variable([field.strip() for field in row.fields]) for row in (rows.rows if rows else ())),
+        tuple(_variable(row) for row in (rows.rows if rows else ())),
         tuple(_rung(one, ",") for one in (body.numbered("FBR") if body else ())))
 
 
-def _variable(fields: list[str]) -> BlockVariable:
+def _variable(row: Row) -> BlockVariable:
+    fields = [field.strip() for field in row.fields]
     usage, name, kind, address, count, initial, retain, comment = (*fields[:7], *[""] * (7 - len(fields)), " ".join(
         (fields[7] if len(fields) > 7 else "").split()))
-    return BlockVariable(usage, name, kind, address, whole_number(count) if count.isdecimal() else 0, initial, retain == "1",
+    return BlockVariable(row, usage, name, kind, address, whole_number(count) if count.isdecimal() else 0, initial, retain == "1",
                          comment)

@@ -14,6 +14,11 @@ _NOTE = re.compile(r"//\s*(\d{1,6})|A\s+F?(\d{1,6})")
 _WORD = re.compile(r"(?<![\w.#&+-])([@*]?)([^\W\d]\w*)")
 
 
+def is_note(line: str) -> bool:
+    """True for a line of a statement list that stands for an attached comment."""
+    return _NOTE.fullmatch(line) is not None
+
+
 class RungLines:
     """Makes the lines of rungs; `known` are the symbols that they see, by the names that rungs write."""
 

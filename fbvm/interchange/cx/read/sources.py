@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
+from fbvm.interchange.cx.markup import Row
 from fbvm.interchange.cx.read.memory import initial_values
+from fbvm.interchange.cx.read.places import Origin
 from fbvm.interchange.cx.read.project import CYCLIC, LADDER_SECTION, BlockVariable, FunctionBlock, Plc, Program, Reading
 from fbvm.interchange.cx.read.rungs import RungLines
 from fbvm.interchange.cx.read.symbols import BLOCK, Symbol, SymbolError, location, spelling
@@ -21,15 +23,17 @@ TIMER, COUNTER = "13", "14"
 _ASKS_FOR = ("EN", "ENO")
 
 
-def sources(reading: Reading, plc: Plc, memory: bool) -> dict[str, str]:
-    """Texts by the names of their files; with `memory` also the initial values of memory."""
-    return _Sources(reading, plc).texts(memory)
+def sources(reading: Reading, plc: Plc, memory: bool) -> tuple[dict[str, str], dict[str, Origin]]:
+    """Texts, and what they were made of, by the names of their files; with `memory` also the initial values of memory."""
+    made = _Sources(reading, plc)
+    return made.texts(memory), made.origins
 
 
 class _Sources:
     def __init__(self, reading: Reading, plc: Plc) -> None:
         self.reading, self.plc = reading, plc
         self.files = SourceFiles()
+        self.origins: dict[str, Origin] = {}
         self.blocks = {block.name.casefold(): block for block in plc.blocks}
         taken = {symbol.own.casefold() for symbol in plc.symbols}
         self.names: dict[int, str] = {}
@@ -48,7 +52,8 @@ class _Sources:
         """Texts by the names of their files."""
         plc = self.plc
         if lines := self._declarations(plc.symbols, "VAR_GLOBAL", "global symbols"):
-            self.files.add(GLOBALS, [f"// Symbols of {plc.name}{f', {plc.device}' if plc.device else ''}", *lines])
+            file = self.files.add(GLOBALS, [f"// Symbols of {plc.name}{f', {plc.device}' if plc.device else ''}", *lines])
+            self.origins[file] = Origin("global symbols", _rows_by_name(plc.symbols))
         if memory and (lines := initial_values(plc.memory)):
             self.files.add(MEMORY, lines)
         for block in plc.blocks:
@@ -122,7 +127,9 @@ class _Sources:
         lines += self._rows((*self.plc.symbols, *program.symbols) if is_first else program.symbols, named=False)
         if not is_first:
             lines += self._rows(self.plc.symbols, named=True)
-        self.files.add(name, [*lines, *body, "END_LADDER", "END_PROGRAM"])
+        file = self.files.add(name, [*lines, *body, "END_LADDER", "END_PROGRAM"])
+        rows = _rows_by_name((*self.plc.symbols, *program.symbols))
+        self.origins[file] = Origin(f"program {program.name}", rows, tuple(sections), (), program.value.start)
         reading.where = ""
 
     def _configuration(self) -> None:
@@ -181,7 +188,9 @@ class _Sources:
         lines = [f"// {' '.join(block.comment.split())}"] if block.comment else []
         lines.append(f"FUNCTION_BLOCK {name}")
         lines += [line for head, inner in parts.items() for line in (head, *inner, "END_VAR")]
-        self.files.add(name, [*lines, "LADDER", *rows, *body, "END_LADDER", "END_FUNCTION_BLOCK"])
+        file = self.files.add(name, [*lines, "LADDER", *rows, *body, "END_LADDER", "END_FUNCTION_BLOCK"])
+        declared = {spelling(variable.name).casefold(): variable.row for variable in block.variables}
+        self.origins[file] = Origin(f"function block {block.name}", declared, (), block.rungs, block.value.start)
         reading.where = ""
 
     def _variable(self, variable: BlockVariable, parts: dict[str, list[str]]) -> list[str]:
@@ -207,6 +216,11 @@ class _Sources:
         head = _USAGES[variable.usage] + (" RETAIN" if variable.retain and variable.usage == "0" else "")
         parts.setdefault(head, []).append(f"{spelling(variable.name)}{place} : {spec}{initial};{note}")
         return []
+
+
+def _rows_by_name(symbols: Iterable[Symbol]) -> dict[str, Row]:
+    """The rows of symbols, by the names that the sources have, in small letters; of comments of addresses, by these."""
+    return {(symbol.own or symbol.address).casefold(): symbol.row for symbol in symbols}
 
 
 class _Definitions:
