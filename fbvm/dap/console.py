@@ -9,10 +9,13 @@ from fbvm.base.types import fold
 from fbvm.dap.session import Arguments, Body, DebugSession, Refusal
 from fbvm.dap.variables import property_row, text_of, variable
 from fbvm.step.commands import COMMANDS_BY_WORD, CommandError, completed
+from fbvm.step.past_session import PastSession
+from fbvm.step.properties import PropertyValue
+from fbvm.step.session import Session
 from fbvm.watch.conditions import ConditionError, parse_expression
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.scopes import Scope
-from fbvm.watch.values import show
+from fbvm.watch.values import Value, show
 
 _WORD = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[[^\]]*\])*")
 _SILENT = re.compile(r"\(\*.*?\*\)|//.*|'[^']*'|\"[^\"]*\"")
@@ -37,7 +40,35 @@ def evaluate(debug: DebugSession, arguments: Arguments) -> Body:
             return _command(debug, plc, text)
         if arguments.get("context") == "repl" and re.search(r":=|(?<![<>])=", text):
             return _command(debug, plc, text)
+        name = text.partition("(")[0].strip()
+        if debug.plc(plc).properties.is_method(name, scope, debug.plc(plc).player.memory):
+            raise Refusal(f"{name} is a method, which may change variables: the debugger calls none; a breakpoint at it shows "
+                          "what it does") from None
         raise Refusal(str(error)) from None
+
+
+class _Names:
+    """Finds and reads the names in an expression: places, and properties, which are read when they are found."""
+
+    def __init__(self, session: Session | PastSession, scope: Scope) -> None:
+        self._session, self._scope = session, scope
+        self._properties: dict[str, PropertyValue] = {}
+
+    def find(self, text: str) -> Place | Span:
+        """The place that `text` names, of a property that of its result.  Raises UnknownPlace, and ValueError for a trap."""
+        try:
+            return self._scope.find(text)
+        except UnknownPlace:
+            made = self._session.property(text, self._scope)
+            if made is None:
+                raise
+        self._properties[made.place.name] = made
+        return made.place
+
+    def read(self, place: Place) -> Value:
+        """The value of a place that was found."""
+        made = self._properties.get(place.name)
+        return made.value if made is not None else self._session.player.read(place)
 
 
 def _value(debug: DebugSession, scope: Scope, plc: str | None, text: str, is_bare: bool) -> Body:
@@ -55,9 +86,10 @@ def _value(debug: DebugSession, scope: Scope, plc: str | None, text: str, is_bar
     if found is None and (made := session.property(text, scope)):
         row = property_row(debug, session, made, made.place.name)
         return {"result": row["value"], "type": row["type"], "variablesReference": 0, "presentationHint": row["presentationHint"]}
-    term = parse_expression(text, scope.find)
+    names = _Names(session, scope)
+    term = parse_expression(text, names.find)
     try:
-        value = term.value(session.player.read)
+        value = term.value(names.read)
     except (ArithmeticError, TypeError) as error:
         raise ConditionError(f"{text} cannot be computed: {error}") from None
     shown = show(term.type, value) if term.type else str(value).upper() if isinstance(value, bool) else str(value)
@@ -119,16 +151,31 @@ def inline_values(debug: DebugSession, arguments: Arguments) -> Body:
         text = _SILENT.sub(lambda match: " " * len(match[0]), debug.sources.line_text(name, line))
         seen: set[str] = set()
         for match in _WORD.finditer(text):
-            try:
-                found = scope.find(match[0])
-            except UnknownPlace:
-                continue
-            if isinstance(found, Place) and found.name not in seen and not _is_block(found):
-                seen.add(found.name)
+            named = _named(debug, session, scope, match[0])
+            if named is not None and named[0] not in seen:
+                seen.add(named[0])
                 rows.append({"line": debug.sources.client_line(line),
-                             "column": debug.sources.client_column(name, line, match.start() + 1), "expression": found.name,
-                             "text": f"{match[0]} = {text_of(debug, session, replace(found))}"})  # fmt: skip
+                             "column": debug.sources.client_column(name, line, match.start() + 1), "expression": named[0],
+                             "text": f"{match[0]} = {named[1]}"})  # fmt: skip
     return {"values": rows}
+
+
+def _named(debug: DebugSession, session: Session | PastSession, scope: Scope, text: str) -> tuple[str, str] | None:
+    """The whole path and the value of a variable or property; None for a block, and for all other words."""
+    try:
+        found = scope.find(text)
+    except UnknownPlace:
+        pass
+    else:
+        is_shown = isinstance(found, Place) and not _is_block(found)
+        return (found.name, text_of(debug, session, replace(found))) if isinstance(found, Place) and is_shown else None
+    try:
+        made = session.property(text, scope)
+    except ValueError:  # its accessor ends with a trap
+        return None
+    if made is None or _is_block(made.place):
+        return None
+    return made.place.name, str(property_row(debug, session, made, text)["value"])
 
 
 def _is_block(place: Place) -> bool:

@@ -27,6 +27,8 @@ class PropertyValue:
 
     place: Place
     value: Value
+    instance: str = ""
+    """Path of the instance for which a reference, a pointer or an interface stands."""
 
 
 class Properties:
@@ -63,7 +65,14 @@ class Properties:
         if trap := PythonEngine(self._image(body, owner.offset), copy).run(0):
             raise ValueError(f"{owner.name}.{name} cannot be computed: {trap}")
         place = find_place({fold(result.name): result}, {}, result.name)
-        return PropertyValue(replace(place, name=f"{owner.name}.{result.name}"), read_found(copy, place))
+        made = replace(place, name=f"{owner.name}.{result.name}")
+        return PropertyValue(made, read_found(copy, place), self._instance(place, copy))
+
+    def is_method(self, text: str, scope: Scope, memory: Memory) -> bool:
+        """Whether `text` names a method of an instance."""
+        owner, name = self._owner(text, scope, memory), text.rpartition(".")[2].strip()
+        return owner is not None and isinstance(owner.type, StructType) and \
+            fold(pou_of_member(owner.type, f".{name}", self._bodies)) in self._bodies
 
     def _owner(self, text: str, scope: Scope, memory: Memory) -> Place | None:
         """The instance whose property `text` names; of an interface or a reference the instance that it stands for."""
@@ -73,14 +82,18 @@ class Properties:
         try:
             found = scope.find(path)
         except UnknownPlace:
-            return None
-        if not isinstance(found, Place):
-            return None
+            made = self.read(path.rstrip("^ "), scope, memory)
+            instance = made.instance if made is not None else ""
+        else:
+            instance = self._instance(found, memory) if isinstance(found, Place) else ""
+        return find_place(self._facts.symbols, self._facts.areas, instance) if instance else None
+
+    def _instance(self, found: Place, memory: Memory) -> str:
+        """The path of the instance at a place, or of that for which it stands; "" if there is none."""
         if isinstance(found.type, RefType):
             found = replace(found, hops=(*found.hops, 0))
         direct = dereferenced(memory, found)
-        instance = self._facts.names.instance(direct.offset) if direct is not None else ""
-        return find_place(self._facts.symbols, self._facts.areas, instance) if instance else None
+        return self._facts.names.instance(direct.offset) if direct is not None else ""
 
     def _image(self, body: int, offset: int) -> Image:
         """A program whose only task executes one body for one instance."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dap_client import Client
+import pytest
+from dap_client import Client, RefusedError
 
 TEXT = """\
 FUNCTION_BLOCK Motor
@@ -52,3 +53,26 @@ def test_properties_are_rows_whose_accessors_run_when_they_are_opened(tmp_path: 
     assert client.rows(row["variablesReference"])["Twice"]["value"] == "6"
     assert client.ask("evaluate", expression="Main.slow.Twice", context="watch")["result"] == "6"
     assert [each["label"] for each in client.ask("completions", text="Main.slow.T", column=12)["targets"]] == ["Main.slow.Twice"]
+
+
+def test_properties_stand_in_expressions_behind_references_and_beside_lines_and_methods_are_not_called(tmp_path: Path) -> None:
+    file = tmp_path / "motors.st"
+    accessors = ("PROPERTY Twice : INT\nGET Twice := 2 * Speed; END_GET\nEND_PROPERTY\n"
+                 "PROPERTY Self : REFERENCE TO Motor\nGET Self REF= THIS^; END_GET\nEND_PROPERTY\n"
+                 "PROPERTY Share : INT\nGET Share := 100 / Speed; END_GET\nEND_PROPERTY")
+    text = TEXT.replace("END_METHOD", f"END_METHOD\n{accessors}")
+    file.write_text(text.replace("END_PROGRAM", "ok := slow.Twice > 5;\nok := fast.Share > 5;\nEND_PROGRAM"), encoding="utf-8")
+    line = text.count("\n")
+    client = Client()
+    client.begin({"setBreakpoints": {"source": {"path": str(file)}, "breakpoints": [{"line": line - 1}]}},
+                 program=str(file), dialect="codesys")  # fmt: skip
+    frame = client.frames[0]["id"]
+    wanted = {"slow.Twice > 5": "TRUE", "2 * slow.Twice + Main.fast.Twice": "12", "slow.Self.Twice": "6",
+              "slow.Self^.Self.Twice = 6": "TRUE"}  # fmt: skip
+    assert {each: client.ask("evaluate", expression=each, frameId=frame)["result"] for each in wanted} == wanted
+    for expression, said in (("slow.Start(Wanted := 2)", "slow.Start is a method, which may change"),
+                             ("slow.Begin(1)", "no Begin"), ("fast.Share + 1", "fast.Share cannot be computed")):  # fmt: skip
+        with pytest.raises(RefusedError, match=said):
+            client.ask("evaluate", expression=expression, frameId=frame)
+    rows = client.ask("fbvm/inlineValues", source={"path": str(file)}, startLine=line, endLine=line + 1, frameId=frame)["values"]
+    assert [(row["line"] - line, row["text"]) for row in rows] == [(0, "ok = FALSE"), (0, "slow.Twice = 6"), (1, "ok = FALSE")]
