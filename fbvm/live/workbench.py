@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fbvm.engine.trap import Trap
 from fbvm.live.changes import SourceChanges
 from fbvm.live.groups import WatchGroups
 from fbvm.live.lesson import LiveLesson
@@ -256,12 +257,15 @@ class Workbench:
         }  # fmt: skip
         names[action](**fields)
 
-    def note_restart(self, old: Workbench, kept: Mapping[str, Sequence[Place]]) -> None:
-        """Notes what the PLCs of this workbench have kept of those before them, as values that were written."""
+    def note_restart(self, old: Workbench, kept: Mapping[str, Sequence[Place]], ended: Mapping[str, Trap | None]) -> None:
+        """Notes what the PLCs of this workbench have kept of those before them, as values that were written, and the traps that
+        ended FB_exit of these."""
         files = ", ".join(old.changes.state["files"]) if old.changes and old.changes.state else ""
         for name, places in kept.items():
             live = self.plcs[name]
             self._note(live, "restart", f"restart with the changed {files}; {len(places)} retained variables kept their values")
+            if (trap := ended.get(name)) is not None:
+                self._note(live, "restart", f"FB_exit of the program before ended with {trap}")
             for place in places:
                 self.acts.append(Act(live.name, 0, 0, "keep", f"{place.name} kept", place.name, live.plc.read(place)))
 

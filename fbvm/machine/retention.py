@@ -14,6 +14,8 @@ from fbvm.watch.paths import Place, UnknownPlace, element, find, member
 def start_with_retained(new: Plc, old: Plc) -> list[Place]:
     """Power off and on with another program: starts `new` with what a warm start of `old` would have kept.
 
+    Whoever loads a program tells the instances of `old` before, see `endings.end_instances`.
+
     A RETAIN variable keeps its value if both programs have one of that name and its value fits; of structures and arrays that
     goes for each part.  Retained areas are kept as they are.  Returns the single variables that were kept."""
     for name, area in new.memory.areas.items():
@@ -23,7 +25,7 @@ def start_with_retained(new: Plc, old: Plc) -> list[Place]:
             new.memory.u8[area.offset : area.offset + size] = old.memory.u8[was.offset : was.offset + size]
     kept = [place for row in new.image.retained for place in _carried(old, new, row.name)]
     new.warm_start()
-    return kept
+    return [place for place in kept if not place.name.startswith("__")]
 
 
 def _carried(old: Plc, new: Plc, name: str) -> Iterator[Place]:

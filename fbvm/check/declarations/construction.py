@@ -1,17 +1,23 @@
-"""Construction of instances: the calls of FB_init with the arguments of declarations, then of methods with 'call_after_init'.
+"""Construction of instances: the calls of FB_init with the arguments of declarations, then of methods with 'call_after_init';
+and the calls of FB_exit, which end them.
 
 Each block with something to construct gets a hidden method for itself, not for what it extends: it constructs the variables
 that the block declares, in their order, and calls the block's own FB_init.  A declaration of an instance calls these methods
 for all that its type extends, the base first.  Instances that live as long as the program are constructed in front of the first
 cycle of the first task; those of a method or function, and VAR_TEMP, each time its body begins.
 
+FB_exit is called in the opposite order, the derived block first, by a body of its own that the program never calls: whoever puts
+another program in place of this one executes it (machine.retention).  Instances of methods and functions, and those of a PLC
+whose power goes off, just end.  Nobody changes a program while it runs: FB_reinit is never called.
+
 Source: Beckhoff Information System and CODESYS online help, Methods FB_init, FB_reinit and FB_exit; attribute call_after_init."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.hidden import ENDING
 from fbvm.base.types import BOOL, ArrayType, StructType, Type, fold
 from fbvm.check.symbols.config_facts import Run
 from fbvm.check.symbols.context import Context
@@ -20,12 +26,15 @@ from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import attributes_before
 from fbvm.syntax.tree.node import changed
 
-INIT, AFTER = "FB_init", "call_after_init"
-"""The phases of construction: the method of that name, the methods with that attribute."""
+INIT, AFTER, EXIT = "FB_init", "call_after_init", "FB_exit"
+"""The phases: the method of that name, the methods with that attribute."""
 PHASES = (INIT, AFTER)
 INIT_KEY = fold(INIT)
-_FLAGS = 2
-"""FB_init begins with bInitRetains and bInCopyCode, which the runtime system gives."""
+FLAGS = {INIT: ("bInitRetains", "bInCopyCode"), EXIT: ("bInCopyCode",)}
+"""The inputs with which methods begin that the runtime system calls, and which it gives."""
+_FLAGS = len(FLAGS[INIT])
+_KEPT, _DONE = "retained values are kept", "__FB_init_done"
+"""Hidden variables: TRUE while FB_init is called at a start that keeps RETAIN variables; TRUE and kept behind the first start."""
 
 
 def arguments(spec: tree.TypeSpec) -> tuple[tree.Argument, ...]:
@@ -46,7 +55,7 @@ def constructs(context: Context, kind: Type, phase: str = "") -> bool:
         return constructs(context, kind.element, phase)
     if isinstance(kind, StructType) and kind.block:
         return any(_has_own(context, level, each) for level in context.block_of(kind).lineage()
-                   for each in ([phase] if phase else PHASES))
+                   for each in ([phase] if phase else (*PHASES, EXIT)))
     return isinstance(kind, StructType) and any(constructs(context, field.type, phase) for field in kind.fields.values())
 
 
@@ -61,8 +70,8 @@ def _has_own(context: Context, level: Pou, phase: str) -> bool:
 
 def _called(level: Pou, phase: str) -> list[Pou]:
     """The methods of a block itself that a phase calls."""
-    if phase == INIT:
-        return [level.methods[INIT_KEY]] if INIT_KEY in level.methods else []
+    if phase != AFTER:
+        return [level.methods[fold(phase)]] if fold(phase) in level.methods else []
     if AFTER not in attributes_before(level.source.text, level.tree.start):
         return []
     return [method for key, method in level.methods.items() if AFTER in attributes_before(method.source.text, method.tree.start)
@@ -134,7 +143,8 @@ class Statements:
         yield from body
 
     def _instance(self, place: tree.Expr, block: Pou, given: tuple[tree.Argument, ...], phase: str) -> Iterator[tree.Statement]:
-        levels = [level for level in [*block.lineage()][::-1] if _has_own(self.context, level, phase)]
+        lineage = [*block.lineage()]
+        levels = [level for level in (lineage if phase == EXIT else lineage[::-1]) if _has_own(self.context, level, phase)]
         nearest = next((level.methods[INIT_KEY] for level in block.lineage() if INIT_KEY in level.methods), None)
         named = self._named(place, given, nearest) if phase == INIT else {}
         for level in levels:
@@ -224,7 +234,7 @@ def level_method(context: Context, level: Pou, phase: str) -> Pou:
     body: list[tree.Statement] = []
     at = level.tree.name.start, level.tree.name.end
     kept: dict[str, dict[str, Variable]] = {}
-    for variable in _declared(level):
+    for variable in _declared(level)[::-1 if phase == EXIT else 1]:
         method_name, _, own = variable.name.partition(".")
         if own:
             kept.setdefault(method_name, {})[own] = variable
@@ -233,18 +243,37 @@ def level_method(context: Context, level: Pou, phase: str) -> Pou:
     for method_name, variables in kept.items():
         body += _of_kept(context, level, method_name, variables, phase)
     inputs: tuple[tree.VarSection, ...] = ()
+    calls: list[tree.Statement] = []
     for method in _called(level, phase):
         passed: list[tree.Argument] = []
         callee: tree.Expr = tree.NameRef(*at, method.tree.name.text)
-        if phase == INIT:
-            inputs, passed = _parameters(context, method, at)
-        else:
+        if phase == AFTER:
             callee = tree.Member(*at, tree.Deref(*at, tree.NameRef(*at, "THIS")), tree.Name(*at, method.tree.name.text))
-        body.append(tree.CallStatement(*at, tree.Call(*at, callee, tuple(passed))))
+        else:
+            inputs, passed = _parameters(context, method, phase, at)
+        calls.append(tree.CallStatement(*at, tree.Call(*at, callee, tuple(passed))))
+    body = [*calls, *body] if phase == EXIT else [*body, *calls]
     written = tree.Pou(*at, "METHOD", tree.Name(*at, name), None, (*inputs, *made_of.sections()), tuple(body))
     made = Pou(f"{level.name}.{phase}", "METHOD", level.source, written, as_written=False, block=level,
                modifiers=frozenset({"FINAL"}))
+    if phase == INIT and calls:
+        made.variables[fold(_KEPT)] = _kept_values(context)
     return _added(context, level, made)
+
+
+def _kept_values(context: Context) -> Variable:
+    """The variable that says whether FB_init is called at a start that keeps RETAIN variables."""
+    if context.kept_values is None:
+        context.kept_values = _flag(_KEPT)
+        context.global_order.append(context.kept_values)
+    return context.kept_values
+
+
+def _flag(name: str, retain: bool = False) -> Variable:
+    """A hidden global variable of type BOOL."""
+    source = Source(INIT, "{attribute 'hide'}\n" + name)
+    node = tree.Name(source.text.index(name), len(source.text), name)
+    return Variable(name, BOOL, "VAR_GLOBAL", source, node, place="abs", initial=b"\0", retain=retain)
 
 
 def _of_kept(context: Context, level: Pou, method_name: str, variables: dict[str, Variable],
@@ -271,16 +300,20 @@ def _added(context: Context, level: Pou, made: Pou) -> Pou:
     return made
 
 
-def _parameters(context: Context, init: Pou, at: tuple[int, int]) -> tuple[tuple[tree.VarSection, ...], list[tree.Argument]]:
-    """Inputs for the arguments of FB_init, and the arguments of its call."""
-    declared = [(name, each, section) for section in init.tree.sections if section.kind == "VAR_INPUT"
+def _parameters(context: Context, method: Pou, phase: str,
+                at: tuple[int, int]) -> tuple[tuple[tree.VarSection, ...], list[tree.Argument]]:
+    """Inputs for the arguments of FB_init, and the arguments of its call; those of the call of FB_exit."""
+    declared = [(name, each, section) for section in method.tree.sections if section.kind == "VAR_INPUT"
                 for each in section.variables for name in each.names]
-    if len(declared) < _FLAGS:
-        context.report.add("S1011", init.source, init.tree.name, "FB_init begins with two inputs",
-                           "write VAR_INPUT bInitRetains, bInCopyCode : BOOL; END_VAR")
-    flags = [tree.Argument(*at, ":=", name, tree.Literal(*at, "bool", number == 0, None, "TRUE" if number == 0 else "FALSE"))
-             for number, (name, _, _) in enumerate(declared[:_FLAGS])]
-    given = declared[_FLAGS:]
+    wanted = FLAGS[phase]
+    if len(declared) < len(wanted) or phase == EXIT and len(declared) > len(wanted):
+        how = "begins with two inputs" if phase == INIT else "has one input"
+        context.report.add("S1011", method.source, method.tree.name, f"{phase} {how}",
+                           f"write VAR_INPUT {', '.join(wanted)} : BOOL; END_VAR")
+    values = {"bInitRetains": tree.Unary(*at, "NOT", tree.NameRef(*at, _KEPT)),
+              "bInCopyCode": _bool(at, False)}
+    flags = [tree.Argument(*at, ":=", name, values[flag]) for flag, (name, _, _) in zip(wanted, declared, strict=False)]
+    given = declared[len(wanted):] if phase == INIT else []
     variables = tuple(changed(each, names=(name,)) for name, each, _ in given)
     passed = [tree.Argument(*at, ":=", name, tree.NameRef(*at, name.text)) for name, _, _ in given]
     return ((tree.VarSection(*at, "VAR_INPUT", (), variables),) if variables else ()), flags + passed
@@ -301,32 +334,70 @@ def with_construction(context: Context, pou: Pou) -> tree.Pou:
 
 
 def construct_at_start(context: Context) -> None:
-    """Let the task that runs first construct all instances that live as long as the program, where there is something to do."""
-    variables = [each for each in context.global_order if constructs(context, each.type)]
-    if not variables or not context.tasks:
+    """Let the task that runs first construct all instances that live as long as the program, where there is something to do, and
+    make the body that ends them."""
+    if not context.tasks:
         return
-    sources = list(dict.fromkeys(each.source for each in _in_order(variables)))
-    made = [_of_source(context, number, [each for each in variables if each.source is source], phase)
-            for phase in PHASES for number, source in enumerate(sources)]
     source = Source(INIT, "{attribute 'hide'}\nFB_init of all instances")
     at = source.text.index("\n") + 1, len(source.text)
-    done = Variable("FB_init is over", BOOL, "VAR_GLOBAL", source, tree.Name(*at, "FB_init"), place="abs", initial=b"\0")
-    context.global_order.append(done)
-    over = tree.NameRef(*at, done.name)
-    calls = [tree.CallStatement(*at, tree.Call(*at, tree.NameRef(*at, each.name), ())) for each in made]
-    statement = tree.If(*at, ((tree.Unary(*at, "NOT", over), (
-        tree.Assign(*at, (over,), ":=", tree.Literal(*at, "bool", True, None, "TRUE")), *calls)),), None)
-    names = {("", fold(each.name)): each for each in made}
-    context.project.pous |= names
-    for task in context.tasks:
-        pou = Pou(INIT, "PROGRAM", source, tree.Pou(*at, "PROGRAM", tree.Name(*at, INIT), None, (), (statement,)),
-                  as_written=False)
-        pou.variables[fold(done.name)] = done
-        context.check_body(pou)
+    if ending := _of_sources(context, (EXIT,)):
+        _check(context, ending, [_hidden("FUNCTION", ENDING, source, at, _calls(at, ending))])
+    if not (made := _of_sources(context, PHASES)):
+        return
+    over = _flag("FB_init is over")
+    flags, begins, ends = [over], [_set(at, over.name, _bool(at, True))], []
+    if context.kept_values is not None:
+        done = context.project.globals["", fold(_DONE)] = _flag(_DONE, retain=True)
+        flags += [context.kept_values, done]
+        begins.append(_set(at, _KEPT, tree.NameRef(*at, _DONE)))
+        ends = [_set(at, _KEPT, _bool(at, False)), _set(at, _DONE, _bool(at, True))]
+        context.global_order.append(done)
+    context.global_order.append(over)
+    statement = tree.If(*at, ((tree.Unary(*at, "NOT", tree.NameRef(*at, over.name)), (*begins, *_calls(at, made), *ends)),), None)
+    begun = [_hidden("PROGRAM", INIT, source, at, [statement]) for _ in context.tasks]
+    for pou, task in zip(begun, context.tasks, strict=True):
+        pou.variables.update({fold(flag.name): flag for flag in flags})
         task.runs.insert(0, Run(task.runs[0].instance, pou))
+    _check(context, made, begun)
+
+
+def _of_sources(context: Context, phases: tuple[str, ...]) -> list[Pou]:
+    """The functions that do some phases for all instances that live as long as the program."""
+    made = []
+    for phase in phases:
+        variables = _in_order([each for each in context.global_order if constructs(context, each.type, phase)])
+        sources = list(dict.fromkeys(each.source for each in variables))
+        made += [_of_source(context, number, [each for each in variables if each.source is source], phase)
+                 for number, source in enumerate(sources)]
+    return made[::-1] if phases == (EXIT,) else made
+
+
+def _check(context: Context, called: list[Pou], callers: list[Pou]) -> None:
+    """Check bodies that call hidden functions, and these; afterwards no name means them."""
+    names = {("", fold(each.name)): each for each in called}
+    context.project.pous |= names
+    for pou in callers:
+        context.check_body(pou)
     for key, each in names.items():
         context.check_body(each)
         del context.project.pous[key]
+
+
+def _hidden(kind: str, name: str, source: Source, at: tuple[int, int], body: Iterable[tree.Statement]) -> Pou:
+    return Pou(name, kind, source, tree.Pou(*at, kind, tree.Name(*at, name), None, (), tuple(body)), as_written=False)
+
+
+def _calls(at: tuple[int, int], called: list[Pou]) -> Iterator[tree.Statement]:
+    for each in called:
+        yield tree.CallStatement(*at, tree.Call(*at, tree.NameRef(*at, each.name), ()))
+
+
+def _set(at: tuple[int, int], name: str, value: tree.Expr) -> tree.Statement:
+    return tree.Assign(*at, (tree.NameRef(*at, name),), ":=", value)
+
+
+def _bool(at: tuple[int, int], value: bool) -> tree.Literal:
+    return tree.Literal(*at, "bool", value, None, "TRUE" if value else "FALSE")
 
 
 def _in_order(variables: list[Variable]) -> list[Variable]:
@@ -342,7 +413,7 @@ def _of_source(context: Context, number_of_source: int, variables: list[Variable
     at = variables[0].node.start, variables[0].node.end
     body: list[tree.Statement] = []
     aliases: dict[str, Variable] = {}
-    for number, variable in enumerate(_in_order(variables)):
+    for number, variable in enumerate(variables[::-1] if phase == EXIT else variables):
         name = f"{variable.name} {number}"
         aliases[fold(name)] = variable
         body += made_of.of(variable, name, phase)

@@ -97,8 +97,8 @@ def refuse_abstract(context: Context, kind: Type, source: Source, node: tree.Nod
 def check_members(context: Context, pou: Pou) -> None:
     """Check the methods of a POU against those that it inherits and implements."""
     for key, method in pou.methods.items():
-        if key == "FB_INIT":
-            continue  # it is never called by way of its base
+        if key in ("FB_INIT", "FB_EXIT"):
+            continue  # they are never called by way of their bases
         parents = [found for parent in (pou.base, *pou.interfaces) if parent and (found := parent.method(key)) is not None]
         for parent in parents:
             _check_override(context, pou, method, parent)

@@ -132,7 +132,7 @@ def _is_program(scope: Scope, name: tree.NameRef) -> bool:
 
 def is_dynamic(scope: Scope, method: Pou, instance: tree.Expr | None) -> bool:
     """True if a call may execute an override: the instance is not named itself, but reached through something."""
-    if method.modifiers & {"PRIVATE", "FINAL"} or method.key == "FB_INIT":
+    if method.modifiers & {"PRIVATE", "FINAL"} or method.key in ("FB_INIT", "FB_EXIT"):
         return False
     return may_be_derived(scope, instance)
 

@@ -77,6 +77,8 @@ class Context:
         """Recorded dependencies of bodies of libraries whose check can be replaced by repeating them."""
         self.constructing: dict[tuple[Pou, str], bool] = {}
         """Of blocks that are resolved, whether they have something to construct in a phase (see declarations.construction)."""
+        self.kept_values: Variable | None = None
+        """Of a program with FB_init the hidden variable that says whether a start keeps RETAIN variables."""
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}
         self._identifiers = 0

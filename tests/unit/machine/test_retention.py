@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fbvm import Plc, compile_text
+from fbvm.machine.endings import end_instances
 from fbvm.machine.retention import start_with_retained
 
 
@@ -43,6 +44,56 @@ def test_what_is_not_retained_or_does_not_fit_begins_anew() -> None:
     start_with_retained(new, old)
     assert new.read("Main.lost") == 70
     assert new.read("Main.kind") == 1.5 and new.read("Main.name") == "new"
+
+
+ENDED = """VAR_GLOBAL RETAIN log : STRING(200); END_VAR
+FUNCTION Note VAR_INPUT t : STRING(20); END_VAR log := CONCAT(CONCAT(log, t), ' '); END_FUNCTION
+FUNCTION_BLOCK Inner VAR me : STRING(10); END_VAR
+METHOD FB_init : BOOL VAR_INPUT bInitRetains, bInCopyCode : BOOL; name : STRING(10); END_VAR
+me := name; Note(CONCAT(SEL(bInitRetains, '-', '+'), me)); END_METHOD
+METHOD FB_exit : BOOL VAR_INPUT bInCopyCode : BOOL; END_VAR Note(CONCAT(SEL(bInCopyCode, 'x', 'X'), me)); END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Base VAR i : Inner('i'); j : Inner('j'); END_VAR
+METHOD FB_exit : BOOL VAR_INPUT bInCopyCode : BOOL; END_VAR Note('base'); END_METHOD END_FUNCTION_BLOCK
+FUNCTION_BLOCK Derived EXTENDS Base
+METHOD FB_exit : BOOL VAR_INPUT bInCopyCode : BOOL; END_VAR Note('derived'); END_METHOD END_FUNCTION_BLOCK
+VAR_GLOBAL g : Inner('g'); END_VAR
+PROGRAM Main VAR d : Derived; a : ARRAY[1..2] OF Inner('a'); END_VAR END_PROGRAM"""
+
+
+def objects(text: str) -> Plc:
+    image = compile_text(text, dialect="codesys").image
+    assert image is not None
+    return Plc(image)
+
+
+def test_fb_exit_ends_instances_in_the_opposite_order_of_fb_init() -> None:
+    old, new = objects(ENDED), objects(ENDED)
+    old.scan()
+    assert end_instances(old) is None
+    assert {place.name for place in start_with_retained(new, old)} == {"log"}
+    new.scan()
+    assert str(new.read("log")).split() == [
+        *["+g", "+i", "+j", "+a", "+a"], *["xa", "xa", "derived", "base", "xj", "xi", "xg"], *["-g", "-i", "-j", "-a", "-a"]]
+
+
+def test_fb_init_is_told_whether_retained_values_are_kept() -> None:
+    one = objects(ENDED)
+    one.scan()
+    one.warm_start()
+    one.scan()
+    assert str(one.read("log")).split() == [*["+g", "+i", "+j", "+a", "+a"], *["-g", "-i", "-j", "-a", "-a"]]
+    one.cold_start()
+    one.scan()
+    assert str(one.read("log")).split() == ["+g", "+i", "+j", "+a", "+a"]
+
+
+def test_a_trap_in_fb_exit_is_told() -> None:
+    one = objects("FUNCTION_BLOCK F VAR n : INT; END_VAR METHOD FB_exit : BOOL VAR_INPUT bInCopyCode : BOOL; END_VAR "
+                  "n := 1 / n; END_METHOD END_FUNCTION_BLOCK PROGRAM Main VAR f : F; END_VAR END_PROGRAM")
+    one.scan()
+    trap = end_instances(one)
+    assert trap is not None and trap.code == "R0101"
 
 
 def test_retained_areas_are_kept_and_others_are_not() -> None:

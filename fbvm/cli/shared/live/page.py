@@ -20,6 +20,7 @@ from fbvm.cli.shared.options import address
 from fbvm.cli.shared.run_recording import RunRecording, record_run
 from fbvm.cli.shared.terminal import say
 from fbvm.live.lesson import LiveLesson
+from fbvm.machine.endings import end_instances
 from fbvm.machine.retention import start_with_retained
 from fbvm.record.recording.file_writer import Described
 from fbvm.record.trace.writer import source_lines
@@ -165,12 +166,13 @@ class _Page:
         """Begins the changed program, with what is retained; a new segment of the recording begins with it."""
         old, before = self.host.workbench, self.built
         self._build_again(before)
+        ended = {name: end_instances(seen.plc) for name, seen in before.plcs.items()}
         kept = {name: start_with_retained(seen.plc, before.plcs[name].plc)
                 for name, seen in self.built.plcs.items() if name in before.plcs}  # fmt: skip
         bench = self._workbench()
         bench.can_branch = False  # the past began with what the program before had left
         self._has_past = False
-        bench.note_restart(old, kept)
+        bench.note_restart(old, kept, ended)
         self._control.has_ended = False
         self.host.show(bench)
 
