@@ -57,6 +57,11 @@ class NamedValues:
             self._forces.pop(find_place(self.image.symbols, self.memory.areas, where), None)
 
     @property
+    def is_forced(self) -> bool:
+        """True if something is forced."""
+        return bool(self._forces)
+
+    @property
     def forces(self) -> dict[str, Value]:
         """What is forced, by name."""
         return {place.name: value for place, value in self._forces.items()}

@@ -6,6 +6,7 @@ from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 from fbvm.base.areas import PAGE_BYTES
@@ -17,34 +18,39 @@ from fbvm.watch.values import Value
 from fbvm.wire.link import Event, Received
 from fbvm.wire.tap import TapEvent
 
-Writes = list[tuple[int, bytes]]
+Write = tuple[int, bytes]
 """Bytes that were written: the offset in the flat memory, and the new bytes."""
 SMALL_BYTES = 200
 """About what a keyframe, or the inputs of one scan, take beside pages and data."""
 
 
-@dataclass
+_NOTHING: Mapping[Any, Any] = MappingProxyType({})
+
+
+@dataclass(slots=True)
 class ScanInputs:
-    """What came from outside in one scan, beside its time; a scan without any has none of these."""
+    """What came from outside in one scan, beside its time; a scan without any has none of these.
+
+    A recording has thousands of them: what is rare shares one empty value."""
 
     scan: int
-    writes: Writes = field(default_factory=list)
+    writes: Sequence[Write] = ()
     """What was written into the memory before the scan."""
     forces: Mapping[str, Value] | None = None
     """What is forced from this scan on; None if that is what was forced before."""
     budget: int | None = None
     """How many statements a scan may execute from this one on; None for as many as before."""
-    settings: dict[int, dict[str, Any]] = field(default_factory=dict)
+    settings: Mapping[int, dict[str, Any]] = field(default_factory=lambda: _NOTHING)
     """How units are set from this scan on, by their numbers."""
     events: dict[int, list[Event]] = field(default_factory=dict)
     """What the network told units in the I/O refresh, by their numbers."""
-    results: Writes = field(default_factory=list)
+    results: Sequence[Write] = ()
     """What Python functions in place of blocks left in their instances, in the order of their calls."""
     traffic: list[tuple[int, str, TapEvent]] = field(default_factory=list)
     """What passed the networks at the units of this PLC: time, address of the unit, event."""
     watch: tuple[int, int] | None = None
     """Of a scan that took longer than the watch cycle time: the steps that it had charged, and that time in ns."""
-    refreshed: Writes = field(default_factory=list)
+    refreshed: Sequence[Write] = ()
     """What the I/O refresh changed, if the units of this PLC cannot be run again."""
 
     @property
@@ -57,9 +63,8 @@ class ScanInputs:
     def size_bytes(self) -> int:
         """About how many bytes of memory this takes."""
         parts, data = 1 + len(self.traffic), 0
-        for rows in (self.writes, self.results, self.refreshed):
-            for _, written in rows:
-                data += len(written)
+        if self.writes or self.results or self.refreshed:
+            data += sum(len(written) for rows in (self.writes, self.results, self.refreshed) for _, written in rows)
         for told in self.events.values():
             parts += len(told)
             for event in told:

@@ -88,8 +88,10 @@ class PlcWriter:
         """Up to which scan, and how many inputs, the last chunk is written."""
         self._bytes = 0
         """Of the inputs that are written."""
-        self._memory: Callable[[], bytes] = bytes
+        self.memory: Callable[[], bytes] = bytes
         """Gives the memory behind the last scan."""
+        self.wants_each_scan = writer.verify
+        """True if `ended` is to be called behind scans without inputs, too."""
         self._settled: int | None = None
         """Its fingerprint, if that memory is not had any more."""
         self._memories: list[int] = []
@@ -128,13 +130,14 @@ class PlcWriter:
     def settle(self) -> None:
         """Called before the memory that was told last is overwritten."""
         if self._settled is None:
-            self._settled = fingerprint(self._memory())
+            self._settled = fingerprint(self.memory())
+            self.wants_each_scan = True
 
-    def ended(self, memory: Callable[[], bytes]) -> None:
-        """Called behind scans; `memory` gives the memory behind the last of them.  Inputs that take much room are written."""
-        self._memory, self._settled = memory, None
+    def ended(self) -> None:
+        """Called behind scans.  Inputs that take much room are written."""
+        self._settled, self.wants_each_scan = None, self._writer.verify
         if self._writer.verify:
-            self._memories.append(fingerprint(memory()))
+            self._memories.append(fingerprint(self.memory()))
         if self._chunk and self._chunk.inputs_bytes - self._bytes > PIECE_BYTES:
             self.flush()
 
@@ -145,7 +148,7 @@ class PlcWriter:
             return
         if len(self._memories) != scans:
             self._memories.clear()  # not asked for, or scans were broken off
-        settled = fingerprint(self._memory()) if self._settled is None else self._settled
+        settled = fingerprint(self.memory()) if self._settled is None else self._settled
         payload = encode_scans(chunk.times.rows(first), chunk.inputs[self._inputs :], chunk.machine,
                                settled, self._memories)  # fmt: skip
         self._writer.put(SCANS, payload, self._number, first, scans)

@@ -112,6 +112,7 @@ class PlcRecording(RecordedPlc):
         """True between `before` and `after`."""
         self._has_changed = True
         """True if the state was changed by something that is no input."""
+        self._system = plc.memory.views["i64"]
         self._known = bytes(plc.memory.size)
         """The memory at the end of the last scan, unless that `is_uncopied`."""
         self._is_alone = self._is_uncopied = False
@@ -128,6 +129,8 @@ class PlcRecording(RecordedPlc):
         """Those that are tapped, for the units with these addresses."""
         self._addresses: set[str] = set()
         self.wants_plain_scans = False
+        if written:
+            written.memory = self._memory
         plc.record_inputs(self)
 
     def close(self) -> None:
@@ -189,7 +192,11 @@ class PlcRecording(RecordedPlc):
 
         def recorded(base: int) -> None:
             function(base)
-            self._pending.results.append((base, memory.map[base : base + size]))
+            result, results = (base, memory.map[base : base + size]), self._pending.results
+            if isinstance(results, list):
+                results.append(result)
+            else:
+                self._pending.results = [result]
 
         python_of(plc.engine).substitute(body, recorded)
         self._substituted.append(body)
@@ -208,16 +215,16 @@ class PlcRecording(RecordedPlc):
         if not self._is_uncopied and (memory := plc.memory.map[:]) != self._known:
             if self._written:
                 self._written.settle()
-            pending.writes += changes(self._known, memory)
+            pending.writes = [*pending.writes, *changes(self._known, memory)]
             self._known = memory
         if plc.budget != self._budget:
             pending.budget = self._budget = plc.budget
-        if (forces := plc.forces) != self._forces:
+        if (plc.is_forced or self._forces) and (forces := plc.forces) != self._forces:
             pending.forces = self._forces = forces
         for number, unit in enumerate(self._units):
             if unit.times_set != self._times_set[number]:
                 self._times_set[number] = unit.times_set
-                pending.settings[number] = unit.settings
+                pending.settings = {**pending.settings, number: unit.settings}
 
     def received(self, unit: int, events: Sequence[Event]) -> None:
         """Records events of the network for a unit."""
@@ -231,30 +238,32 @@ class PlcRecording(RecordedPlc):
     def refresh_ended(self) -> None:
         """Records what a refresh changed that cannot be done again."""
         if self.wants_plain_scans:
-            self._pending.refreshed += changes(self._before_refresh, self._plc.memory.map[:])
+            self._pending.refreshed = [*self._pending.refreshed, *changes(self._before_refresh, self._plc.memory.map[:])]
 
     def after(self, scans: int, now_ns: int, step_ns: int = 0) -> None:
         """Records the times of some scans, and with the last of them what was told since `before`."""
         self._has_begun = False
         if not scans:
             return
-        plc, chunk, pending = self._plc, self._chunks[-1], self._pending
-        pending.watch = plc.watch_cycle.ended(plc.trap, plc.budget)
+        plc, chunk, pending, written = self._plc, self._chunks[-1], self._pending, self._written
+        if plc.trap:
+            pending.watch = plc.watch_cycle.ended(plc.trap, plc.budget)
         chunk.times.add(now_ns, scans, step_ns)
-        if not pending.is_empty:
-            self._put(chunk, pending, scans)
-            self._pending = ScanInputs(plc.scans)
         self._is_uncopied = self._is_alone
         if not self._is_alone:
             self._known = plc.memory.map[:]
-        statements = plc.budget - plc.memory.views["i64"][BUDGET // 8]
         machine = plc.engine.machine is not None
-        chunk.machine = chunk.machine or machine
-        self._cost_ns += CALL_NS + scans * (SCAN_NS + STATEMENT_NS[machine] * statements)
-        if chunk.inputs_bytes > MOST_INPUT_BYTES:
-            self._cost_ns = AGAIN_NS + 1
-        if self._written:
-            self._written.ended(self._memory)
+        if machine:
+            chunk.machine = True
+        self._cost_ns += CALL_NS + scans * (SCAN_NS + STATEMENT_NS[machine] * (plc.budget - self._system[BUDGET // 8]))
+        has_inputs = not pending.is_empty
+        if has_inputs:
+            self._put(chunk, pending, scans)
+            self._pending = ScanInputs(plc.scans)
+            if chunk.inputs_bytes > MOST_INPUT_BYTES:
+                self._cost_ns = AGAIN_NS + 1
+        if written and (has_inputs or written.wants_each_scan):
+            written.ended()
 
     def run_begins(self) -> None:
         """Until `run_ends`, nobody outside has a turn between two scans: memory need not be compared."""

@@ -14,7 +14,7 @@ from fbvm.engine.choice.tiers import again_choice, python_of
 from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Plc
 from fbvm.machine.scan.refresh import Attached
-from fbvm.record.recording.chunks import Chunk, ScanInputs, Writes
+from fbvm.record.recording.chunks import Chunk, ScanInputs, Write
 from fbvm.record.recording.packed import unpacked
 from fbvm.units.contract import AreaMemory, ResumableUnit, Unit
 from fbvm.wire.link import Event, Request
@@ -48,7 +48,7 @@ class RecordedLink:
         self.address, self.tap = address, tap
         self.told: list[Event] = []
         """What it tells in the next refresh."""
-        self.traffic: list[tuple[int, str, TapEvent]] = []
+        self.traffic: Sequence[tuple[int, str, TapEvent]] = ()
         """What its tap is told then."""
 
     @property
@@ -70,7 +70,7 @@ class RecordedLink:
         if self.tap:
             for passed in self.traffic:
                 self.tap(*passed)
-        self.traffic = []
+        self.traffic = ()
         return told
 
     def close(self) -> None:
@@ -91,7 +91,7 @@ class RecordedRefresh:
         self.meanings = getattr(unit, "meanings", {})
         self.configuration: dict[str, Any] = {}
         self.settings: dict[str, Any] = {}
-        self.writes: Writes = []
+        self.writes: Sequence[Write] = ()
         """What the next refresh changes."""
 
     @property
@@ -104,7 +104,7 @@ class RecordedRefresh:
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         write(self._plc, self.writes)
-        self.writes = []
+        self.writes = ()
         return []
 
 
@@ -227,7 +227,7 @@ class Replay:
         for number, events in inputs.events.items():
             self._links[number].told = list(events)
         for link in self._links[:1]:  # one of them has all of it, in its order
-            link.traffic = inputs.traffic if link.tap else []
+            link.traffic = inputs.traffic if link.tap else ()
         for refresh in self._refreshes[-1:]:
             refresh.writes = inputs.refreshed
         self._results.extend(inputs.results)

@@ -13,7 +13,7 @@ from typing import Any
 
 from fbvm.machine.state import State
 from fbvm.net.journal import from_event, to_event
-from fbvm.record.recording.chunks import Chunk, ScanInputs, Times, UnitKeyframe, Writes
+from fbvm.record.recording.chunks import Chunk, ScanInputs, Times, UnitKeyframe, Write
 from fbvm.record.recording.plain_data import number, parts_of, payload_of
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import TapEvent, TapKind
@@ -92,16 +92,19 @@ def decode_scans(payload: bytes, first: int, scans: int) -> Segment:
     return Segment(first, times, numbers, data["inputs"], bool(data["machine"]), number(data["memory"]), memories)
 
 
-def _writes(writes: Writes) -> list[Any]:
+WRITES = ("writes", "results", "refreshed")
+"""Those inputs that are bytes at offsets."""
+
+
+def _writes(writes: Sequence[Write]) -> list[Any]:
     return [[offset, data.hex()] for offset, data in writes]
 
 
 def encode_inputs(inputs: ScanInputs) -> dict[str, Any]:
     """The inputs of a scan as plain data."""
     found: dict[str, Any] = {"scan": inputs.scan}
-    for name in ("writes", "results", "refreshed"):
-        if writes := getattr(inputs, name):
-            found[name] = _writes(writes)
+    if inputs.writes or inputs.results or inputs.refreshed:
+        found.update((name, _writes(writes)) for name in WRITES if (writes := getattr(inputs, name)))
     if inputs.forces is not None:
         found["forces"] = dict(inputs.forces)
     if inputs.budget is not None:
@@ -121,14 +124,13 @@ def decode_inputs(row: Mapping[str, Any], size: int) -> ScanInputs:
     """The inputs of a scan again; `size` is that of the memory.  Raises errors of several classes for other data."""
     made = ScanInputs(number(row["scan"]))
     for name, data in row.items():
-        if name in _WRITES:
+        if name in WRITES:
             setattr(made, name, [_write(size, *write) for write in data])
         elif read := _DECODED.get(name):
             setattr(made, name, read(data))
     return made
 
 
-_WRITES = ("writes", "results", "refreshed")
 _DECODED: dict[str, Callable[[Any], object]] = {
     "forces": dict,
     "budget": number,
@@ -139,7 +141,7 @@ _DECODED: dict[str, Callable[[Any], object]] = {
 }
 
 
-def _write(size: int, offset: int, data: str) -> tuple[int, bytes]:
+def _write(size: int, offset: int, data: str) -> Write:
     content = bytes.fromhex(data)
     if number(offset) + len(content) > size:
         raise ValueError(f"{len(content)} bytes at {offset} are outside the memory")
