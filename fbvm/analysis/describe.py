@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
+from fbvm.analysis.comments import comment_at
 from fbvm.analysis.declarations import Declared
 from fbvm.base.areas import AREAS, AddressError, parse_address
 from fbvm.base.diagnostics import Source
@@ -15,10 +14,6 @@ from fbvm.syntax import tree
 
 PINS = ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT")
 SHORT = {"VAR_INPUT": ":=", "VAR_IN_OUT": ":=", "VAR_OUTPUT": "=>"}
-_BEHIND = re.compile(r"[^\n]*?(?://[ \t]*([^\n]*)|\(\*[ \t]*(.*?)\s*\*\))[ \t\r]*(?=\n|\Z)")
-_ABOVE = re.compile(r"((?:[ \t]*//[^\n]*\n)+|[ \t]*\(\*(?:(?!\*\)).)*\*\)[ \t]*\n)(?:[ \t]*\{[^}\n]*\}[ \t]*\n)*[ \t]*\Z", re.S)
-_NEARLY = 2000
-"""Characters in front of a declaration in which its comment is searched."""
 
 
 def declaration(declared: Declared) -> str:
@@ -67,15 +62,7 @@ def _type(declared: Declared) -> str:
 
 def comment(source: Source, node: tree.Node) -> str:
     """The comment that belongs to a declaration: behind it on its line, else directly above it; "" if there is none."""
-    text = source.text
-    if behind := _BEHIND.match(text, node.end):
-        return (behind[1] if behind[1] is not None else behind[2]).strip()
-    line = text.rfind("\n", 0, node.start) + 1
-    above = _ABOVE.search(text, max(0, line - _NEARLY), line)
-    if above is None:
-        return ""
-    lines = [re.sub(r"^\s*(?://|\(\*|\*(?!\)))?|\*\)\s*$", "", each).strip() for each in above[1].splitlines()]
-    return "\n".join(lines).strip()
+    return comment_at(source.text, node.start, node.end)
 
 
 def markdown(declared: Declared, value: Value | None = None) -> str:

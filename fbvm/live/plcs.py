@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
+from fbvm.analysis.comments import declared_comments
 from fbvm.live.program import Drawn, PowerView, ScanView, instances
 from fbvm.machine.plc import Plc
 from fbvm.machine.power import Power, powering
@@ -19,7 +20,7 @@ from fbvm.record.trace.observing import observing
 from fbvm.record.trace.packets import Dissector, Packet, add_tap
 from fbvm.record.trace.writer import descriptions, meanings, source_lines
 from fbvm.watch.names import Names
-from fbvm.watch.paths import UnknownPlace
+from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.tap import TapEvent
 
 MOST_PACKETS = 2000
@@ -50,6 +51,9 @@ class LivePlc:
         self.name, self.plc, self.recorded, self.texts = name, plc, recorded, texts
         self.names = Names.of(plc.image, plc.memory.areas)
         self.described, self.meanings = descriptions(plc), meanings(plc)
+        self._comments = declared_comments(texts.values())
+        self._owners: dict[str, str] = {}
+        """The type of the instance or structure of this path, in upper case; "" for what is none."""
         self.instances = instances(plc.image)
         self.past = RecordedScans(recorded, source_lines(plc.image, texts))
         self.view: ScanView | None = None
@@ -71,6 +75,16 @@ class LivePlc:
         self._dissector = Dissector()
         for network in {id(attached.network): attached.network for attached in plc.units}.values():
             add_tap(network, self._passed)
+
+    def said(self, place: Place) -> str:
+        """The comment of a variable where it is declared; of a word or a bit what its unit calls it."""
+        if not self._comments or place.area:
+            return self.described.get(place.name, "")
+        path, _, last = place.name.rpartition(".")
+        if path not in self._owners:
+            found = self.plc.find(path) if path else None
+            self._owners[path] = found.type.name.upper() if isinstance(found, Place) else ""
+        return self._comments.get((self._owners[path], last.partition("[")[0].upper()), "")
 
     def wish_view(self, is_paused: bool) -> None:
         """Has the next scan observed.  With real connections only while the run is paused and goes scan by scan: Python alone

@@ -174,7 +174,7 @@ class Session:
         found, unknown = yield from find_names(self._bench, live, names or [])
         rows = {}
         for number, (name, (owner, place)) in enumerate(found.items(), 1):
-            rows[name] = row(place, owner.described)
+            rows[name] = row(place, owner.said)
             if number % STEP == 0:
                 yield
         if live is not look.live:
@@ -209,11 +209,11 @@ class Session:
 
     def _search(self, plc: str, text: str) -> Reply:
         live = self._bench.plc(plc)
-        return search(live.plc, live.described, text)
+        return search(live.plc, live.described, live.said, text)
 
     def _parts(self, plc: str, name: str) -> Reply:
         live = self._bench.plc(plc)
-        return {"parts": (yield from parts(live.plc, live.described, name))}
+        return {"parts": (yield from parts(live.plc, live.said, name))}
 
     def _history(self, plc: str, names: list[str], scans: int) -> dict[str, Any]:
         """The values of some names in the last recorded scans, or the last before the one that is looked at."""

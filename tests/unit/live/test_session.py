@@ -89,6 +89,18 @@ def test_search_finds_names_types_addresses_and_words_of_units(page: Page) -> No
     assert any("CIO 15" in name for name in names("send request"))
 
 
+def test_a_variable_is_shown_and_found_with_the_comment_of_its_declaration() -> None:
+    page = Page("""TYPE Valve : STRUCT Way : INT; // of the lever, mm
+        END_STRUCT END_TYPE
+        PROGRAM Main VAR
+            Inlet : ARRAY[1..2] OF Valve;   (* from the well *)
+            Level : INT;
+        END_VAR Level := Level + 1; END_PROGRAM""")
+    rows = page.done("look", plc="pump", names=["Main.Inlet[2].Way", "Main.Inlet", "Main.Level", "CIO 1517.14"])["rows"]
+    assert [row["said"] for row in rows.values()] == ["of the lever, mm", "from the well", "", "Link Status"]
+    assert [one["name"] for one in page.done("search", plc="pump", text="well")["found"]] == ["Main.Inlet"]
+
+
 def test_an_array_opens_into_its_elements(page: Page) -> None:
     parts = page.done("parts", plc="pump", name="Main.Curve")["parts"]
     assert [part["name"] for part in parts] == ["Main.Curve[1]", "Main.Curve[2]", "Main.Curve[3]"]
