@@ -14,7 +14,8 @@ _NEARLY = 2000
 """Characters in front of a declaration in which its comment is searched."""
 _HEAD = re.compile(r"(?:PROGRAM|FUNCTION_BLOCK|FUNCTION)\s+(?:(?:ABSTRACT|FINAL|PUBLIC|INTERNAL)\s+)*([^\W\d]\w*)", re.I)
 _STRUCTURE = re.compile(r"(?:TYPE\s+)?([^\W\d]\w*)\s*:\s*(?:STRUCT|UNION)\b", re.I)
-_BEGIN = re.compile(r"VAR(?:_\w+)?\b(?!\s*:)(?:\s+(?:RETAIN|NON_RETAIN|PERSISTENT|CONSTANT|PUBLIC|PRIVATE|PROTECTED|INTERNAL)\b)*", re.I)
+_BEGIN = re.compile(
+    r"VAR(?:_\w+)?\b(?!\s*:)(?:\s+(?:RETAIN|NON_RETAIN|PERSISTENT|CONSTANT|PUBLIC|PRIVATE|PROTECTED|INTERNAL)\b)*", re.I)
 _END = re.compile(r"END_(?:VAR|STRUCT|UNION)\b", re.I)
 _DECLARED = re.compile(r"((?:[^\W\d]\w*\s*,\s*)*[^\W\d]\w*)\s*(?:AT\s+[%\w.]+(?:\s+\d[\d.]*)?\s*)?:(?!=)", re.I)
 

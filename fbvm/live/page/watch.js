@@ -4,6 +4,9 @@ import { at, inRadix, make, options, remember, remembered } from "/dom.js";
 
 const NO_GROUP = "";
 const MOST_ROWS = 1000;
+const MOST_SHOWN = 60; // characters of what can be opened, and of a type
+
+const cut = (text) => (text.length > MOST_SHOWN ? `${text.slice(0, MOST_SHOWN)}…` : text);
 
 export class WatchPanel {
   constructor(page) {
@@ -149,8 +152,8 @@ export class WatchPanel {
       on: { click: () => this.toggle(name) } }, isOpen ? "▾" : "▸")] : [];
     this.rows.set(name, value);
     return make("tr", { "data-name": name, class: `level${Math.min(level, 6)}` },
-      make("td", { class: "mono", title: about.said ?? "" }, ...opener, short, about.said ? make("div", { class: "dim" }, about.said) : ""),
-      value, make("td", { class: "dim" }, about.type ?? ""), make("td", {}, input), make("td", { class: "does" }, ...tools));
+      make("td", { class: "mono", }, ...opener, short, about.said ? make("div", { class: "dim" }, about.said) : ""),
+      value, make("td", { class: "dim", title: about.type ?? "" }, cut(about.type ?? "")), make("td", {}, input), make("td", { class: "does" }, ...tools));
   }
 
   // Opens an array, a structure or an instance into its parts, or closes it.
@@ -203,7 +206,8 @@ export class WatchPanel {
     const forces = this.page.state.forces ?? {};
     for (const [name, cell] of this.rows) {
       const text = this.values.get(name) ?? "";
-      const shown = inRadix(text, radix, this.about.get(name)?.bytes);
+      const whole = inRadix(text, radix, this.about.get(name)?.bytes);
+      const shown = this.about.get(name)?.tree ? cut(whole) : whole;
       const isForced = !name.includes("/") && (this.about.get(name)?.name ?? name) in forces;
       if (cell.textContent !== shown) cell.textContent = shown;
       cell.classList.toggle("on", text === "TRUE");
