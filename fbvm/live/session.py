@@ -17,7 +17,7 @@ from fbvm.live.plcs import LivePlc
 from fbvm.live.program import source_of
 from fbvm.live.symbols import parts, row, search
 from fbvm.live.updates import Updates, shown
-from fbvm.live.workbench import REFUSED, Workbench
+from fbvm.live.workbench import MEASURES, REFUSED, Workbench
 from fbvm.machine.state import Mode
 from fbvm.net.faults import NAMED
 from fbvm.record.draw.why import cause_text, why
@@ -154,6 +154,7 @@ class Session:
             "lesson": bench.lesson.about() if bench.lesson else None,
             "pictures": bench.pictures is not None and bool(bench.pictures.shown), "groups": bench.groups is not None,
             "modes": [mode.value for mode in Mode], "faults": {name: kind.meaning for name, kind in NAMED.items()},
+            "measures": MEASURES,
             "plcs": [{"name": live.name, "cycle": live.plc.cycle_ns, "watch": list(live.watch), "instances": live.instances,
                       "areas": {name: area.size_bytes // 2 for name, area in live.plc.memory.areas.items()
                                 if area.unit_bits == 16 and name not in FLAG_AREAS},

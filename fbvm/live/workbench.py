@@ -25,6 +25,10 @@ from fbvm.wire.link import Peer
 MOST_STEPS = 100_000
 SLOWEST, FASTEST = 0.001, 1000.0
 """Bounds of the speed of virtual time; 0 is as fast as it goes."""
+PERCENT = {"lose_percent": "percent", "duplicate_percent": "percent"}
+MEASURES = {name: PERCENT.get(kind.needed[0], "time") for name, kind in NAMED.items()
+            if kind.needed and kind.needed[0].endswith(("_percent", "_ns"))}  # fmt: skip
+"""What says how much of a fault there is: the field of its message."""
 REFUSED = (UnknownPlace, ValueError, TypeError)
 """What an action raises whose names or values do not fit the program."""
 

@@ -187,6 +187,7 @@ def test_a_cable_is_pulled_and_a_fault_switched_on(live: Any) -> None:
     page.click("[data-panel=network]")
     page.select_option("#kind", "slow")
     page.fill("#peer", "192.168.250.1:502")
+    page.fill("#much", "30ms")
     page.click("#break")
     page.locator("#faults li", has_text="slow at 192.168.250.1:502").wait_for()
     assert run.complaints == []
@@ -424,7 +425,7 @@ def test_frames_are_saved_and_a_word_says_who_wrote_it(live: Any) -> None:
     page.click("[data-panel=memory]")
     page.fill("#first", "10")
     page.locator("#words button", has_text="005A").first.click()
-    page.locator("#cause:not([hidden])").wait_for()
+    page.locator("#reason:not([hidden])").wait_for()
     page.click("[data-panel=times]")
     page.locator("#histogram rect").first.wait_for()
     assert run.complaints == []

@@ -93,7 +93,7 @@ def _serve_page(lesson: Lesson, folder: Path, target: Path) -> None:
 
     def predict(values: Mapping[str, str]) -> str:
         answer(lesson, folder, values)
-        return prediction_mistake(lesson, folder)
+        return prediction_mistake(lesson, folder, "s executes one scan, n one statement").removeprefix("answers.toml: ")
 
     taught = LiveLesson(lesson.title, lesson.text, lambda: questions(lesson, folder), predict,
                         lambda: program_mistakes(lesson, folder), lesson.solution)  # fmt: skip

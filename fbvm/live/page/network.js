@@ -13,7 +13,23 @@ export class NetworkPanel {
       const made = await page.ask("capture", { plc: page.plc });
       if (made) save(`${page.plc}.pcapng`, Uint8Array.from(atob(made.pcapng), (one) => one.charCodeAt(0)), "application/octet-stream");
     });
-    at("break").addEventListener("click", () => page.ask("fault", { kind: at("kind").value, ...(at("peer").value.trim() ? { peer: at("peer").value.trim() } : {}) }));
+    at("break").addEventListener("click", () => this.switchOn());
+    at("kind").addEventListener("change", () => this.measure());
+    for (const id of ["peer", "much"]) at(id).addEventListener("keydown", (event) => { if (event.key === "Enter") this.switchOn(); });
+  }
+
+  // How much of the fault that is chosen, where it has a measure: a time, or percent.
+  measure() {
+    const kind = this.page.about.measures[at("kind").value];
+    at("measure").hidden = !kind;
+    at("unit").textContent = kind ?? "";
+    at("much").value = kind === "percent" ? "10" : "100ms";
+  }
+
+  switchOn() {
+    const [kind, peer, much] = ["kind", "peer", "much"].map((id) => at(id).value.trim());
+    const measure = this.page.about.measures[kind];
+    this.page.ask("fault", { kind, ...(peer ? { peer } : {}), ...(measure && much ? { [measure]: measure === "percent" ? Number(much) : much } : {}) });
   }
 
   begin() {
@@ -21,6 +37,7 @@ export class NetworkPanel {
     const { about } = this.page;
     options(at("kind"), Object.keys(about.faults));
     for (const option of at("kind").options) option.title = about.faults[option.value];
+    this.measure();
     at("break").disabled = about.read_only || about.writable !== null;
     this.draw();
   }

@@ -125,7 +125,8 @@ export class TrendPanel {
   between(name) {
     const [a, b] = CURSORS.map((one) => this.sample(this.cursors[one])?.values.get(name));
     const [from, to] = [number(a), number(b)];
-    const apart = from !== null && to !== null && a !== undefined && b !== undefined ? `, B − A ${Number((to - from).toPrecision(9))}` : "";
+    const isBit = a === "TRUE" || a === "FALSE";
+    const apart = !isBit && from !== null && to !== null && a !== undefined && b !== undefined ? `, B − A ${Number((to - from).toPrecision(9))}` : "";
     return `${a === undefined ? "" : `  A ${a}`}${b === undefined ? "" : `  B ${b}`}${apart}`;
   }
 

@@ -2,7 +2,7 @@
 
 import { at, make } from "/dom.js";
 
-const SOCKET = { name: "socket", state: "state", local: "local port", peer: "peer", received: "bytes received", requested: "bytes requested", result: "result" };
+const SOCKET = { name: "socket", state: "state", local: "local port", peer: "peer", received: "bytes received", requested: "bytes requested", result: "latest result" };
 
 export class UnitsPanel {
   constructor(page) {

@@ -4,9 +4,10 @@ import { at, inRadix, make, options, remember, remembered } from "/dom.js";
 
 const NO_GROUP = "";
 const MOST_ROWS = 1000;
-const MOST_SHOWN = 60; // characters of what can be opened, and of a type
+const MOST_SHOWN = 60; // characters of what can be opened
+const MOST_OF_TYPE = 24;
 
-const cut = (text) => (text.length > MOST_SHOWN ? `${text.slice(0, MOST_SHOWN)}…` : text);
+const cut = (text, most) => (text.length > most ? `${text.slice(0, most)}…` : text);
 
 export class WatchPanel {
   constructor(page) {
@@ -39,6 +40,7 @@ export class WatchPanel {
       event.preventDefault();
       this.keep(at("groupName").value, this.list);
     });
+    at("uncause").addEventListener("click", () => { at("reason").hidden = true; });
     at("ungroup").addEventListener("click", () => this.keep(at("group").value, []));
   }
 
@@ -47,7 +49,8 @@ export class WatchPanel {
     this.list = remembered(`watch.${plc.name}`, plc.watch).map(String);
     this.open = new Set(remembered(`open.${plc.name}`, []).map(String));
     this.parts.clear();
-    at("groups").hidden = !about.groups;
+    at("reason").hidden = true; // of another PLC, or of a program before
+    at("grouping").hidden = !about.groups;
     for (const id of ["keepGroup", "ungroup", "groupName"]) at(id).disabled = about.read_only || about.writable !== null;
     await Promise.all([...this.open].map((name) => this.fetch(name)));
     this.build();
@@ -153,7 +156,7 @@ export class WatchPanel {
     this.rows.set(name, value);
     return make("tr", { "data-name": name, class: `level${Math.min(level, 6)}` },
       make("td", { class: "mono", }, ...opener, short, about.said ? make("div", { class: "dim" }, about.said) : ""),
-      value, make("td", { class: "dim", title: about.type ?? "" }, cut(about.type ?? "")), make("td", {}, input), make("td", { class: "does" }, ...tools));
+      value, make("td", { class: "dim", title: about.type ?? "" }, cut(about.type ?? "", MOST_OF_TYPE)), make("td", {}, input), make("td", { class: "does" }, ...tools));
   }
 
   // Opens an array, a structure or an instance into its parts, or closes it.
@@ -176,7 +179,7 @@ export class WatchPanel {
 
   async why(name) {
     const found = await this.page.ask("why", this.owner(name));
-    at("cause").hidden = !found;
+    at("reason").hidden = !found;
     if (found) {
       at("cause").textContent = found.text;
       at("cause").focus();
@@ -207,7 +210,7 @@ export class WatchPanel {
     for (const [name, cell] of this.rows) {
       const text = this.values.get(name) ?? "";
       const whole = inRadix(text, radix, this.about.get(name)?.bytes);
-      const shown = this.about.get(name)?.tree ? cut(whole) : whole;
+      const shown = this.about.get(name)?.tree ? cut(whole, MOST_SHOWN) : whole;
       const isForced = !name.includes("/") && (this.about.get(name)?.name ?? name) in forces;
       if (cell.textContent !== shown) cell.textContent = shown;
       cell.classList.toggle("on", text === "TRUE");

@@ -85,8 +85,8 @@ def lessons() -> tuple[Lesson, ...]:
     return tuple(Lesson(int(path.name.partition("-")[0]), path.name, path) for path in folders)
 
 
-def prediction_mistake(lesson: Lesson, folder: Path) -> str:
-    """What is wrong with a learner's prediction, without the right one; "" if it is right.
+def prediction_mistake(lesson: Lesson, folder: Path, look: str = "fbvm step shows every statement") -> str:
+    """What is wrong with a learner's prediction, without the right one; "" if it is right.  `look` says how to look again.
 
     The report of a failed test would show the answer, and so would a test of a program that is still the given one."""
     target = folder / lesson.slug
@@ -103,7 +103,7 @@ def prediction_mistake(lesson: Lesson, folder: Path) -> str:
     if not said or not said.startswith(("assert ", "AssertionError")):
         return ""  # given.st is broken, or the test: the check shows how
     keep_first_wrong(target)
-    return f"{ANSWERS}: this is not what the program does; read the text again, and look: fbvm step shows every statement"
+    return f"{ANSWERS}: this is not what the program does; read the text again, and look: {look}"
 
 
 def check(lesson: Lesson, folder: Path) -> int:

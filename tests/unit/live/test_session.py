@@ -202,6 +202,8 @@ def test_the_restart_button_of_a_unit_restarts_it(page: Page) -> None:
 
 def test_faults_are_switched_on_and_off_by_name(page: Page) -> None:
     page.done("look", plc="pump", names=[], network=True)
+    measures = page.done("hello")["measures"]
+    assert (measures["slow"], measures["lossy"], {"cut", "interrupted"} & set(measures)) == ("time", "percent", set())
     page.done("fault", kind="slow", peer="192.168.250.1:502", time="30ms")
     page.done("fault", kind="lossy", percent=50)
     assert [row.lose_percent for row in page.network.faults] == [0, 50] and page.network.faults[0].latency_ns == 30_000_000
