@@ -140,6 +140,8 @@ class RungPicture:
     steps: tuple[tuple[int, str, str, tuple[str, ...]], ...]
     is_text: bool = False
     """True for a statement of Structured Text that is drawn as a rung; `comment` says why if it has no steps."""
+    section: str = ""
+    """The section that begins with it, "" if none does."""
 
 
 @dataclass(frozen=True)

@@ -33,3 +33,32 @@ def test_a_rung_that_was_stored_by_address_shows_the_symbol(tmp_path: Path) -> N
     lines = drawn(tmp_path, b"LD Start_PB", b"LD 0.00")
     assert "││ Start_PB │ 0.01 100.00 │" in lines
     assert "Start_PB 0.00 start button" in lines
+
+
+@pytest.mark.slow
+def test_sections_and_the_other_names_of_operands_are_drawn(tmp_path: Path) -> None:
+    file = tmp_path / "line.cxt"
+    file.write_bytes(SAMPLE.bytes().replace(b",D100,CHANNEL", b"Level,D100,CHANNEL")
+                     .replace(b"LD Start_PB\n", b"LD Start_PB\nAND=(300) D100 &5\nTIM 0003 D100\nLD TIM0003\n"))  # fmt: skip
+    done = CliRunner().invoke(main, ["ladder", str(file)])
+    assert done.exit_code == 0, done.output
+    lines = [" ".join(line.split()) for line in done.output.splitlines()]
+    at = lines.index("PROGRAM NewProgram1")
+    assert lines[at + 1 : at + 3] == ["SECTION Pumping", "RUNG 0 self hold"]
+    assert "SECTION END" in lines[at:]
+    assert any("│ D100 (Level) │" in line for line in lines)
+    compared = next(number for number, line in enumerate(lines) if "D100 &5" in line)
+    assert "Level" in lines[compared + 2], "below the comparison"
+    assert "CX_" not in done.output, "names of the library are not the electrician's"
+
+
+@pytest.mark.slow
+def test_executed_rungs_are_drawn_with_their_sections_and_right_rails_in_one_column(tmp_path: Path) -> None:
+    file = tmp_path / "line.cxt"
+    file.write_bytes(SAMPLE.bytes())
+    done = CliRunner().invoke(main, ["run", str(file), "--set", "Start_PB=TRUE", "--scans", "2", "--ladder", "1"])
+    assert done.exit_code == 0, done.output
+    _, _, shown = done.output.partition("scan 1, NewProgram1\n")
+    assert shown.startswith("SECTION Pumping\nRUNG 0 self hold\n")
+    rungs = [line for line in shown.partition("scan 1, Dbl1")[0].splitlines() if line[:1] in "┃┣┠"]
+    assert {len(line) for line in rungs if line} == {len(rungs[0])}

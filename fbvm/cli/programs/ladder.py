@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.files import write_file
-from fbvm.cli.shared.drawings import SVG_WIDTH, comment_lines, print_lines, rung_lines, symbol_addresses
+from fbvm.cli.shared.drawings import SVG_WIDTH, comment_lines, print_lines, rung_lines, say_section, symbol_addresses
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.given_sources import sources_of
 from fbvm.cli.shared.run_result import chart_width
@@ -32,15 +32,16 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if not image.rungs:
         raise click.UsageError("there is nothing to draw in these files")
     if svg:
-        drawn = [ladder_surface(rung, width or SVG_WIDTH, Annotations(None, symbol_addresses(image, rung.body)))
-                 for rung in image.rungs]  # fmt: skip
+        drawn = [ladder_surface(rung, width or SVG_WIDTH, Annotations(None, known, others=known))
+                 for rung in image.rungs for known in (symbol_addresses(image, rung.body),)]
         with writing(svg):
             write_file(svg, ladder_svg(drawn))
         return
-    known = contents(sources_of(files)) if commented else None
+    declared = contents(sources_of(files)) if commented else None
     for body, group in groupby(image.rungs, lambda rung: rung.body):
         rungs = list(group)
         say(f"{image.bodies[body].kind} {image.bodies[body].name}")
         for rung, lines in zip(rungs, rung_lines(image, rungs, width or chart_width()), strict=True):
-            remarks = comment_lines(rung, image.bodies[body].name, symbol_addresses(image, body), known) if known else []
+            remarks = comment_lines(rung, image.bodies[body].name, symbol_addresses(image, body), declared) if declared else []
+            say_section(rung)
             print_lines([*lines, *remarks])

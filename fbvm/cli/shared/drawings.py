@@ -6,11 +6,12 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import click
 
-from fbvm.base.types import StructType, fold
+from fbvm.base.types import Elementary, StructType, fold
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.terminal import say
 from fbvm.code.image import Image, RungPicture
@@ -40,6 +41,12 @@ def print_lines(lines: Iterable[str]) -> None:
     say()
 
 
+def say_section(rung: RungPicture) -> None:
+    """Names the section that begins with a rung."""
+    if rung.section:
+        say(f"SECTION {rung.section}")
+
+
 def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
     """A function from the name of a variable to its address, "" without one.
 
@@ -51,7 +58,7 @@ def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
     @cache
     def by_address() -> dict[str, str]:
         found = ((names.address(Place(field.name, field.type, field.offset, field.bit)), field.name)
-                 for field in image.symbols.values() if field.absolute)
+                 for field in image.symbols.values() if field.absolute and isinstance(field.type, Elementary))
         return {place.removeprefix("CIO "): name for place, name in reversed(list(found)) if place}
 
     def address(symbol: str) -> str:
@@ -70,9 +77,15 @@ def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
 def rung_lines(image: Image, rungs: Sequence[RungPicture], width: int) -> list[list[str]]:
     """The lines of the rungs of a POU that are not executed, at most `width` columns wide, with addresses of the variables.
     All right rails stand in one column."""
-    annotations = Annotations(None, symbol_addresses(image, rungs[0].body))
-    widest = max(len(row) for rung in rungs for row in ("", *ladder_text(rung, width, annotations)[1:]) if row[:1] != " ")
-    return [ladder_text(rung, width, annotations, widest) for rung in rungs]
+    known = symbol_addresses(image, rungs[0].body)
+    return _aligned([(rung, Annotations(None, known, others=known)) for rung in rungs], width)
+
+
+def _aligned(rungs: Sequence[tuple[RungPicture, Annotations]], width: int) -> list[list[str]]:
+    """The lines of rungs, all right rails in one column."""
+    drawn = [ladder_text(rung, width, annotations) for rung, annotations in rungs]
+    widest = max(len(row) for lines in drawn for row in ("", *lines[1:]) if row[:1] != " ")
+    return [ladder_text(rung, width, annotations, widest) for rung, annotations in rungs]
 
 
 def comment_lines(rung: RungPicture, pou: str, address: Callable[[str], str], known: Contents) -> list[str]:
@@ -124,13 +137,14 @@ def draw_executed_rungs(plc: Plc, scans: str | None) -> Iterator[None]:
     if not power.executed:
         _warn_nothing_drawn(plc, f"--ladder {scans}", "rung", bool(plc.image.rungs))
     names = Names.of(plc.image, plc.memory.areas)
-    before: tuple[int, int] | None = None
-    for made in power.executed:
-        if before != (made.scan, made.base):
-            before = made.scan, made.base
-            say(f"scan {made.scan}, {names.instance(made.base)}")
-        annotations = Annotations(made.states, symbol_addresses(plc.image, made.picture.body), values.of(made))
-        print_lines(ladder_text(made.picture, chart_width(), annotations))
+    for (scan, base), together in groupby(power.executed, lambda made: (made.scan, made.base)):
+        say(f"scan {scan}, {names.instance(base)}")
+        group = list(together)
+        known = symbol_addresses(plc.image, group[0].picture.body)
+        rungs = [(made.picture, Annotations(made.states, known, values.of(made), known)) for made in group]
+        for (rung, _), lines in zip(rungs, _aligned(rungs, chart_width()), strict=True):
+            say_section(rung)
+            print_lines(lines)
 
 
 @contextmanager

@@ -144,7 +144,7 @@ def _lines(body: BodyContext, node: ladder.Ladder | il.InstructionList, site: in
 
 def _rung(body: BodyContext, node: ladder.Rung, site: int) -> None:
     steps = tuple((body.site(step), step.prefix, step.mnemonic, step.operands) for step in node.steps)
-    body.program.rungs.append(RungPicture(body.pou.number, site, node.number, node.comment, steps))
+    body.program.rungs.append(RungPicture(body.pou.number, site, node.number, node.comment, steps, section=node.section))
     body.emit(("observe", "rung", site, node.number))
     body.lower(node.body)
 

@@ -12,14 +12,19 @@ AT_REST = Annotations()
 
 def ladder_text(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST, least: int = 0) -> list[str]:
     """The lines of a rung, whose right rail stands in column `least` or behind it."""
-    head, surface = ladder_surface(picture, width, annotations, least)
-    return [head, *surface.rows()]
+    return [_head(picture), *_surface(picture, width, annotations, least).rows()]
 
 
 def ladder_surface(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST,
                    least: int = 0) -> tuple[str, Surface]:
-    """The headline of a rung and its drawing."""
-    head = " ".join(filter(None, (f"RUNG {picture.number}", picture.comment)))
-    if not picture.steps:
-        return head, Surface()
-    return head, rung_surface([step[1:] for step in picture.steps], width, annotations, least)
+    """The headline of a rung, which names the section that begins with it, and its drawing."""
+    section = f"SECTION {picture.section}, " if picture.section else ""
+    return section + _head(picture), _surface(picture, width, annotations, least)
+
+
+def _head(picture: RungPicture) -> str:
+    return " ".join(filter(None, (f"RUNG {picture.number}", picture.comment)))
+
+
+def _surface(picture: RungPicture, width: int, annotations: Annotations, least: int) -> Surface:
+    return rung_surface([step[1:] for step in picture.steps], width, annotations, least) if picture.steps else Surface()

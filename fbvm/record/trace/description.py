@@ -53,10 +53,10 @@ def describe(source: ScanSource, head: Mapping[str, Any]) -> int:
     return size
 
 
-def _rung(body: int, site: int, number: int, comment: str, steps: list[Any]) -> RungPicture:
+def _rung(body: int, site: int, number: int, comment: str, steps: list[Any], section: str = "") -> RungPicture:
     return RungPicture(int(body), int(site), int(number), str(comment),
                        tuple((int(place), str(prefix), str(mnemonic), tuple(map(str, operands)))
-                             for place, prefix, mnemonic, operands in steps))  # fmt: skip
+                             for place, prefix, mnemonic, operands in steps), section=str(section))  # fmt: skip
 
 
 def _chart(body: int, site: int, steps: list[Any], transitions: list[Any]) -> SfcPicture:

@@ -277,7 +277,7 @@ def description(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[
         "mailboxes": [astuple(box) for box in image.layout.mailboxes],
         **symbols.to_data(image.symbols), "objects": image.objects.extents,
         "files": files, "sites": [[files.index(s.file), s.pou, s.line, s.column] for s in image.sites],
-        "rungs": [[rung.body, rung.site, rung.number, rung.comment, rung.steps] for rung in image.rungs],
+        "rungs": [[rung.body, rung.site, rung.number, rung.comment, rung.steps, rung.section] for rung in image.rungs],
         "charts": [astuple(chart) for chart in image.charts],
         "outer": outer_statements(image), "bodies": [[body.name, body.kind] for body in image.bodies],
         "results": results.to_data(results.results_of(image)),

@@ -89,7 +89,8 @@ class LadderLowering:
         if text.lines and not text.damaged:
             self._finish(text)
         steps = tuple(line.step for line in text.lines)
-        return Rung(text.start, end, number, text.comment, steps, tuple(text.notes), tuple(context.out))
+        section = text.section[len("SECTION"):].strip()
+        return Rung(text.start, end, number, text.comment, section, steps, tuple(text.notes), tuple(context.out))
 
     def _finish(self, text: RungText) -> None:
         """Report conditions of a rung that nothing uses."""

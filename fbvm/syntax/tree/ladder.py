@@ -69,10 +69,11 @@ class Step(Node):
 @_node
 class Rung(Statement):
     """`steps` are the instructions as written, `body` the statements that execute them.  `notes` are comments as written, each
-    with the number of the step behind it."""
+    with the number of the step behind it, `section` the name of the section that begins with it, "" if none does."""
 
     number: int
     comment: str
+    section: str
     steps: tuple[Step, ...]
     notes: tuple[tuple[int, str], ...]
     body: Block

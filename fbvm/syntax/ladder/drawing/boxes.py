@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from fbvm.syntax.ladder.drawing.diagram import Box, Pin
 
-Values = Callable[[int, str], str]
+Operand = Callable[[int, str], str]
+"""What is drawn of an operand, by its step."""
 
 
 class Row(NamedTuple):
@@ -39,19 +40,19 @@ class Shape(NamedTuple):
         return made | dict(enumerate(self.rows, free))
 
 
-def shape(box: Box, values: Values) -> Shape:
-    """The layout of a box, with the values that its operands had."""
+def shape(box: Box, operand: Operand) -> Shape:
+    """The layout of a box; `operand` says how each of its operands is drawn."""
     if box.instance:
-        return _block(box, values)
-    texts = [_valued(box.step, operand, values) for operand in box.operands]
+        return _block(box, operand)
+    texts = [operand(box.step, text) for text in box.operands]
     wide = max(map(len, (box.name, *texts))) + 3
     return Shape("", (Row(box.name),), tuple(map(Row, texts)), 0, wide, 0, 2)
 
 
-def _block(box: Box, values: Values) -> Shape:
+def _block(box: Box, operand: Operand) -> Shape:
     """A function block: its instance and type in its upper side, operands beside its pins."""
     heads = tuple(Row(name, box.leaves if box.through else "") for name in box.entries)
-    rows = tuple(_rows(box, values))
+    rows = tuple(_rows(box, operand))
     everything = (*heads, *rows)
     title = f" {box.instance} : {box.name} "
     inside = max((len(row.left) + len(row.right) + 2 * bool(row.right) for row in everything), default=0)
@@ -65,30 +66,25 @@ def _widest(texts: Iterator[str]) -> int:
     return longest + 1 if longest else 0
 
 
-def _rows(box: Box, values: Values) -> Iterator[Row]:
+def _rows(box: Box, operand: Operand) -> Iterator[Row]:
     """The pins in rows: an output stands beside the input in front of it."""
     before: Pin | None = None
     for pin in box.pins:
         if before is not None and pin.output:
-            yield _row(box, before, pin, values)
+            yield _row(box, before, pin, operand)
             before = None
             continue
         if before is not None:
-            yield _row(box, before, None, values)
+            yield _row(box, before, None, operand)
         before = None if pin.output else pin
         if pin.output:
-            yield _row(box, None, pin, values)
+            yield _row(box, None, pin, operand)
     if before is not None:
-        yield _row(box, before, None, values)
+        yield _row(box, before, None, operand)
 
 
-def _row(box: Box, taking: Pin | None, giving: Pin | None, values: Values) -> Row:
+def _row(box: Box, taking: Pin | None, giving: Pin | None, operand: Operand) -> Row:
     return Row(taking.name if taking else "", giving.name if giving else "",
-               _valued(box.step, taking.operand, values) if taking else "",
-               _valued(box.step, giving.operand, values) if giving else "")
+               operand(box.step, taking.operand) if taking else "",
+               operand(box.step, giving.operand) if giving else "")
 
-
-def _valued(step: int, operand: str, values: Values) -> str:
-    """An operand with its value, if the value is known."""
-    value = values(step, operand)
-    return f"{operand} = {value}" if value else operand

@@ -35,6 +35,14 @@ class Annotations(NamedTuple):
     """The address behind a symbol, "" if it has none."""
     values: Callable[[int, str], str] = _unseen
     """The value that an operand of a step had; "" if it is not known."""
+    others: Callable[[str], str] = _nothing
+    """What is drawn in brackets behind an operand of a box, and below a comparison: the address of a symbol, or the symbol at an
+    address; "" for nothing."""
+
+    def operand(self, step: int, operand: str) -> str:
+        """An operand of a box as it is drawn."""
+        other, value = self.others(operand), self.values(step, operand)
+        return operand + (f" ({other})" if other else "") + (f" = {value}" if value else "")
 
 
 class Widths:
@@ -85,14 +93,15 @@ class Widths:
         return 2 + max(mark, (self._label(coil) + mark) // 2)
 
     def shape(self, box: Box) -> Shape:
-        return shape(box, self.annotations.values)
+        return shape(box, self.annotations.operand)
 
     def below(self, contact: Contact) -> str:
-        """The text below a contact: its address, or the values that it compares."""
+        """The text below a contact: its address, or the values that it compares, or the other names of what it compares."""
         if len(contact.operands) == 1:
             return self.annotations.places(contact.operands[0])
         seen = [value for operand in contact.operands if (value := self.annotations.values(contact.step, operand))]
-        return f"= {', '.join(seen)}" if seen else ""
+        others = [other for operand in contact.operands if (other := self.annotations.others(operand))]
+        return f"= {', '.join(seen)}" if seen else ", ".join(others)
 
     def _label(self, drawn: Contact | Coil) -> int:
         below = self.below(drawn) if isinstance(drawn, Contact) else self.annotations.places(" ".join(drawn.operands))
