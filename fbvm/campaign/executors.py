@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Protocol, cast
 
 from fbvm.campaign.processes import Crashed, Late, Pool
-from fbvm.campaign.work import Bench, Done, Task
+from fbvm.campaign.work import AnyBench, Done, Task
 
 LIMIT_NS = 600_000_000_000
 """How long a task may take.  Scans have a budget of statements, so only what hangs itself takes longer."""
@@ -27,7 +27,7 @@ class Executor(AbstractContextManager["Executor"], Protocol):
 class InThisProcess(Executor):
     """Does one task after the other, in this process."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: AnyBench) -> None:
         self._bench = bench
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -63,6 +63,6 @@ class ByWorkers(Executor):
             yield task, None if isinstance(found, Late | Crashed) else found
 
 
-def in_processes(bench: Bench, jobs: int) -> Executor:
+def in_processes(bench: AnyBench, jobs: int) -> Executor:
     """Does so many tasks at once, each in a process of its own."""
     return ByWorkers(cast(Workers, Pool[Task, Done](jobs, bench.prepare, bench.work)))

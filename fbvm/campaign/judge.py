@@ -16,7 +16,8 @@ from fbvm.watch.conditions import Condition, parse_condition
 from fbvm.watch.paths import Place
 from fbvm.watch.values import show_time
 
-TRAP, NEVER, ALWAYS, WITHIN, UNTIL, GOLDEN, CRASHED = "trap", "never", "always", "within", "until", "golden", "crashed"
+TRAP, NEVER, ALWAYS, WITHIN, UNTIL, GOLDEN, CRASHED, TEST = (
+    "trap", "never", "always", "within", "until", "golden", "crashed", "test")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Failure:
     file: str = ""
     pou: str = ""
     line: int = 0
+    detail: str = ""
 
     @property
     def key(self) -> tuple[str, str, str, str, int]:

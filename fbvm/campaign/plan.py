@@ -100,7 +100,8 @@ class Judging:
 class Plan:
     """A campaign over a project: `runs` runs, drawn by `seed`; 0 runs are one of each combination of the values.
 
-    `shown` are places whose values behind the last scan are results; with `alone` names need no name of a PLC before them."""
+    `shown` are places whose values behind the last scan are results; with `alone` names need no name of a PLC before them.
+    `tests` are executed in place of the project, which is empty then: arguments of pytest."""
 
     project: Project
     seed: int = 0
@@ -112,6 +113,7 @@ class Plan:
     cuts: tuple[PowerRule, ...] = ()
     judging: Judging = field(default_factory=Judging)
     shown: tuple[str, ...] = ()
+    tests: tuple[str, ...] = ()
 
     @property
     def combinations(self) -> int:

@@ -74,6 +74,7 @@ CHOSEN: Keys = {name: Key(one_or_more(key.kind), f"{key.meaning}  One is drawn."
 CAMPAIGN: Keys = {
     "project": Key(text, "The project, from the folder of this file; \"fbvm.toml\" if neither it nor sources are there.", None),
     "sources": Key(texts, "In place of a project: the source files of one PLC.", None),
+    "tests": Key(texts, "In place of a project: tests, as pytest names them, from the folder of this file.", ()),
     "program": Key(text, "With sources: the PROGRAM to run.", None),
     "dialect": Key(one_of(tuple(DIALECTS)), "With sources: the dialect.", None),
     "libraries": Key(texts, "With sources: folders of blocks.", ()),
@@ -167,6 +168,8 @@ def read_plan_file(path: Path) -> Written | list[Diagnostic]:
     )
     if made.about["sources"] and made.about["project"]:
         reading.report("P0103", ("campaign", "sources"), "a campaign runs sources or a project, not both")
+    if made.about["tests"] and (made.about["sources"] or made.about["project"]):
+        reading.report("P0103", ("campaign", "tests"), "a campaign executes tests, or runs sources or a project: one of them")
     return sorted(reading.diagnostics, key=Diagnostic.order) if errors(reading.diagnostics) else made
 
 

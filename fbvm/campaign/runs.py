@@ -11,11 +11,9 @@ from fbvm.campaign.groups import Group, grouped
 from fbvm.campaign.judge import CRASHED, Failure
 from fbvm.campaign.plan import Plan
 from fbvm.campaign.shrinking import Shrunk
-from fbvm.campaign.work import Batch, Bench, Shrinking, Task
+from fbvm.campaign.work import AnyBench, Batch, Shrinking, Task
 from fbvm.run.time_limit import stopwatch
 
-BATCH_NS = 200_000_000
-"""About how long a batch takes; to send one costs half a millisecond."""
 MOST_IN_BATCH = 500
 QUICK_NS = 1_000_000_000
 """What takes less time is done in this process: others take about as long to begin."""
@@ -58,7 +56,7 @@ class Outcome:
         return [number for number in range(self.plan.count) if number not in self.results]
 
 
-def conduct(bench: Bench, outcome: Outcome, jobs: int, take: Callable[[Sequence[Result]], None],
+def conduct(bench: AnyBench, outcome: Outcome, jobs: int, take: Callable[[Sequence[Result]], None],
             others: Executor | None = None, *, shrinks: bool = True) -> None:  # fmt: skip
     """Executes the runs that have no result in `outcome`; then, if it `shrinks`, makes the first run of each group of failures
     smaller.
@@ -76,7 +74,7 @@ def conduct(bench: Bench, outcome: Outcome, jobs: int, take: Callable[[Sequence[
         others, size = InThisProcess(bench), 1
     else:
         others = others or in_processes(bench, jobs)
-        size = max(1, min(BATCH_NS // max(once_ns, 1), MOST_IN_BATCH, len(left) // jobs))
+        size = max(1, min(bench.batch_ns // max(once_ns, 1), MOST_IN_BATCH, len(left) // jobs))
     with others:
         _execute(others, left, size, take)
         if shrinks:

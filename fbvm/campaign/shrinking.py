@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
-from fbvm.campaign.execution import Execution, Result
+from fbvm.campaign.execution import Result
 from fbvm.campaign.judge import Failure
 from fbvm.campaign.plan import EXACT
 from fbvm.campaign.variants import STEP_NS, Variant
@@ -29,7 +30,14 @@ class Shrunk:
     tries: int
 
 
-def shrink(execution: Execution, variant: Variant, result: Result) -> Shrunk:
+class Executes(Protocol):
+    """What executes runs."""
+
+    def result(self, variant: Variant) -> Result:
+        """What comes of a run."""
+
+
+def shrink(execution: Executes, variant: Variant, result: Result) -> Shrunk:
     """The smallest run with a failure of the same group as that of `variant`, whose result is `result`."""
     assert result.failure
     search = _Search(execution, result.failure, Shrunk(variant, result, 0))
@@ -46,7 +54,7 @@ def shrink(execution: Execution, variant: Variant, result: Result) -> Shrunk:
 
 @dataclass
 class _Search:
-    execution: Execution
+    execution: Executes
     failure: Failure
     best: Shrunk
     tries: int = 0

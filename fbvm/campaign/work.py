@@ -7,11 +7,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 from fbvm.base.version import VERSION
 from fbvm.campaign.execution import Execution, Result
 from fbvm.campaign.plan import Plan
-from fbvm.campaign.shrinking import Shrunk, shrink
+from fbvm.campaign.shrinking import Executes, Shrunk, shrink
 from fbvm.campaign.variants import Variant, draw
 from fbvm.code.image import Image
 from fbvm.code.store.encoding import decode, encode
@@ -43,6 +44,37 @@ class Unreachable(Exception):
     """There is no such cluster, it has no workers, or it has gone; the message says which."""
 
 
+BATCH_NS = 200_000_000
+"""About how long a batch takes; to send one costs half a millisecond."""
+
+
+class AnyBench(Protocol):
+    """What does tasks in a process: it has all that this needs, but for what lies in a folder."""
+
+    @property
+    def plan(self) -> Plan: ...
+
+    @property
+    def mark(self) -> str:
+        """A hash of all that results depend on."""
+
+    @property
+    def batch_ns(self) -> int:
+        """About how long a batch takes."""
+
+    def prepare(self, number: int) -> None:
+        """Makes a process ready."""
+
+    def execution(self) -> Executes:
+        """What executes runs in this process."""
+
+    def variant(self, number: int) -> Variant:
+        """The run with this number."""
+
+    def work(self, number: int, task: Task) -> Done:
+        """Does a task."""
+
+
 @dataclass(frozen=True)
 class Bench:
     """All that a process needs: the plan, the programs as bytes with their fingerprints by name, and the version of fbvm."""
@@ -52,6 +84,7 @@ class Bench:
     version: str
     mark: str
     """A hash of all that results depend on."""
+    batch_ns: int = BATCH_NS
 
     @classmethod
     def of(cls, plan: Plan, images: Mapping[str, Image]) -> Bench:

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -15,12 +14,10 @@ import pytest
 from fbvm.base.files import write_file
 from fbvm.campaign.mutation.equivalence import proof_of_equality
 from fbvm.campaign.mutation.mutants import EQUAL, INVALID, KILLED, SURVIVED, Mutant
+from fbvm.campaign.pytest_session import run_pytest
 from fbvm.code.image import Image
 from fbvm.testing.subject import SubjectError, subject
 
-PLUGIN = "fbvm.testing.plugin"
-QUIET = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:unraisableexception", "--fbvm-pages", "0")
-"""Options of pytest: it writes no files, and does not look through all objects at its end, which takes as long as quick tests."""
 FAILED, GOOD, NO_TESTS = 1, 0, 5
 """Exit statuses of pytest."""
 
@@ -127,16 +124,7 @@ class _First:
 
 
 def run_tests(arguments: Sequence[str]) -> tuple[int, str]:
-    """Runs pytest in the present folder and process until a test fails: its status, and the name of that test.
-
-    Modules of the folder are forgotten afterwards, since they may hold programs that were compiled from what it held."""
-    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
-    first, path, folder = _First(), list(sys.path), f"{Path.cwd()}{os.sep}"
-    try:
-        status = pytest.main([*QUIET, *([] if installed else ["-p", PLUGIN]), *arguments], [first])
-    finally:
-        sys.path[:] = path
-        for name, module in list(sys.modules.items()):
-            if str(vars(module).get("__file__")).startswith(folder):
-                del sys.modules[name]
-    return int(status), first.failed
+    """Runs pytest in the present folder and process until a test fails: its status, and the name of that test."""
+    first = _First()
+    status = run_pytest(["-x", *arguments], [first])
+    return status, first.failed

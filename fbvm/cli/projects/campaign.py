@@ -13,6 +13,7 @@ import click
 import fbvm
 from fbvm.cli.projects.cluster import cluster_of, cluster_option
 from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
+from fbvm.cli.projects.runs_of_tests import bench_of_tests, record_test, travelling
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.options import moment_ns
@@ -21,15 +22,15 @@ from fbvm.cli.shared.run_recording import record_plant
 from fbvm.cli.shared.terminal import named, say, say_json
 
 if TYPE_CHECKING:
-    from fbvm.campaign.execution import Execution, Result
+    from fbvm.campaign.execution import Result
     from fbvm.campaign.groups import Group
+    from fbvm.campaign.plan import Plan
     from fbvm.campaign.plan_file import Written
     from fbvm.campaign.runs import Outcome
     from fbvm.campaign.store import Store
     from fbvm.campaign.variants import Variant
-    from fbvm.campaign.work import Bench
+    from fbvm.campaign.work import AnyBench, Bench
     from fbvm.run.plant import Plant
-    from fbvm.run.project import Project
 
 MOST_GROUPS = 20
 """Groups that are printed."""
@@ -56,26 +57,26 @@ FOLDER = Path("campaign-results")
 @click.option("--write-golden", is_flag=True, help="Write golden files, from a run with the first values and without faults.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], as_json: bool, **options: Any) -> None:
-    """Run a program or a project many times, each time under other faults and parameters, in virtual time on all processors.
+    """Run a program, a project or tests many times, each time under other faults and parameters, in virtual time on all
+    processors.
 
-    PROJECT is a folder with an fbvm.toml, CAMPAIGN a file with a table [campaign], or a folder with campaign.toml.  A run fails
-    by a trap, and by what --never, --always, --within and --until, or the campaign file, ask for.  Failing runs are grouped by
-    what failed and where, and of each group one run is made as small as possible and recorded.
+    PROJECT is a folder with an fbvm.toml, CAMPAIGN a file with a table [campaign], or a folder with campaign.toml, TEST a file of
+    pytest or FILE::NAME.  A test judges itself; another run fails by a trap, and by what --never, --always, --within and
+    --until, or the campaign file, ask for.  Failing runs are grouped by what failed and where, and of each group one run is made
+    as small as possible and recorded.
 
     Status 0 if all runs were good, 1 if some failed, 3 if the program has errors, 5 if the cluster cannot be used."""
     check_parquet(options)
-    plan, images, home = planned(files, program, libraries, options, lambda written, project: _changed(written, project, options))
+    bench, home = bench_of_tests(files, options, _changed) or _bench(files, program, libraries, options)
     from fbvm.campaign.execution import Wrong
-    from fbvm.campaign.planning import unfit_conditions
     from fbvm.campaign.runs import Outcome
     from fbvm.campaign.store import Store
     from fbvm.campaign.work import Bench, Mismatch, Unreachable
 
-    for message in unfit_conditions(plan):
-        say(message, fg="yellow", err=True)
-    bench, outcome = Bench.of(plan, images), Outcome(plan)
+    outcome = Outcome(bench.plan)
     try:
         if options["write_golden"]:
+            assert isinstance(bench, Bench)
             _write_golden(bench, home)
             return
         if options["only"] is not None:
@@ -97,13 +98,26 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     sys.exit(status.FAILED if outcome.failing else status.GOOD)
 
 
-def _changed(written: Written, project: Project, options: dict[str, Any]) -> Written:
-    """What a file says, with the options of this verb."""
+def _bench(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...],
+           options: dict[str, Any]) -> tuple[Bench, Path]:  # fmt: skip
+    """The bench of a campaign over a program or a project, and the folder to which golden files are relative."""
+    plan, images, home = planned(files, program, libraries, options,
+                                 lambda written, project: _changed(written, project.for_ns, options))  # fmt: skip
+    from fbvm.campaign.planning import unfit_conditions
+    from fbvm.campaign.work import Bench
+
+    for message in unfit_conditions(plan):
+        say(message, fg="yellow", err=True)
+    return Bench.of(plan, images), home
+
+
+def _changed(written: Written, usual_ns: int | None, options: dict[str, Any]) -> Written:
+    """What a file says, with the options of this verb; `usual_ns` is how long a run takes if neither says it."""
     from fbvm.campaign.plan import Response
     from fbvm.campaign.plan_file import any_cuts, any_faults, with_about
 
     about = written.about
-    for_ns = about["for"] or project.for_ns
+    for_ns = about["for"] or usual_ns
     if (options["faults"] or options["cuts"]) and for_ns is None:
         raise click.UsageError("say how long a run takes at most, by --for: faults come at any time of it")
     responses = [Response(trigger, answer, moment_ns(limit)) for trigger, answer, limit in options["within"]]
@@ -128,7 +142,7 @@ def _open(make: type[Store], folder: Path, mark: str, fresh: bool) -> Store:
             raise click.UsageError(f"{named(folder)} {error}: name another folder by --out, or begin anew by --fresh") from None
 
 
-def _conduct(bench: Bench, outcome: Outcome, store: Store, jobs: int, cluster: str | None) -> None:
+def _conduct(bench: AnyBench, outcome: Outcome, store: Store, jobs: int, cluster: str | None) -> None:
     """Executes what is left of a campaign, and shows how it goes."""
     from fbvm.campaign.executors import ByWorkers
     from fbvm.campaign.runs import conduct
@@ -145,13 +159,13 @@ def _conduct(bench: Bench, outcome: Outcome, store: Store, jobs: int, cluster: s
             rate = (done - there) * 1_000_000_000 / max(elapsed(), 1)
             update(f"{done:,} of {known:,} runs, {outcome.failing:,} failing, {rate:.0f} a second,", done, known)
 
-        conduct(bench, outcome, jobs, take, ByWorkers(cluster_of(bench, cluster, jobs)) if cluster else None)
+        conduct(bench, outcome, jobs, take, ByWorkers(cluster_of(travelling(bench), cluster, jobs)) if cluster else None)
 
 
 # --- what is left behind ----------------------------------------------------------------------------------------------
 
 
-def _finish(bench: Bench, outcome: Outcome, options: dict[str, Any], as_json: bool) -> None:
+def _finish(bench: AnyBench, outcome: Outcome, options: dict[str, Any], as_json: bool) -> None:
     """Writes table and recordings, and prints what came of the campaign, also of one that was interrupted."""
     from fbvm.campaign.store import TABLE, write_table
 
@@ -165,7 +179,7 @@ def _finish(bench: Bench, outcome: Outcome, options: dict[str, Any], as_json: bo
     for number, group in enumerate(outcome.groups):
         if group.shrunk:
             recordings[group.first] = path = folder / f"{number + 1}.fbtrace"
-            again = _recorded(bench.execution(), group.shrunk.variant, path)
+            again = _recorded(bench, group.shrunk.variant, path)
             if again != group.shrunk.result:
                 say(f"{named(path)}: run {group.first} did not give the same result again", fg="red", err=True)
     if as_json:
@@ -174,11 +188,15 @@ def _finish(bench: Bench, outcome: Outcome, options: dict[str, Any], as_json: bo
         _print(outcome, recordings)
 
 
-def _recorded(execution: Execution, variant: Variant, path: Path) -> Result:
+def _recorded(bench: AnyBench, variant: Variant, path: Path) -> Result:
     """Executes a run and records it in a file.  Returns its result, with the line of its failure."""
+    from fbvm.campaign.execution import Execution
     from fbvm.record.recording.file_writer import RecordingWriter
     from fbvm.record.recording.recording import Recording
 
+    execution = bench.execution()
+    if not isinstance(execution, Execution):
+        return record_test(bench, variant, path)[0]
     about = {"options": {"run": variant.number, "seed": variant.seed}}
     with writing(path), growing_file(path) as file:
 
@@ -212,7 +230,7 @@ def _about(outcome: Outcome, group: Group, recordings: dict[int, Path]) -> list[
 
     plan = outcome.plan
     variant = group.shrunk.variant if group.shrunk else draw(plan, group.first)
-    parts = [*(f"{axis.name} = {axis.text(variant.value(plan, at))}" for at, axis in enumerate(plan.axes)),
+    parts = [*_values(plan, variant),
              *map(str, variant.faults), *map(str, variant.cuts), *(["late units"] * (variant.timing == "real"))]  # fmt: skip
     failure = group.shrunk.result.failure if group.shrunk else group.failure
     assert failure
@@ -220,10 +238,20 @@ def _about(outcome: Outcome, group: Group, recordings: dict[int, Path]) -> list[
              f"fails in scan {failure.scan} of {failure.plc}"]  # fmt: skip
     if common := in_common(plan, group, outcome.results):
         lines.append(f"all of them, and not all others, have {', '.join(common)}")
-    if path := recordings.get(group.first):
+    if failure.detail:
+        lines.append(failure.detail)
+    path = recordings.get(group.first)
+    if plan.tests:
+        lines.append(f"fbvm step {named(path)}" if path and path.exists() else f"the same command with --only {group.first}")
+    elif path:
         which = f" --plc {failure.plc}" if len(plan.project.plcs) > 1 else ""
         lines.append(f"fbvm replay {named(path)}{which}")
     return lines
+
+
+def _values(plan: Plan, variant: Variant) -> list[str]:
+    """The parameters of a run."""
+    return [f"{axis.name} = {axis.text(variant.value(plan, at))}" for at, axis in enumerate(plan.axes)]
 
 
 def _as_dict(outcome: Outcome, recordings: dict[int, Path]) -> dict[str, Any]:
@@ -245,24 +273,26 @@ def _group_as_dict(outcome: Outcome, group: Group, recordings: dict[int, Path]) 
         "first": group.first, "seed": variant.seed, "common": in_common(plan, group, outcome.results),
         "values": {axis.name: variant.value(plan, at) for at, axis in enumerate(plan.axes)},
         "faults": list(map(str, variant.faults)), "power": list(map(str, variant.cuts)), "timing": variant.timing,
-        "shrunk": group.shrunk is not None, "recording": str(path) if path else None,
+        "shrunk": group.shrunk is not None, "recording": str(path) if path and path.exists() else None,
     }  # fmt: skip
 
 
 # --- one run ----------------------------------------------------------------------------------------------------------
 
 
-def _execute_one(bench: Bench, number: int, folder: Path) -> int:
+def _execute_one(bench: AnyBench, number: int, folder: Path) -> int:
     """Executes one run, records it and prints what came of it; returns the exit status."""
     if number >= bench.plan.count:
         raise click.UsageError(f"--only {number}: there are runs 0 to {bench.plan.count - 1}")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     variant, path = bench.variant(number), folder / f"run{number}.fbtrace"
-    result = _recorded(bench.execution(), variant, path)
-    for fault in (*variant.faults, *variant.cuts):
-        say(str(fault))
-    say(f"run {number}: {result.failure or 'good'}; recorded in {named(path)}")
+    result, report = record_test(bench, variant, path) if bench.plan.tests else (_recorded(bench, variant, path), "")
+    for line in (*_values(bench.plan, variant), *variant.faults, *variant.cuts):
+        say(str(line))
+    if result.failure and report:
+        say(report)
+    say(f"run {number}, seed {variant.seed}: {result.failure or 'good'}{f'; recorded in {named(path)}' * path.exists()}")
     return status.FAILED if result.failure else status.GOOD
 
 

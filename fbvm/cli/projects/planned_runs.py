@@ -28,10 +28,27 @@ if TYPE_CHECKING:
 OUTPUT = click.Path(dir_okay=False, path_type=Path)
 
 
+class RunPath(SourcePath):
+    """A source, a folder or a file of settings, or tests as pytest names them: FILE::TEST."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path; of a test with its name.  Raises BadParameter."""
+        file, mark, _ = str(value).partition("::")
+        if not mark:
+            return super().convert(value, param, ctx)
+        super().convert(file, param, ctx)
+        return Path(value)
+
+
+def tests_among(files: Sequence[Path]) -> list[str]:
+    """The arguments that are tests: files of Python, and names of tests."""
+    return [str(file) for file in files if file.suffix == ".py" or "::" in str(file)]
+
+
 def plan_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """What is run, for how long, what is varied and shown, and by how many processes."""
     for decorate in (
-        click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | CAMPAIGN]", type=SourcePath(), callback=taken_folders),
+        click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | CAMPAIGN | TEST...]", type=RunPath(), callback=taken_folders),
         source_options,
         cycle_option,
         click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=peer",
@@ -57,35 +74,44 @@ def processes(jobs: int | None) -> int:
     return jobs or os.cpu_count() or 1
 
 
-def planned(files: Sequence[Path], program: str | None, libraries: Sequence[Path], options: dict[str, Any],
-            change: Callable[[Written, Project], Written]) -> tuple[Plan, dict[str, Image], Path]:  # fmt: skip
-    """The plan that arguments and options say, the compiled programs, and the folder to which golden files are relative.
+def written_plan(files: Sequence[Path], options: dict[str, Any]) -> tuple[Written, Path | None]:
+    """What the campaign file says that the arguments name, with the options of all verbs; and that file.
 
-    `change` adds what only one verb has.  Ends the verb with status 3 for errors in files and programs."""
+    Ends the verb with status 3 for errors in the file.  Raises ValueError."""
     from fbvm.campaign.axes import axis_from_text
-    from fbvm.campaign.execution import Wrong
     from fbvm.campaign.plan_file import FILE, Written, is_campaign, read_plan_file, with_about
-    from fbvm.campaign.planning import Unfit, images_of, plan_of, program_project
 
     written, where = Written(), _plan_file(files, FILE, is_campaign)
-    folder = where.parent if where else Path()
     if where:
         read = read_plan_file(where)
         if not isinstance(read, Written):
             refuse(read)
         written = read
-    elif files and project_argument(tuple(files)) is None:
-        written = with_about(written, sources=tuple(map(str, files)), program=program, cycle=options["cycle_ns"],
-                             libraries=tuple(map(str, libraries)), dialect=compile_options(files)["dialect"])  # fmt: skip
+    axes = [axis_from_text(text) for text in options["varied"]]
+    if any(row.host is not None for row in options["mappings"]):
+        raise click.UsageError("runs are in memory: write --map IP:PORT=peer")
+    servers = (*written.about["servers"], *(row.endpoint for row in options["mappings"]))
+    given = {"for": options["for_ns"], "until": options["until"], "seed": options["seed"]}
+    written = with_about(written, servers=servers, show=(*written.about["show"], *options["shown"]),
+                         **{name: value for name, value in given.items() if value is not None})  # fmt: skip
+    return replace(written, axes=(*written.axes, *axes)), where
+
+
+def planned(files: Sequence[Path], program: str | None, libraries: Sequence[Path], options: dict[str, Any],
+            change: Callable[[Written, Project], Written]) -> tuple[Plan, dict[str, Image], Path]:  # fmt: skip
+    """The plan that arguments and options say, the compiled programs, and the folder to which golden files are relative.
+
+    `change` adds what only one verb has.  Ends the verb with status 3 for errors in files and programs."""
+    from fbvm.campaign.execution import Wrong
+    from fbvm.campaign.plan_file import with_about
+    from fbvm.campaign.planning import Unfit, images_of, plan_of, program_project
+
     try:
-        axes = [axis_from_text(text) for text in options["varied"]]
-        if any(row.host is not None for row in options["mappings"]):
-            raise click.UsageError("runs are in memory: write --map IP:PORT=peer")
-        servers = (*written.about["servers"], *(row.endpoint for row in options["mappings"]))
-        given = {"for": options["for_ns"], "until": options["until"], "seed": options["seed"]}
-        written = with_about(written, servers=servers, show=(*written.about["show"], *options["shown"]),
-                             **{name: value for name, value in given.items() if value is not None})  # fmt: skip
-        written = replace(written, axes=(*written.axes, *axes))
+        written, where = written_plan(files, options)
+        folder = where.parent if where else Path()
+        if not where and files and project_argument(tuple(files)) is None:
+            written = with_about(written, sources=tuple(map(str, files)), program=program, cycle=options["cycle_ns"],
+                                 libraries=tuple(map(str, libraries)), dialect=compile_options(files)["dialect"])  # fmt: skip
         if written.about["sources"]:
             project = program_project([folder / name for name in written.about["sources"]], written.about, folder)
         else:

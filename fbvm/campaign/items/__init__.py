@@ -1,0 +1,1 @@
+"""Campaigns over tests: pytest executes the same tests again and again, each time under other conditions."""

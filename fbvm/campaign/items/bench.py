@@ -1,0 +1,90 @@
+"""What a process does for a campaign over tests: executes batches of runs in the folder of the project."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fbvm.base.diagnostics import Source
+from fbvm.base.version import VERSION
+from fbvm.campaign.items.execution import ItemsExecution, ItemsSession
+from fbvm.campaign.plan import Plan
+from fbvm.campaign.plan_file import Written
+from fbvm.campaign.planning import Unfit
+from fbvm.campaign.project_copies import files_of
+from fbvm.campaign.shrinking import Shrunk, shrink
+from fbvm.campaign.variants import Variant, draw
+from fbvm.campaign.work import Batch, Done, Task
+from fbvm.run.project import FILE, Project
+
+READ = (".py", ".st", ".toml", ".ini", ".cfg", ".txt", ".xml")
+"""Endings of the files that tests may depend on: sources, settings, golden traces."""
+BATCH_NS = 8_000_000_000
+"""About how long a batch takes: to start pytest takes up to a second."""
+
+
+@dataclass(frozen=True)
+class ItemsBench:
+    """All that a process needs: the plan, and the folder in which it executes the tests."""
+
+    plan: Plan
+    folder: str
+    mark: str
+    """A hash of all that results depend on."""
+    batch_ns: int = BATCH_NS
+
+    @classmethod
+    def of(cls, plan: Plan, folder: Path) -> ItemsBench:
+        """The bench of a campaign over the tests of a project.  Raises OSError."""
+        depends = hashlib.sha256(repr((VERSION, plan)).encode())
+        for file in sorted(file for file in files_of(folder) if file.suffix.lower() in READ):
+            depends.update(repr((file.as_posix(), (folder / file).read_bytes())).encode())
+        return cls(plan, str(folder), depends.hexdigest())
+
+    def in_folders(self, folders: Sequence[str]) -> ItemsBench:
+        """The same in another copy of the project."""
+        return replace(self, folder=folders[0])
+
+    def prepare(self, number: int) -> None:
+        """Makes a process ready."""
+        sys.dont_write_bytecode = True
+
+    def execution(self) -> ItemsExecution:
+        """What executes runs in this process."""
+        return ItemsExecution(self.plan, self.folder)
+
+    def variant(self, number: int) -> Variant:
+        """The run with this number."""
+        return draw(self.plan, number)
+
+    def work(self, number: int, task: Task) -> Done:
+        """Does a task.  Raises NoTests."""
+        if isinstance(task, Batch):
+            return self.execution().results([self.variant(run) for run in task.numbers])
+
+        def smaller(session: ItemsSession) -> Shrunk:
+            return shrink(session, self.variant(task.result.number), task.result)
+
+        return self.execution().within(smaller)
+
+
+def plan_of_tests(written: Written, tests: Sequence[str]) -> Plan:
+    """The plan of a campaign over tests, as pytest names them.  Raises Unfit for what only programs and projects have."""
+    about = written.about
+    if said := next(_of_programs(written), ""):
+        raise Unfit(f"tests judge themselves: leave out {said}")
+    axes = tuple(replace(axis, path=axis.path or axis.name) for axis in written.axes)
+    cuts = tuple(replace(rule, plcs=rule.plcs or ("",)) for rule in written.cuts)
+    nothing = Project(Source(FILE, ""), "loop", 0, None, None, (), (), frozenset(), (), ())
+    return Plan(nothing, about["seed"], about["runs"], about["timing"], about["for"], axes, written.faults, cuts,
+                shown=about["show"], tests=tuple(tests))  # fmt: skip
+
+
+def _of_programs(written: Written) -> Iterator[str]:
+    about, judging = written.about, written.judging
+    yield from (name for name in ("never", "always", "until") if about[name])
+    yield from ["within"] * bool(judging.responses) + ["golden"] * bool(judging.goldens)
+    yield from (name for name in ("project", "sources", "program", "dialect", "libraries", "servers") if about[name])

@@ -1,0 +1,144 @@
+"""Campaigns over tests: what is varied reaches every PLC that a test makes, and each failing run is known and done again."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.campaign.items.bench import ItemsBench
+from fbvm.cli.main import main
+from fbvm.net.faults import fault
+from fbvm.run.varied import Conditions, PowerCut, VariedRun, Written
+from fbvm.testing.plant_rig import PlantRig
+from fbvm.testing.rig import Rig
+
+COUNTER = """FUNCTION_BLOCK Counter
+VAR_INPUT Step : INT := 1; END_VAR
+VAR_OUTPUT Total, Scans : INT; END_VAR
+VAR a : ARRAY[0..20] OF INT; END_VAR
+    Scans := Scans + 1;
+    Total := Total + Step;
+    a[Total] := 1;
+END_FUNCTION_BLOCK
+"""
+TESTS = """def test_it_counts(fb):
+    counter = fb("src/Counter.st")
+    counter.run(scans=5)
+    assert counter.Total < 15
+
+
+def test_it_scans(fb):
+    assert fb("src/Counter.st").run("50ms").Scans < 6
+"""
+ST_TEST = "PROGRAM Test_of_st\nVAR Limit : INT := 5; c : Counter; END_VAR\nc();\nASSERT(c.Total < Limit);\nEND_PROGRAM\n"
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    files = {"src/Counter.st": COUNTER, "tests/test_counter.py": TESTS, "tests/test_st.st": ST_TEST, "pytest.ini": "[pytest]\n"}
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def fbvm(*arguments: str) -> tuple[int, str]:
+    result = CliRunner().invoke(main, ["campaign", *arguments])
+    return result.exit_code, result.stdout if result.exit_code < 2 else result.stderr
+
+
+@pytest.mark.slow
+def test_failing_runs_of_tests_are_grouped_and_each_is_done_again_by_its_number(project: Path) -> None:
+    status, said = fbvm("tests/test_counter.py", "--vary", "Step=1,2,3,9", "--vary", "cycle=10ms,5ms", "--json", "--jobs", "1")
+    found = {(group["kind"], group["file"], group["line"]): group for group in json.loads(said)["groups"]}
+    counts, scans = (("test", "tests/test_counter.py", line) for line in (4, 8))
+    trap = ("trap", "src/Counter.st", 7)
+    assert (status, {key: group["runs"] for key, group in found.items()}) == (1, {counts: 2, trap: 2, scans: 2})
+    assert found[counts]["values"] == {"Step": 3, "cycle": 10_000_000}
+    assert found[counts]["detail"] == "AssertionError: assert 15 < 15"
+    assert [found[scans]["first"], found[trap]["first"]] == [1, 6]
+    assert Path(found[trap]["recording"]).is_file()
+    rows = list(csv.DictReader(Path("campaign-results/results.csv").read_text().splitlines()))
+    status, said = fbvm("tests/test_counter.py", "--vary", "Step=1,2,3,9", "--vary", "cycle=10ms,5ms", "--only", "4")
+    assert (status, rows[4]["scan"]) == (1, "4")
+    assert ">       assert counter.Total < 15" in said
+    assert f"run 4, seed {rows[4]['seed']}: test tests/test_counter.py::test_it_counts (tests/test_counter.py:4)" in said
+
+
+@pytest.mark.slow
+def test_a_test_in_st_is_varied_and_its_line_told(project: Path) -> None:
+    status, said = fbvm("tests/test_st.st::Test_of_st", "--vary", "Limit=5,1", "--jobs", "1", "--json")
+    [group] = json.loads(said)["groups"]
+    assert (status, group["first"], group["file"], group["line"]) == (1, 1, "tests/test_st.st", 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("arguments", "said"), [
+    (("tests/test_counter.py", "--vary", "Foo=1,2"), "no PLC that these tests make has Foo"),
+    (("tests/test_counter.py", "--never", "Total > 3"), "tests judge themselves: leave out never"),
+    (("tests/test_counter.py", "--cycle", "5ms"), "tests say themselves what they run: leave out --cycle"),
+    (("tests/test_counter.py", "src/Counter.st"), "name tests, or programs, not both"),
+    (("tests/test_counter.py::test_nothing",), "not found"),
+])  # fmt: skip
+def test_what_tests_cannot_have_is_refused(project: Path, arguments: tuple[str, ...], said: str) -> None:
+    status, text = fbvm(*arguments)
+    assert (status, said in text) == (2, True), text
+
+
+def test_results_of_tests_belong_to_the_files_that_they_read(project: Path) -> None:
+    from fbvm.campaign.items.bench import plan_of_tests
+    from fbvm.campaign.plan_file import Written as InFile
+
+    plan = plan_of_tests(InFile(), ["tests/test_counter.py"])
+    before = ItemsBench.of(plan, project).mark
+    (project / "results.csv").write_text("1,2")
+    assert ItemsBench.of(plan, project).mark == before
+    (project / "src" / "Counter.st").write_text(COUNTER.replace(":= 1;", ":= 2;", 1))
+    assert ItemsBench.of(plan, project).mark != before
+
+
+# --- what is varied ---------------------------------------------------------------------------------------------------
+
+KEEPS = """PROGRAM Main
+VAR n : INT; limit : INT := 3; END_VAR
+VAR RETAIN kept : INT; END_VAR
+    n := n + 1; kept := kept + 1;
+END_PROGRAM
+"""
+
+
+def test_power_is_cut_and_comes_back_while_time_goes_on(project: Path) -> None:
+    (project / "keeps.st").write_text(KEEPS)
+    run = VariedRun(Conditions(written=(Written("limit", 7),), cuts=(PowerCut("", 35_000_000, 50_000_000),)))
+    rig = Rig.of("keeps.st", block=False, varied=run)
+    rig.run("60ms")  # four scans, then it is off from 40 to 85 ms, and one scan follows
+    assert (rig.elapsed_ns, rig["n"], rig["kept"], rig["limit"]) == (95_000_000, 1, 5, 7)
+    assert run.used == {"limit"}
+
+
+def test_a_value_may_be_written_later_and_a_cycle_be_another(project: Path) -> None:
+    (project / "keeps.st").write_text(KEEPS)
+    run = VariedRun(Conditions(written=(Written("limit", "INT#9", 25_000_000),), cycles_ns=(("", 5_000_000),),
+                               phases_ns=(("", 12_000_000),)))  # fmt: skip
+    rig = Rig.of("keeps.st", block=False, varied=run)
+    rig.run("10ms")
+    assert (rig["n"], rig["limit"]) == (2, 3)  # at 12 and 17 ms
+    assert rig.run("10ms")["limit"] == 9
+
+
+def test_plcs_of_a_plant_are_varied_by_their_names(project: Path) -> None:
+    (project / "keeps.st").write_text(KEEPS)
+    (project / "fbvm.toml").write_text("".join(f'[plc.{name}]\nsources = ["keeps.st"]\n' for name in ("one", "two")))
+    one = PowerCut("one", 30_000_000, 40_000_000)
+    run = VariedRun(Conditions(written=(Written("two.Main.limit", 5),), cycles_ns=(("two", 20_000_000),), cuts=(one,),
+                               faults=(fault("silent"),)))  # fmt: skip
+    plant = PlantRig(project / "fbvm.toml", varied=run)
+    plant.run("100ms")
+    found = [(rig["kept"], rig["limit"], rig.plc.cycle_ns) for rig in plant.rigs.values()]
+    assert found == [(6, 3, 10_000_000), (5, 5, 20_000_000)]
+    assert plant.network.faults == [fault("silent")]
