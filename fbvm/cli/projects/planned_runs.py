@@ -48,7 +48,8 @@ def tests_among(files: Sequence[Path]) -> list[str]:
 def plan_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """What is run, for how long, what is varied and shown, and by how many processes."""
     for decorate in (
-        click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | CAMPAIGN | TEST...]", type=RunPath(), callback=taken_folders),
+        click.argument("files", nargs=-1, metavar="[FILE... | PROJECT | CAMPAIGN | TEST...]", type=RunPath(),
+                       callback=taken_folders),
         source_options,
         cycle_option,
         click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=peer",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
+from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, tests_among, write_results
 from fbvm.cli.shared import status
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.terminal import say, say_json
@@ -29,6 +29,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     check_parquet(options)
     if not options["varied"]:
         raise click.UsageError("say what to vary: --vary Main.Gain=1,2,5")
+    if tests_among(files):
+        raise click.UsageError("sweep varies programs and projects; fbvm campaign varies tests")
     from fbvm.campaign.execution import Wrong
     from fbvm.campaign.plan_file import with_about
     from fbvm.campaign.runs import Outcome, conduct
