@@ -30,6 +30,7 @@ class Dialect:
     arithmetic_of_bits: bool = False
     integers_and_bits: bool = False
     numbers_of_enumerations: bool = False
+    members_as_numbers: bool = False
     number_times_duration: bool = False
     integers_are_nanoseconds: bool = False
     mixed_arguments: bool = False
@@ -101,6 +102,8 @@ QUESTIONS = {
                           "NOT of integers",
                           "an error that names the conversion", "converted as it stands if the width suffices; on their bits"),
     "numbers_of_enumerations": ("an enumeration as a number, < and > between its members", "an error", "its value"),
+    "members_as_numbers": ("TO_STRING of an enumeration", "the name of its member",
+                           "its number; the name where {attribute 'to_string'} stands in front of the type"),
     "number_times_duration": ("2 * T#5s", "an error: the TIME stands in front", "T#10s"),
     "integers_are_nanoseconds": ("T#1s + 5, T#1s - n: an integer beside a duration", "an error", "nanoseconds"),
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
@@ -196,8 +199,9 @@ QUESTIONS = {
 STANDARD = Dialect("standard", "the third edition, and CODESYS's answer where it is silent")
 _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made of it", ("codesys/blocks",), last_of_mux=True,
                    lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
-                   integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
-                   bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading",
+                   integers_and_bits=True, numbers_of_enumerations=True, members_as_numbers=True,
+                   number_times_duration=True, mixed_arguments=True, bare_actions=True, locals_are_read=True,
+                   programs_are_written=True, lenient_texts="leading",
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,

@@ -17,19 +17,30 @@ LISTED = 4
 
 
 def gathered(found: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """The messages, in their order; of those about one unknown name of a source the first, which names the other lines."""
+    """The messages, in their order; of those about one unknown name of a source the first, which names the other lines, and of
+    those about one unknown attribute the first of all sources."""
     places: dict[tuple[str, str, str], list[Diagnostic]] = defaultdict(list)
     for message in found:
-        if message.code in NAMES:
-            places[message.code, message.source.name, message.message].append(message)
+        if (key := _key(message)) is not None:
+            places[key].append(message)
     kept: list[Diagnostic] = []
     for message in found:
-        same = places.get((message.code, message.source.name, message.message), [])
-        if len(same) <= FEW:
+        key = _key(message)
+        same = places[key] if key is not None else []
+        if len(same) <= (FEW if message.code in NAMES else 1):
             kept.append(message)
-        elif message is same[0]:
+        elif message is same[0] and message.code in NAMES:
             kept.append(replace(message, hint=_with_lines(message.hint, same)))
+        elif message is same[0]:
+            kept.append(replace(message, hint=f"{message.hint}; it stands in {len(same)} places"))
     return kept
+
+
+def _key(message: Diagnostic) -> tuple[str, str, str] | None:
+    """What messages that say the same have in common; None for one that is always said."""
+    if message.code in NAMES:
+        return message.code, message.source.name, message.message
+    return (message.code, "", message.message) if message.code == "S0190" and "attribute '" in message.message else None
 
 
 def _with_lines(hint: str, same: Sequence[Diagnostic]) -> str:

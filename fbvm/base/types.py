@@ -141,6 +141,8 @@ class EnumType(Type):
     base: Elementary
     members: dict[str, int] = field(hash=False, compare=False)
     shown: dict[int, str] = field(hash=False, compare=False)
+    attributes: frozenset[str] = field(default=frozenset(), hash=False, compare=False, repr=False)
+    """Those of qualified_only, strict and to_string that its declaration has; of no use once a program is compiled."""
 
 
 @dataclass(frozen=True)

@@ -129,12 +129,25 @@ def _instance(scope: Scope, call: tree.Call, as_value: bool) -> Type | str | Non
                     "call one of its methods: name.method()")
         return None
     bound = PouCall(pou, call.callee, dynamic=objects.may_be_derived(scope, call.callee))
+    if not _may_call(scope, call.callee, bound):
+        return None
     variable = scope.facts.variables.get(call.callee)
     if variable is not None and variable.owner is not None:
         bound.tasked = variable.owner.tasked.get(variable)
     bind(scope, call, pou, bound)
     scope.facts.calls[call] = bound
     return ""
+
+
+def _may_call(scope: Scope, callee: tree.Expr, bound: PouCall) -> bool:
+    """False after a diagnostic if an attribute forbids to call the body of an instance by name."""
+    said = scope.context.attributes(bound.pou).get("no_explicit_call")
+    itself = callee.of if isinstance(callee, tree.Deref) else callee
+    if said is None or bound.dynamic or objects.is_self(scope, itself):
+        return True
+    scope.error("S1012", callee, f"the body of {bound.pou.name} is not called by name: {said or 'it has no_explicit_call'}",
+                "call its methods")
+    return False
 
 
 def _function(scope: Scope, call: tree.Call, generic: Pou, want: Type | None) -> Type | str | None:

@@ -21,14 +21,16 @@ from fbvm.base.hidden import ENDING
 from fbvm.base.types import BOOL, ArrayType, StructType, Type, fold
 from fbvm.check.symbols.config_facts import Run
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Pou, Variable, holds_block
+from fbvm.check.symbols.facts import PROGRAM_SLOT, Pou, Variable, holds_block
 from fbvm.syntax import tree
-from fbvm.syntax.st.pragmas import attributes_before
+from fbvm.syntax.st.pragmas import init_slot
 from fbvm.syntax.tree.node import changed
 
 INIT, AFTER, EXIT = "FB_init", "call_after_init", "FB_exit"
 """The phases: the method of that name, the methods with that attribute."""
 PHASES = (INIT, AFTER)
+LAST = "call_after_global_init_slot"
+"""The attribute of functions that are called behind all initialisation; methods with it are called in the phase AFTER."""
 INIT_KEY = fold(INIT)
 FLAGS = {INIT: ("bInitRetains", "bInCopyCode"), EXIT: ("bInCopyCode",)}
 """The inputs with which methods begin that the runtime system calls, and which it gives."""
@@ -63,18 +65,17 @@ def _has_own(context: Context, level: Pou, phase: str) -> bool:
     """True if a block itself, without what it extends, has something to construct."""
     key = level, phase
     if key not in context.constructing:
-        context.constructing[key] = bool(_called(level, phase)) or \
+        context.constructing[key] = bool(_called(context, level, phase)) or \
             any(constructs(context, variable.type, phase) for variable in _declared(level))
     return context.constructing[key]
 
 
-def _called(level: Pou, phase: str) -> list[Pou]:
+def _called(context: Context, level: Pou, phase: str) -> list[Pou]:
     """The methods of a block itself that a phase calls."""
     if phase != AFTER:
         return [level.methods[fold(phase)]] if fold(phase) in level.methods else []
-    if AFTER not in attributes_before(level.source.text, level.tree.start):
-        return []
-    return [method for key, method in level.methods.items() if AFTER in attributes_before(method.source.text, method.tree.start)
+    wanted = {LAST} | ({AFTER} if AFTER in context.attributes(level) else set())
+    return [method for key, method in level.methods.items() if wanted & context.attributes(method).keys()
             and (level.base is None or level.base.method(key) is None)]
 
 
@@ -244,7 +245,7 @@ def level_method(context: Context, level: Pou, phase: str) -> Pou:
         body += _of_kept(context, level, method_name, variables, phase)
     inputs: tuple[tree.VarSection, ...] = ()
     calls: list[tree.Statement] = []
-    for method in _called(level, phase):
+    for method in _called(context, level, phase):
         passed: list[tree.Argument] = []
         callee: tree.Expr = tree.NameRef(*at, method.tree.name.text)
         if phase == AFTER:
@@ -341,8 +342,9 @@ def construct_at_start(context: Context) -> None:
     source = Source(INIT, "{attribute 'hide'}\nFB_init of all instances")
     at = source.text.index("\n") + 1, len(source.text)
     if ending := _of_sources(context, (EXIT,)):
-        _check(context, ending, [_hidden("FUNCTION", ENDING, source, at, _calls(at, ending))])
-    if not (made := _of_sources(context, PHASES)):
+        _check(context, ending, [_hidden("FUNCTION", ENDING, source, at, _calls(at, [each.name for each in ending]))])
+    made, last = _of_sources(context, PHASES), _called_afterwards(context)
+    if not made and not last:
         return
     over = _flag("FB_init is over")
     flags, begins, ends = [over], [_set(at, over.name, _bool(at, True))], []
@@ -353,7 +355,9 @@ def construct_at_start(context: Context) -> None:
         ends = [_set(at, _KEPT, _bool(at, False)), _set(at, _DONE, _bool(at, True))]
         context.global_order.append(done)
     context.global_order.append(over)
-    statement = tree.If(*at, ((tree.Unary(*at, "NOT", tree.NameRef(*at, over.name)), (*begins, *_calls(at, made), *ends)),), None)
+    names = [*(each.name for each in made), *last]
+    is_first = tree.Unary(*at, "NOT", tree.NameRef(*at, over.name))
+    statement = tree.If(*at, ((is_first, (*begins, *_calls(at, names), *ends)),), None)
     begun = [_hidden("PROGRAM", INIT, source, at, [statement]) for _ in context.tasks]
     for pou, task in zip(begun, context.tasks, strict=True):
         pou.variables.update({fold(flag.name): flag for flag in flags})
@@ -365,11 +369,26 @@ def _of_sources(context: Context, phases: tuple[str, ...]) -> list[Pou]:
     """The functions that do some phases for all instances that live as long as the program."""
     made = []
     for phase in phases:
-        variables = _in_order([each for each in context.global_order if constructs(context, each.type, phase)])
-        sources = list(dict.fromkeys(each.source for each in variables))
-        made += [_of_source(context, number, [each for each in variables if each.source is source], phase)
-                 for number, source in enumerate(sources)]
+        groups: dict[tuple[int, Source], list[Variable]] = {}
+        for slot, each in sorted(((_slot(context, each), each) for each in context.global_order), key=lambda row: row[0]):
+            if constructs(context, each.type, phase):
+                groups.setdefault((slot, each.source), []).append(each)
+        made += [_of_source(context, number, group, phase) for number, group in enumerate(groups.values())]
     return made[::-1] if phases == (EXIT,) else made
+
+
+def _slot(context: Context, variable: Variable) -> int:
+    """The place of a global variable or program in the order of initialisation."""
+    if variable.kind != "PROGRAM" or not isinstance(variable.type, StructType):
+        return variable.init_slot
+    return init_slot(context.attributes(context.block_of(variable.type)), PROGRAM_SLOT)
+
+
+def _called_afterwards(context: Context) -> list[str]:
+    """The names of the user's functions that are called once behind all initialisation, in the order of their attributes."""
+    slots = [(init_slot(context.attributes(pou), -1, LAST), pou.name) for pou in context.project.pous.values()
+             if pou.is_function and not pou.source.library]
+    return [name for slot, name in sorted(row for row in slots if row[0] >= 0)]
 
 
 def _check(context: Context, called: list[Pou], callers: list[Pou]) -> None:
@@ -387,9 +406,9 @@ def _hidden(kind: str, name: str, source: Source, at: tuple[int, int], body: Ite
     return Pou(name, kind, source, tree.Pou(*at, kind, tree.Name(*at, name), None, (), tuple(body)), as_written=False)
 
 
-def _calls(at: tuple[int, int], called: list[Pou]) -> Iterator[tree.Statement]:
-    for each in called:
-        yield tree.CallStatement(*at, tree.Call(*at, tree.NameRef(*at, each.name), ()))
+def _calls(at: tuple[int, int], functions: list[str]) -> Iterator[tree.Statement]:
+    for name in functions:
+        yield tree.CallStatement(*at, tree.Call(*at, tree.NameRef(*at, name), ()))
 
 
 def _set(at: tuple[int, int], name: str, value: tree.Expr) -> tree.Statement:
@@ -398,11 +417,6 @@ def _set(at: tuple[int, int], name: str, value: tree.Expr) -> tree.Statement:
 
 def _bool(at: tuple[int, int], value: bool) -> tree.Literal:
     return tree.Literal(*at, "bool", value, None, "TRUE" if value else "FALSE")
-
-
-def _in_order(variables: list[Variable]) -> list[Variable]:
-    """Global variables in front of programs."""
-    return sorted(variables, key=lambda each: each.kind == "PROGRAM")
 
 
 def _of_source(context: Context, number_of_source: int, variables: list[Variable], phase: str) -> Pou:

@@ -9,8 +9,9 @@ from fbvm.check.declarations.variables import check_qualifiers, initialized, mak
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.dependencies import Dependencies, Key
-from fbvm.check.symbols.facts import is_open
+from fbvm.check.symbols.facts import GLOBAL_SLOT, is_open
 from fbvm.check.symbols.symbol_table import GlobalDeclaration, SymbolTable, list_name
+from fbvm.syntax.st.pragmas import attributes_before, init_slot
 
 
 def enroll(context: Context) -> None:
@@ -70,6 +71,7 @@ def _declare(context: Context, declaration: GlobalDeclaration) -> None:
         return
     for name, key in zip(declared.names, keys, strict=True):
         made = make_variable(context, declared, name, declaration.section, source, resolved)
+        made.init_slot = init_slot(attributes_before(source.text, declaration.section.start), GLOBAL_SLOT)
         made.qualified = declaration.section in project.qualified_only
         made.space = Path(source.name).stem if list_name(source) in project.lists else ""
         made.place = "area" if declared.location is not None and not is_open(declared.location, made.type) else "abs"

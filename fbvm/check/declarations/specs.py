@@ -53,6 +53,8 @@ def type_declaration(context: Context, entry: TypeEntry) -> Resolved | None:
         resolved = _structure(scope, spec, entry.name, entry.pack)
     else:
         resolved = resolve(scope, spec, entry.name)
+    if resolved is not None and isinstance(resolved[0], EnumType) and isinstance(spec, tree.EnumSpec):
+        object.__setattr__(resolved[0], "attributes", entry.attributes)
     if resolved is None or declared.initial is None:
         return resolved
     kind, initial = resolved

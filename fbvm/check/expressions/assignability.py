@@ -53,6 +53,8 @@ def assignable(kind: Type, target: Type) -> bool:
 
 def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
     """True if a dialect converts a value implicitly where the standard demands a conversion function."""
+    if isinstance(target, EnumType) and "strict" in target.attributes:
+        return False
     if dialect.numbers_of_enumerations and (isinstance(kind, EnumType) or isinstance(target, EnumType)):
         kind = kind.base if isinstance(kind, EnumType) else kind
         if kind == target or converts(kind, target):

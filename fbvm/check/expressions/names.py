@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.areas import FLAG_AREAS, AddressError, parse_address
-from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, Type, fold
+from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, EnumType, Type, fold
 from fbvm.check.expressions import objects, unknown_names
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Variable
@@ -30,20 +30,34 @@ def name(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
 
 def _enumerated(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
     """The type of a name that is a member of an enumeration, else a diagnostic."""
-    own = scope.source.library
-    members = [m for m in scope.project.enum_members.get(fold(expr.text), ()) if (m[2] or not own)
-               and (m[0] == want or "." not in m[0].name or scope.named_type(m[0].name.rpartition(".")[2]) == m[0])]
-    near = [m for m in members if m[2] == own]
-    wanted = [m for m in members if m[0] == want] or near or members
+    seen = _members(scope, expr, want)
+    free = [m for m in seen if "qualified_only" not in m[0].attributes]
+    near = [m for m in free if m[2] == scope.source.library]
+    wanted = [m for m in free if m[0] == want] or near or free
     if len({kind.name for kind, _, _ in wanted}) == 1:
         scope.facts.constants[expr] = wanted[0][1]
         return wanted[0][0]
     if wanted:
         scope.error("S0201", expr, f"{expr.text} is a member of several enumerations",
                     "write which: " + " or ".join(f"{kind}#{expr.text}" for kind, _, _ in wanted))
-        return None
-    unknown_names.report_unknown(scope, expr)
+    elif seen:
+        scope.error("S0201", expr, f"{expr.text} is named with its enumeration, which is qualified_only",
+                    "write " + " or ".join(f"{kind}.{expr.text}" for kind, _, _ in seen))
+    else:
+        unknown_names.report_unknown(scope, expr)
     return None
+
+
+def _members(scope: Scope, expr: tree.NameRef, want: Type | None) -> list[tuple[EnumType, int, str]]:
+    """The members of enumerations that a name may mean: enumeration, value, library."""
+    own = scope.source.library
+    return [m for m in scope.project.enum_members.get(fold(expr.text), ())
+            if (m[2] or not own) and (m[0] == want or _is_seen(scope, m[0]))]
+
+
+def _is_seen(scope: Scope, kind: EnumType) -> bool:
+    """True if an enumeration can be named without its namespace, so that its members can be named by themselves."""
+    return "." not in kind.name or scope.named_type(kind.name.rpartition(".")[2]) == kind
 
 
 def variable(scope: Scope, expr: tree.Expr, meant: Variable) -> Type | None:

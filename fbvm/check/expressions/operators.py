@@ -192,6 +192,11 @@ def _made_by_adr(scope: Scope, expr: tree.Expr) -> bool:
     return isinstance(expr, tree.Call) and isinstance(expr.callee, tree.NameRef) and fold(expr.callee.text) == "ADR"
 
 
+def _is_strict(expr: tree.Binary, *operands: Type) -> bool:
+    """True for arithmetic of an enumeration with the attribute strict."""
+    return expr.op not in COMPARISONS and any(isinstance(kind, EnumType) and "strict" in kind.attributes for kind in operands)
+
+
 def _as_numbers(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
     """The type of an operator in a dialect that takes bit strings and enumerations as numbers; None if the dialect does not."""
     dialect = scope.dialect
@@ -204,7 +209,7 @@ def _as_numbers(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: 
     if timed is not None:
         return scope.infer(timed)
     a, b = as_number(left, dialect), as_number(right, dialect)
-    if (a, b) == (left, right):
+    if (a, b) == (left, right) or _is_strict(expr, left, right):
         return None
     kind = _operand_type(scope, expr, a, b, want)
     if kind is None or not _defined(scope, expr, kind):

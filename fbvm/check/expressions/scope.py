@@ -122,6 +122,8 @@ class Scope:
             value = self.facts.constants.get(expr)
             return value is None or self._in_range(expr, value, target, code)
         if converted_by_dialect(kind, target, self.dialect):
+            if isinstance(target, StructType) and target.block:
+                self.context.refuse_copy(self.context.block_of(target), self.source, expr)
             if expr in self.facts.constants:
                 self.facts.constants[expr] = cut(self.facts.constants[expr], base(target))
             return True
@@ -185,7 +187,8 @@ class Scope:
         if isinstance(kind, RefType) and value == 0:  # CODESYS writes 0 for NULL
             self.facts.types[expr] = target
             return target
-        if isinstance(kind, EnumType) and self.dialect.numbers_of_enumerations:
+        if isinstance(kind, EnumType) and self.dialect.numbers_of_enumerations and \
+                ("strict" not in kind.attributes or value in kind.shown):
             kind = kind.base
         if untyped is UNTYPED_REAL and self._becomes_integer(expr, kind):
             untyped, value = UNTYPED_INT, int(value) if math.isfinite(value) else cut(value, kind)
@@ -244,6 +247,7 @@ class Scope:
 
     def note_call(self, pou: Pou, node: tree.Node, dynamic: bool = False) -> None:
         """Record that the POU of this scope calls another one, or with `dynamic` perhaps one that overrides it."""
+        self.context.warn_of_obsolete(pou, self.source, node)
         if self.pou is not None:
             self.pou.calls.setdefault(pou, node)
             if dynamic:

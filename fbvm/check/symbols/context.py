@@ -19,6 +19,7 @@ from fbvm.check.symbols.facts import Facts, Pou, StandardCall, Value, Variable
 from fbvm.check.symbols.statement_lists import writes_eno
 from fbvm.check.symbols.symbol_table import Resolved, SymbolTable, TypeEntry, list_name
 from fbvm.syntax import tree
+from fbvm.syntax.st.pragmas import attributes_before
 
 Evaluate = Callable[[StandardCall, Sequence[Value], Dialect], Value | None]
 """The value of a call of a standard function with constant arguments, None if it is not known before the program runs.
@@ -79,6 +80,7 @@ class Context:
         """Of blocks that are resolved, whether they have something to construct in a phase (see declarations.construction)."""
         self.kept_values: Variable | None = None
         """Of a program with FB_init the hidden variable that says whether a start keeps RETAIN variables."""
+        self._attributes: dict[Pou, dict[str, str]] = {}
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}
         self._identifiers = 0
@@ -171,6 +173,30 @@ class Context:
         """The numbers with which instances of a type begin, and of those derived from it."""
         return sorted(block.identifier for block in self._blocks.values()
                       if block.kind != "INTERFACE" and derives(block.type, kind))
+
+    # --- attributes -------------------------------------------------------------------------------------------------
+
+    def attributes(self, pou: Pou) -> dict[str, str]:
+        """The attributes in front of a POU: names in small letters and values."""
+        if pou not in self._attributes:
+            self._attributes[pou] = attributes_before(pou.source.text, pou.tree.start)
+        return self._attributes[pou]
+
+    def refuse_copy(self, block: Pou, source: Source, node: tree.Node) -> None:
+        """Report a copy of an instance if an attribute of its block, or of one that it extends, forbids it or warns of it."""
+        for level in block.lineage():
+            if "no_assign" in self.attributes(level):
+                self.report.add("S1012", source, node, f"instances of {level.name} are not copied: it has no_assign",
+                                "use a pointer, a reference or an in-out")
+            elif "no_assign_warning" in self.attributes(level):
+                self.report.add("S0194", source, node, f"an instance of {level.name} is copied: it has no_assign_warning",
+                                "pointers in the copy still point into the source")
+
+    def warn_of_obsolete(self, pou: Pou, source: Source, node: tree.Node) -> None:
+        """Warn of a use of a POU that is marked as obsolete, but for uses inside of libraries."""
+        said = None if source.library else self.attributes(pou).get("obsolete")
+        if said is not None:
+            self.report.add("S0194", source, node, f"{pou.name} is obsolete" + f": {said}" * bool(said))
 
     # --- global variables -------------------------------------------------------------------------------------------
 

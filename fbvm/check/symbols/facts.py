@@ -26,6 +26,11 @@ UNTYPED_REAL = Elementary("a real literal", 0, 1, "f64", frozenset())
 """Types of literals (and of expressions of nothing but literals) to which no operand and no place has given a type yet."""
 
 
+GLOBAL_SLOT, PROGRAM_SLOT = 49990, 50000
+"""In the order of initialisation, the places of lists of global variables and of programs that have no attribute
+global_init_slot.  Source: CODESYS online help, attribute global_init_slot."""
+
+
 @dataclass(eq=False)
 class Variable:
     """One declared variable.  `kind` is its section's word, or RESULT for a function's result.
@@ -73,6 +78,8 @@ class Variable:
     qualified: bool = False
     declared: VarDecl | None = None
     """The declaration of it, with the arguments of FB_init."""
+    init_slot: int = GLOBAL_SLOT
+    """Of a global variable the place of its list in the order of initialisation."""
     object: int | None = None
     """Of a variable that something refers to: the number of its object (see code.operations), or of one that every
     instance has, its position among those.  Known after layout, or when it is referred to."""

@@ -38,6 +38,8 @@ class TypeEntry:
     """Its name with its namespace in front."""
     tree: tree.TypeDecl
     source: Source
+    attributes: frozenset[str] = frozenset()
+    """The names of its attributes."""
     pack: int | None = None
     """The multiple of bytes at which members lie at most, where an attribute says that."""
     resolved: Resolved | None = None
@@ -155,7 +157,8 @@ class SymbolTable:
                 key = (source.library, fold(full))
                 if not self._twice(key, declaration.name, source, "type"):
                     self._forget(self._found_types, key[1])
-                    self.types[key] = TypeEntry(full, declaration, source, pack_mode(text, declaration))
+                    self.types[key] = TypeEntry(full, declaration, source, frozenset(attributes(text, declaration)),
+                                                pack_mode(text, declaration))
             elif isinstance(declaration, tree.GlobalVars):
                 self.sections.append((declaration.section, source))
                 self.lists.add(list_name(source))

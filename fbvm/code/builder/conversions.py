@@ -111,6 +111,8 @@ def _to_text(emitter: Emitter, source: Type, node: Node) -> Node:
         return node
     if is_any(source, "ANY_CHAR"):
         return ("character", "s16" if source.name == "WCHAR" else "s8", node)
+    if isinstance(source, EnumType) and emitter.dialect.members_as_numbers and "to_string" not in source.attributes:
+        return ("to_text", "s8", source.base.name, node)
     if isinstance(source, EnumType):
         return ("enum_text", "s8", tuple(sorted(source.shown.items())), ("convert", "i64", source.base.machine, node))
     return ("to_text", "s8", source.name, node)

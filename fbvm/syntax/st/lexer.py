@@ -12,7 +12,7 @@ from functools import cache
 from typing import NamedTuple
 
 from fbvm.syntax.st.comments import CLOSERS, comment_end
-from fbvm.syntax.st.pragmas import GENERATOR, NO_EFFECT, dialectal, harmless
+from fbvm.syntax.st.pragmas import GENERATOR, NO_EFFECT, attribute_name, dialectal, harmless
 from fbvm.syntax.st.tables import Terminal, tables
 from fbvm.syntax.tree import Form, Pragma
 
@@ -370,7 +370,9 @@ class Lexer:
             self.report("S0190", start, end + 1, "what stands in braces is a pragma, and no statement is executed in one",
                         "blocks are written IF .. END_IF, FOR .. END_FOR, without braces")
         elif not harmless(contents) and not dialectal(contents):
-            unknown = "S0190", f"the pragma `{{{_short(contents.strip())}}}` is not known and has no effect", NO_EFFECT
+            named = attribute_name(contents)
+            what = f"attribute '{named}'" if named else f"pragma `{{{_short(contents.strip())}}}`"
+            unknown = "S0190", f"the {what} is not known and has no effect", NO_EFFECT
             acts = next((row for row in GENERATOR if row[0].fullmatch(contents)), None)
             if acts:
                 self.forms.append(Form("pragmas_of_c", start, end + 1, ("S0901", *acts[1:]), unknown, taken=False))

@@ -18,7 +18,7 @@ ATTRIBUTES = {
     "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy", "no_copy", "no-analysis", "const_non_replaced", "tcgenerated",
     "tcrpcenable", "pytmc", "enable_dynamic_creation", "signature_flag", "tclinkto", "tcncaxis", "tccontextname",
     "call_after_online_change_slot", "no_assign", "no_assign_warning", "no_explicit_call",
-    "call_after_init", "reflection", "instance-path", "noinit"}
+    "call_after_init", "call_after_global_init_slot", "global_init_slot", "reflection", "instance-path", "noinit"}
 """Names of attributes that are obeyed, and of those that make no valid program do anything else: they restrict, show, hide,
 export."""
 
@@ -59,6 +59,12 @@ def harmless(text: str) -> bool:
         return not text.strip()
     name, word = found[1], found[2]
     return name.lower() in ATTRIBUTES if name is not None else word.lower() in WORDS
+
+
+def attribute_name(text: str) -> str:
+    """The name of the attribute whose pragma has these contents; "" for other pragmas and where its value is what is wrong."""
+    found = _SHAPE.match(text)
+    return found[1] if found and found[1] is not None and not _PACK_MODE.fullmatch(text) else ""
 
 
 def dialectal(text: str) -> bool:
@@ -112,6 +118,12 @@ def attributes_before(text: str, start: int) -> dict[str, str]:
     while match := re.search(r"\{[^{}]*\}(?:\s|//[^\n]*\n|\(\*(?:(?!\*\)).)*\*\))*\Z", before[:at], re.DOTALL):
         at = match.start()
     return {found[1].lower(): found[2] or "" for found in _ATTRIBUTE.finditer(before[at:])}
+
+
+def init_slot(attributes: dict[str, str], otherwise: int, name: str = "global_init_slot") -> int:
+    """The number of an attribute that places something in the order of initialisation; `otherwise` without one."""
+    value = attributes.get(name, "")
+    return int(value) if value.isdecimal() else otherwise
 
 
 def attributes(text: SourceText, declaration: Declaration) -> set[str]:
