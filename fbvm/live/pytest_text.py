@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 from fbvm.live.plcs import LivePlc
 from fbvm.live.workbench import Act
 from fbvm.machine.plc import Plc
+from fbvm.net.faults import ANY, Fault
 
 _CALLS = {"write": "plc.write({name!r}, {value})", "keep": "plc.write({name!r}, {value})",
           "force": "plc.force({name!r}, {value})", "mode": "plc.mode = Mode({value!r})",
@@ -19,7 +21,7 @@ _CALLS = {"write": "plc.write({name!r}, {value})", "keep": "plc.write({name!r}, 
 def pytest_text(acts: Sequence[Act], live: LivePlc, seen: Sequence[str], files: Sequence[Path],
                 program: str | None = None) -> str:  # fmt: skip
     """The text of a test module: compiles `files`, repeats the acts before their scans, and asserts the values of the names
-    `seen` as they are now.  What faults and cables did is not repeated: a line says so."""
+    `seen` as they are now.  Of what is done inside a scan, at a breakpoint, a line says that it is not repeated."""
     plc = live.plc
     sources = ", ".join(repr(str(file)) for file in files)
     chosen = f", program={program!r}" if program else ""
@@ -37,7 +39,7 @@ def pytest_text(acts: Sequence[Act], live: LivePlc, seen: Sequence[str], files: 
         if act.scan > at:
             lines.append(f"    plc.run(scans={act.scan - at})")
             at = act.scan
-        lines.append(f"    {_statement(act)}")
+        lines += [f"    {line}" for line in _statements(act, plc)]
     if plc.scans > at:
         lines.append(f"    plc.run(scans={plc.scans - at})")
     lines += [f"    assert plc.read({name!r}) == {_literal(plc.read(name))}" for name in seen]
@@ -47,9 +49,16 @@ def pytest_text(acts: Sequence[Act], live: LivePlc, seen: Sequence[str], files: 
 
 
 def _imports(plc: Plc, acts: Sequence[Act]) -> list[str]:
-    names = ["LoopNetwork"] * bool(plc.units) + ["Mode"] * any(act.what == "mode" for act in acts) + ["Plc", "compile_files"]
-    units = ["from fbvm.machine.backplane import usual_units"] * bool(plc.units)
-    return [f"from fbvm import {', '.join(names)}", *units]
+    done = {act.what for act in acts}
+    names = {"LoopNetwork": bool(plc.units), "Mode": "mode" in done, "Plc": True,
+             "Peer": "cable" in done or any(isinstance(act.value, Fault) and act.value.peer != ANY for act in acts),
+             "compile_files": True}  # fmt: skip
+    lines = [f"from fbvm import {', '.join(name for name, is_used in sorted(names.items()) if is_used)}"]
+    if plc.units:
+        lines.append("from fbvm.machine.backplane import usual_units")
+    if done & {"fault", "cable"}:
+        lines.append("from fbvm.net.faults import Fault")
+    return lines
 
 
 def _literal(value: object) -> str:
@@ -57,10 +66,38 @@ def _literal(value: object) -> str:
     return f"float({str(value)!r})" if isinstance(value, float) and not math.isfinite(value) else repr(value)
 
 
-def _statement(act: Act) -> str:
+def _statements(act: Act, plc: Plc) -> list[str]:
+    """The lines of an act, after which it takes place before the next scan."""
     if act.what == "release":
-        return f"plc.unforce({act.name!r})" if act.name else "plc.unforce()"
+        return [f"plc.unforce({act.name!r})" if act.name else "plc.unforce()"]
     if act.what in _CALLS:
         value = _literal(act.value) if act.what in ("write", "keep", "force") else act.value
-        return _CALLS[act.what].format(name=act.name, value=value)
-    return f"# not repeated: {act.text.splitlines()[0] if act.text else act.what}"
+        return [_CALLS[act.what].format(name=act.name, value=value)]
+    if isinstance(act.value, Fault):
+        return [f"network.faults.append({_fault(act.value)})"]
+    if act.what == "mend":
+        return ["network.faults.clear()" if act.value is None else f"del network.faults[{act.value}]"]
+    if act.what == "cable":
+        return _cable(act, plc)
+    return [f"# not repeated: {act.text.splitlines()[0] if act.text else act.what}"]
+
+
+def _cable(act: Act, plc: Plc) -> list[str]:
+    """Pulls or plugs the cable of a unit, as `Workbench.cable` does."""
+    number, unit = next((number, attached.unit) for number, attached in enumerate(plc.units) if attached.unit.name == act.name)
+    row = f"Fault(Peer({unit.address!r}, 0), silent=True)"
+    lines = [f"network.faults[:] = [row for row in network.faults if row != {row}]" if act.value
+             else f"network.faults.insert(0, {row})"]  # fmt: skip
+    if "link_up" in unit.settings:
+        made = f"plc.units[{number}].unit"
+        lines.append(f"{made}.settings = {{**{made}.settings, 'link_up': {act.value}}}")
+    return lines
+
+
+def _fault(row: Fault) -> str:
+    """A row of faults as Python writes it, with what is not as usual."""
+    values = {each.name: repr(getattr(row, each.name)) for each in fields(row) if getattr(row, each.name) != each.default}
+    if "peer" in values:
+        values["peer"] = f"Peer({row.peer.host!r}, {row.peer.port})"
+    given = [f"{name}={value}" for name, value in values.items()]
+    return f"Fault({', '.join(given)})"

@@ -323,9 +323,10 @@ class Workbench:
             if not 0 <= percent <= 100:
                 raise MessageError(f"{percent} is not 0 to 100 percent")
             fields |= {"lossy": {"lose_percent": percent}, "doubled": {"duplicate_percent": percent}}.get(kind, {})
+        row = fault(kind, **fields)
         for network in self.networks:
-            network.faults.append(fault(kind, **fields))
-        self._note_all("fault", f"fault {kind}" + (f" at {peer}" if peer else ""))
+            network.faults.append(row)
+        self._note_all("fault", f"fault {kind}" + (f" at {peer}" if peer else ""), row)
 
     def mend(self, number: int | None = None) -> None:
         """Ends the fault with that number in `faults`, or all."""
@@ -335,7 +336,7 @@ class Workbench:
             raise MessageError(f"there is no fault {number}")
         for network in self.networks:
             network.faults[:] = [] if number is None else [row for row in network.faults if row is not rows[number]]
-        self._note_all("mend", "all faults ended" if number is None else f"fault {_named(rows[number])} ended")
+        self._note_all("mend", "all faults ended" if number is None else f"fault {_named(rows[number])} ended", number)
 
     def _check_free(self) -> None:
         if self.writable is not None:
@@ -348,9 +349,9 @@ class Workbench:
     def _note(self, live: LivePlc, what: str, text: str, name: str = "", value: object = None) -> None:
         self.acts.append(Act(live.name, live.plc.scans, live.plc.now_ns, what, text, name, value))
 
-    def _note_all(self, what: str, text: str) -> None:
+    def _note_all(self, what: str, text: str, value: object = None) -> None:
         for live in self.plcs.values():
-            self._note(live, what, text)
+            self._note(live, what, text, value=value)
 
 
 def _text(found: Place | Span, value: object) -> str:
