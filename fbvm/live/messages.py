@@ -7,6 +7,7 @@ for the next by `{"do": "ready"}`."""
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from itertools import islice
@@ -23,6 +24,7 @@ MOST_NAMES = 1000
 PIECE = 50
 """Items of a long list or mapping that are written as JSON in one step."""
 NUMBER = (int, float)
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,11 @@ def parse(text: str) -> dict[str, Any]:
         message = json.loads(text, parse_constant=_refuse)
     except (ValueError, RecursionError):
         raise MessageError("the message is not JSON") from None
+    if _SURROGATE.search(text):
+        try:
+            dump({"": message}).encode()
+        except UnicodeEncodeError:
+            raise MessageError("a text has half a surrogate pair, which is no character") from None
     if not isinstance(message, dict) or not isinstance(message.get("do"), str):
         raise MessageError('a message is an object with "do"')
     action = ACTIONS.get(message["do"])

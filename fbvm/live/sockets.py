@@ -12,7 +12,8 @@ from fbvm.live.guard import Guard
 from fbvm.live.session import Session
 
 MOST_CONNECTIONS = 32
-"""Connections at a time; further ones wait in the host, or are refused."""
+"""Connections at a time.  A further one takes the place of the oldest that has not finished its request; without one it is
+refused."""
 READ_BYTES = 64 << 10
 MOST_BACKLOG_BYTES = 4 << 20
 """What may wait for a browser that does not read; then its connection is ended."""
@@ -58,6 +59,8 @@ class LiveServer:
                 self._accept()
                 continue
             browser: _Browser = key.data
+            if browser not in self._browsers:  # it has made room for another
+                continue
             if events & selectors.EVENT_READ:
                 self._read(browser)
             if browser in self._browsers:
@@ -115,8 +118,11 @@ class LiveServer:
             except OSError:
                 return
             if len(self._browsers) >= MOST_CONNECTIONS:
-                sock.close()
-                continue
+                waiting = next((browser for browser in self._browsers if browser.session is None), None)
+                if waiting is None:
+                    sock.close()
+                    continue
+                self._drop(waiting)
             sock.setblocking(False)
             with suppress(OSError):
                 sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -149,7 +149,8 @@ def test_broken_frames_end_the_connection(data: bytes) -> None:
     '{"do":"cable","plc":"pump","unit":"x","plugged":false}', '{"do":"fault","kind":"silent","peer":"a:b"}',
     '{"do":"mend","number":7}', '{"do":"write","plc":"pump","name":"Main.Level","value":"99999"}',
     '{"do":"mode","plc":"pump","mode":"BOOT"}', '{"do":"fault","kind":"slow","time":"-5ms"}',
-    '{"do":"force","plc":"pump","name":"D1..D5","value":"1"}',
+    '{"do":"force","plc":"pump","name":"D1..D5","value":"1"}', r'{"do":"look","plc":"pump","names":["\ud800"]}',
+    r'{"do":"\uDFFF"}', r'{"do":"run","\udead":1}',
 ])  # fmt: skip
 def test_a_broken_message_gets_an_error_and_changes_nothing(text: str) -> None:
     page = Page()
@@ -159,6 +160,18 @@ def test_a_broken_message_gets_an_error_and_changes_nothing(text: str) -> None:
     assert set(reply) == {"re", "error"} and reply["error"]
     assert bytes(page.plc.memory.map[:]) == before
     assert page.bench.acts == [] and not page.control.is_paused and page.network.faults == []
+
+
+def test_every_reply_and_update_can_be_sent() -> None:
+    """Also with characters that are no UTF-8, and such a WSTRING."""
+    page = Page('PROGRAM Main VAR Half : WSTRING := "a$D800b"; Wide : WSTRING := "$D83D$DE00"; END_VAR END_PROGRAM')
+    for name in (r"\ud800", r"\ud83d\ude00"):
+        reply = page.session.answer(f'{{"id":1,"do":"look","plc":"pump","names":["{name}"]}}') or page.session.update(0)
+        assert reply is not None and reply.encode()
+    page.done("hello")
+    page.done("look", plc="pump", names=["Main.Half", "Main.Wide"])
+    text = page.session.update(10**9)
+    assert text is not None and set(json.loads(text.encode())["update"]["values"]) == {"Main.Half", "Main.Wide"}
 
 
 def test_a_long_text_in_a_message_is_refused() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import pytest
 from browsers import Page, frame
@@ -73,15 +74,25 @@ def test_callers_who_say_nothing_are_sent_away(host: LiveHost) -> None:
         assert sock.recv(10) == b""
 
 
-def test_there_are_so_many_connections_and_no_more(host: LiveHost) -> None:
+def test_callers_who_say_nothing_keep_no_page_out(host: LiveHost) -> None:
     callers = [called(host) for _ in range(MOST_CONNECTIONS)]
     try:
-        with called(host) as late:
-            late.settimeout(5)
-            assert late.recv(10) == b""
+        with opened(host):
+            assert len(host.server.sessions) == 1
+        callers[0].settimeout(5)
+        assert callers[0].recv(10) == b"", "the oldest of them made room"
     finally:
         for caller in callers:
             caller.close()
+
+
+def test_there_are_so_many_pages_and_no_more(host: LiveHost) -> None:
+    with ExitStack() as stack:
+        for _ in range(MOST_CONNECTIONS):
+            stack.enter_context(opened(host))
+        late = stack.enter_context(called(host))
+        late.settimeout(5)
+        assert late.recv(10) == b"" and len(host.server.sessions) == MOST_CONNECTIONS
 
 
 def test_who_hangs_up_inside_a_request_leaves_nothing(host: LiveHost) -> None:
