@@ -64,7 +64,13 @@ def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument
     names = {fold(a.name.text) for a in named if a.name is not None}
     names = {pou.other_names.get(name, name) for name in names} | {"EN", "ENO"}
     parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in names]
-    if len(arguments) > len(parameters) and not pou.has_failed_names:
+    if pou.has_failed_names:  # a parameter may be missing, and the others would move up
+        given.update((fold(v.name), call) for v in parameters)
+        for argument in arguments:
+            assert argument.value is not None
+            scope.infer(argument.value)
+        return
+    if len(arguments) > len(parameters):
         plural = "" if len(parameters) == 1 else "s"
         scope.error("S0402", arguments[len(parameters)],
                     f"{pou.name} has {len(parameters) or 'no'} parameter{plural}, {len(arguments)} given",
