@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 
-from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, result, value, variable
+from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, result, value, variable, wires
 from rows import each_of
 
+from fbvm.base.diagnostics import Source
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
+from fbvm.interchange.plcopen.write.exporting import export_xml
 
 UNKNOWN = '<fileHeader companyName="Unknown" productName="Unnamed" productVersion="1"/>'
 
@@ -149,3 +151,42 @@ def test_jumps_are_not_executed_where_the_tool_executes_none() -> None:
 
 def test_every_order_says_what_it_is() -> None:
     assert all(len(text) > 30 for text in ORDERS.values())
+
+
+def _text(body: str, language: str, declared: str, actions: str = "") -> str:
+    """What comes of a POU in a document of Beremiz, in the order of its generator since October 2022."""
+    whole = document(pou(body, declared, language=language)).replace(b"<body>", f"{actions}<body>".encode(), 1)
+    return import_xml(headed(whole), order="document").files["Main.st"]
+
+
+def test_who_reads_a_variable_that_is_written_at_the_same_place_does_not_wait_for_that() -> None:
+    body = (result(2, "3", "q") + f'<inOutVariable localId="3">{wires("7.OUT")}<connectionPointOut/><expression>n</expression>'
+            "</inOutVariable>" + block(7, "ADD", "IN1=3 IN2=5", "OUT") + value(5, "1"))
+    text = _text(body, "FBD", variable("n", "INT") + variable("q", "INT"))
+    assert text.index("q := n;") < text.index("n := n + 1;")
+
+
+def test_actions_are_executed_in_the_order_in_which_steps_along_the_transitions_name_them() -> None:
+    def action(name: str) -> str:
+        return f'<action name="{name}"><body><ST><p xmlns="http://www.w3.org/1999/xhtml">;</p></ST></body></action>'
+
+    def step(number: int, name: str, source: str, marks: str = "") -> str:
+        return f'<step localId="{number}" name="{name}" {marks}>{wires(source)}<connectionPointOutAction/></step>'
+
+    def block_of(number: int, step_number: int, name: str) -> str:
+        return (f'<actionBlock localId="{number}">{wires(str(step_number))}<action localId="0" qualifier="N">'
+                f'<reference name="{name}"/></action></actionBlock>')
+
+    def transition(number: int, source: str) -> str:
+        return f'<transition localId="{number}">{wires(source)}<condition><reference name="go"/></condition></transition>'
+
+    body = (step(1, "First", "6", 'initialStep="true"') + block_of(11, 1, "Third") + step(3, "Late", "5") + block_of(13, 3, "One")
+            + step(2, "Next", "4") + block_of(12, 2, "Two") + transition(4, "1") + transition(5, "2") + transition(6, "3"))
+    text = _text(body, "SFC", variable("go"), f"<actions>{action('One')}{action('Two')}{action('Third')}</actions>")
+    assert re.findall(r"ACTION (\w+):", text) == ["Third", "Two", "One"]
+
+
+def test_a_body_without_a_statement_is_exported_with_a_text() -> None:
+    exported = export_xml([Source("Main.st", "PROGRAM Main\nEND_PROGRAM\n")]).text
+    assert exported is not None
+    assert re.search(r"<ST>\s*<xhtml:p>\n</xhtml:p>", exported)

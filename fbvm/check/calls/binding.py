@@ -64,13 +64,13 @@ def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument
     names = {fold(a.name.text) for a in named if a.name is not None}
     names = {pou.other_names.get(name, name) for name in names} | {"EN", "ENO"}
     parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in names]
-    if pou.has_failed_names:  # a parameter may be missing, and the others would move up
+    if _lacks_parameters(pou):  # the others would move up
         given.update((fold(v.name), call) for v in parameters)
         for argument in arguments:
             assert argument.value is not None
             scope.infer(argument.value)
         return
-    if len(arguments) > len(parameters):
+    if len(arguments) > len(parameters) and not pou.has_failed_names:
         plural = "" if len(parameters) == 1 else "s"
         scope.error("S0402", arguments[len(parameters)],
                     f"{pou.name} has {len(parameters) or 'no'} parameter{plural}, {len(arguments)} given",
@@ -83,6 +83,14 @@ def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument
     if open_inputs and not named:
         scope.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
                     "a call without names gives all inputs; name the parameters to leave some out")
+
+
+def _lacks_parameters(pou: Pou) -> bool:
+    """Whether the declaration of a parameter has an error, which is reported, so that the POU does not have it."""
+    declared = (name for section in pou.tree.sections if section.kind in PARAMETER_KINDS
+                for variable in section.variables for name in variable.names)
+    return bool(pou.failed_names) and any(
+        fold(name.text) in pou.failed_names and fold(name.text) not in pou.variables for name in declared)
 
 
 def _compared(scope: Scope, argument: tree.Argument, pou: Pou) -> str:

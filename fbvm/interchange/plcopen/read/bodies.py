@@ -4,7 +4,7 @@ statements, charts in their textual form."""
 from __future__ import annotations
 
 from fbvm.interchange.plcopen.read.accesses import accesses, swapped
-from fbvm.interchange.plcopen.read.charts import Chart
+from fbvm.interchange.plcopen.read.charts import Chart, NamedAction
 from fbvm.interchange.plcopen.read.conditions import NotImportable
 from fbvm.interchange.plcopen.read.diagram import Diagram, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading
@@ -28,8 +28,8 @@ class Bodies:
         self.reading, self.pou = reading, pou
         self.scope = Scope(document, pou)
         self.rungs = 0
-        self.actions: list[str] = []
-        """Lines of the ACTIONs that charts of the POU need."""
+        self.actions: list[NamedAction] = []
+        """The ACTIONs that charts of the POU need."""
 
     def lines(self, body: Body) -> list[str]:
         """The lines of a body."""

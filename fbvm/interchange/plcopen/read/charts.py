@@ -41,13 +41,17 @@ class Arrow:
     targets: list[str]
 
 
+NamedAction = tuple[str, list[str]]
+"""The name of an ACTION, and the lines of its body."""
+
+
 class Chart:
     """Writes one chart.  `write` makes the lines of the body of an inline action or a transition."""
 
     def __init__(self, reading: Reading, scope: Scope, pou: Pou, write: Callable[[Body], list[str]]) -> None:
         self.reading, self.scope, self.pou, self.write = reading, scope, pou, write
-        self.actions: list[str] = []
-        """Lines of the ACTIONs that the chart needs, which stand behind those of the POU."""
+        self.actions: list[NamedAction] = []
+        """The ACTIONs that the chart needs, which stand behind those of the POU."""
         self.conditions = Conditions(reading, scope)
         self.indirect: dict[str, str] = {}
         """By text in capitals, the actions that stand for actions and variables of instances."""
@@ -70,13 +74,27 @@ class Chart:
         ways = [line for arrow in sorted(arrows, key=_order(arrows)) for line in self._transition(arrow, diagram)]
         compute = self._free(COMPUTE) if self.conditions.statements else ""
         begin = next(step for step in steps if step.get("initialStep") == "true")
+        if self.reading.producer.generates:
+            steps = self._generated(steps, arrows)
         lines = [line for step in steps
                  for line in self._step(step, blocks.get(step.get("localId")), compute if step is begin else "")]
         self._report_unused(diagram)
         if compute:
-            self.actions += [f"ACTION {compute}:", *self.conditions.statements, "END_ACTION"]
-        self.actions = [self._with_new_names(line) for line in self.actions]
+            self.actions.append((compute, list(self.conditions.statements)))
+        self.actions = [(name, [self._with_new_names(line) for line in inner]) for name, inner in self.actions]
         return [self._with_new_names(line) for line in (*lines, *ways)]
+
+    def _generated(self, steps: list[Element], arrows: list[Arrow]) -> list[Element]:
+        """The steps as the generator of Beremiz comes to them: from each initial step along the transitions, depth first."""
+        by_name = {self._name(step): step for step in steps}
+        todo = [self._name(step) for step in reversed(steps) if step.get("initialStep") == "true"]
+        found: dict[str, Element] = {}
+        while todo:
+            name = todo.pop()
+            if name not in found and name in by_name:
+                found[name] = by_name[name]
+                todo += reversed([target for arrow in arrows if name in arrow.sources for target in arrow.targets])
+        return [*found.values(), *(step for step in steps if self._name(step) not in found)]
 
     def _rename(self, steps: list[Element]) -> None:
         """Give other names to steps that are called like a variable, an action, or a step of another chart of the POU: in
@@ -147,11 +165,8 @@ class Chart:
                 continue
             name = self._free(f"{self._name(step)}_{kind}")
             call = f"{called}();" if kind != ACTIVE else f"IF {self._name(step)}.X THEN {called}(); END_IF;"
-            lines = [f"ACTION {name}:", call, "END_ACTION"]
-            if kind == EXIT:
-                self.actions[:0] = lines  # a step is left in front of what follows being entered
-            else:
-                self.actions += lines
+            # A step is left in front of what follows being entered.
+            self.actions.insert(0 if kind == EXIT else len(self.actions), (name, [call]))
             yield f"{name}({QUALIFIER[kind]});"
 
     def _association(self, step: Element, action: Element, number: int) -> str:
@@ -162,7 +177,7 @@ class Chart:
         name = reference.get("name").strip() if reference else ""
         if inline is not None and (language := _language(inline)) is not None:
             name = self._free(f"{self._name(step)}_{number}")
-            self.actions += [f"ACTION {name}:", *self.write(Body(language.name, language)), "END_ACTION"]
+            self.actions.append((name, self.write(Body(language.name, language))))
         if "." in name:
             name = self._of_instance(name)
         if not name:
@@ -181,7 +196,7 @@ class Chart:
         if known is None:
             known = self.indirect[text.upper()] = self._free(text.replace(".", "_"))
             statement = f"{text}();" if self.scope.names_action(text) else f"{text} := {known}.Q;"
-            self.actions += [f"ACTION {known}:", statement, "END_ACTION"]
+            self.actions.append((known, [statement]))
         return known
 
     def _free(self, stem: str) -> str:

@@ -133,6 +133,8 @@ class NetworkContext:
             return TRUE
         if (consumer, wire) in self.network.cut:
             return self._from_pass_before(wire)
+        if item.kind == "inOutVariable" and self.generates:
+            return self.modified(item, self.expression(item.text), item.negated, item.edge)
         if key not in self.held and item.kind == "inVariable":
             self.set_output(wire, self.modified(item, self.expression(item.text), item.negated, item.edge))
         held = self.held.get(key)

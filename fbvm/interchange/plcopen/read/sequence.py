@@ -2,6 +2,8 @@
 
 The generator goes through the sinks of a body, and through its blocks, and writes what each needs in front of it, a block once.
 A block counts as written before its inputs are looked at: so a wire that comes back to it carries the value of the pass before.
+A variable that a diagram reads and writes at one place (inOutVariable) is written at its turn; whoever reads it does not wait for
+that.
 """
 
 from __future__ import annotations
@@ -77,14 +79,13 @@ class _Generation:
                 self.made.append(item)
                 continue
             source = wire.source
-            if source not in self.inside or source in self.done:
+            if source not in self.inside or source in self.done or source.kind == "inOutVariable":
                 continue
             if source in self.begun or (waits and source.kind == "block"):
                 self.cut.add((item, wire))
                 continue
             self.begun.add(source)
-            passes = source.kind in ("contact", "inOutVariable")
-            todo.append((source, waits if passes else self._numbered(source), self._wires(source)))
+            todo.append((source, waits if source.kind == "contact" else self._numbered(source), self._wires(source)))
 
     @staticmethod
     def _numbered(item: Object) -> bool:

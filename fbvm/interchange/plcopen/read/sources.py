@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from fbvm.interchange.plcopen.read.bodies import Bodies
+from fbvm.interchange.plcopen.read.charts import NamedAction
 from fbvm.interchange.plcopen.read.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
 from fbvm.interchange.plcopen.read.types import remark
 from fbvm.interchange.source_files import SourceFiles
@@ -93,9 +94,19 @@ def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
     lines = [f"// {pou.note}"] if pou.note else []
     lines += [head, *(line for listed in [*pou.lists, *_gathered(made)] for line in _section(listed)[:-1])]
     lines += main
-    for name, inner in actions:
+    for name, inner in _ordered([*actions, *bodies.actions], main, reading.producer.generates):
         lines += ["", f"ACTION {name}:", *inner, "END_ACTION"]
-    return [*lines, *bodies.actions, f"END_{pou.kind}"]
+    return [*lines, f"END_{pou.kind}"]
+
+
+def _ordered(actions: list[NamedAction], chart: list[str], generates: bool) -> list[NamedAction]:
+    """The ACTIONs of a POU in the order in which they are executed.  Where a generator makes text of the document, that is the
+    order in which its steps name them."""
+    if not generates:
+        return actions
+    named = [name.upper() for line in chart if (name := line.strip().partition("(")[0]) != line.strip()]
+    place = {name: at for at, name in reversed(list(enumerate(named)))}
+    return sorted(actions, key=lambda action: place.get(action[0].upper(), len(named)))
 
 
 def _gathered(lists: list[VarList]) -> Iterator[VarList]:

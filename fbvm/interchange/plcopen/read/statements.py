@@ -88,7 +88,8 @@ class Statements:
         if item.inputs[0].connected:
             target, writes = context.target(item)
             context.write(f"{target} := {context.value_at(item, item.inputs[0]).text};", writes)
-        context.set_output(Wire(item, ""), context.modified(item, context.expression(item.text), item.negated, item.edge))
+        if not context.generates:  # a generator reads the variable wherever it is used
+            context.set_output(Wire(item, ""), context.modified(item, context.expression(item.text), item.negated, item.edge))
 
     def _label(self, item: Object) -> None:
         self.context.lines.insert(0, f"{item.text}:")

@@ -121,7 +121,8 @@ def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str])
     text = types.source.text[start:end]
     if not any(isinstance(statement, Ladder) for statement in body):
         types.kept.append((start, end))
-        return element("IL" if _is_list(body) else "ST", element("xhtml:p", _dedented(text))), {}
+        # Beremiz takes an element without any text for none.
+        return element("IL" if _is_list(body) else "ST", element("xhtml:p", _dedented(text) or "\n")), {}
     if len(body) > 1 and (_JUMP.search(text) or _LABEL.search(_without_ladder(text))):
         raise NotExportable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
     drawing = Drawing()
