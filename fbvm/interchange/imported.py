@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 
@@ -37,6 +38,10 @@ class Imported:
     """From what the family and the order of evaluation were concluded."""
     references: tuple[str, ...] = ()
     """Names of the libraries that it refers to, as far as they are known."""
+    uses: tuple[Path, ...] = ()
+    """Files of other projects that it refers to."""
+    parameters: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    """Values of constants in libraries that it sets, by the names of list and constant in small letters."""
     find_places: Callable[[], Places] | None = None
     """Finds where the sources stand in the document; None if nobody can tell."""
     is_text: bool = True

@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from twincat_files import PROJECT, write_project
+from twincat_files import PROJECT, write_project, write_solution
 
-from fbvm.interchange.formats.given import given_sources, usual_dialect, within
+from fbvm import Plc
+from fbvm.base.diagnostics import Source
+from fbvm.code.compiler import compile_sources
+from fbvm.interchange.formats.given import given_sources, inputs, usual_dialect, within
 from fbvm.interchange.twincat.project import read_project
 
 
@@ -50,6 +53,32 @@ def test_the_first_of_several_projects_runs_its_tasks_and_the_others_are_librari
     assert tasks == [f"{plant}/Tasks.st"]
 
 
+def test_a_project_is_read_with_those_of_its_solution_that_it_refers_to(tmp_path: Path) -> None:
+    line = write_solution(tmp_path)
+    found, said = inputs([line])
+    compiled = compile_sources([each for each in found if isinstance(each, Source)], dialect="twincat")
+    assert said == [] and compiled.errors == []
+    assert compiled.image is not None
+    plc = Plc(compiled.image)
+    plc.scan()
+    assert (plc.read("MAIN.fbAxis.nLast"), plc.read("MAIN.fbAxis.aSteps[5]")) == (5, 7)
+    assert sum(name.endswith("Tasks.st") for name in given_sources([line])) == 1
+
+
+def test_a_project_that_is_named_and_used_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_solution(tmp_path)
+    monkeypatch.chdir(tmp_path / "Line")
+    names = list(given_sources([Path("Line.plcproj"), tmp_path / "Core" / "Core.plcproj"]))
+    assert sum("FB_Axis" in name for name in names) == 1
+    assert "../Core/FB_Axis.TcPOU" in [name.replace("\\", "/") for name in given_sources([Path("Line.plcproj")])]
+
+
+def test_without_a_solution_around_it_a_project_has_no_neighbours(tmp_path: Path) -> None:
+    line = write_solution(tmp_path)
+    (tmp_path / "All.sln").unlink()
+    assert not any("FB_Axis" in name for name in given_sources([line]))
+
+
 SYSTEM = """<?xml version="1.0"?>
 <TcSmProject><Project><System><Tasks><Task Id="3" Priority="5" CycleTime="40000"><Name>PlcTask</Name></Task></Tasks></System>
 <Plc>{0}</Plc></Project></TcSmProject>
@@ -78,6 +107,15 @@ def test_a_system_runs_its_project_with_its_own_cycle(tmp_path: Path, project: s
         ("X0292", "the system gives the task PlcTask 4000 us and priority 5, its own file 20000 us and 20")]
     assert made.errors == []
     assert usual_dialect([path]) == "twincat"
+
+
+def test_of_several_projects_of_a_system_the_one_runs_that_no_other_uses(tmp_path: Path) -> None:
+    write_solution(tmp_path)
+    rows = ('PrjFilePath="Core\\Core.plcproj"', 'PrjFilePath="Line\\Line.plcproj"')
+    path = tmp_path / "Line.tsproj"
+    path.write_text(SYSTEM.format("".join(f"<Project {row}/>" for row in rows)), encoding="utf-8")
+    names = [Path(name).name for name in given_sources([path])]
+    assert names == ["MAIN.TcPOU", "Core.st", "Tasks.st", "FB_Axis.TcPOU", "Param.TcGVL", "Core.st"]
 
 
 @pytest.mark.parametrize(("projects", "said"), [

@@ -119,3 +119,68 @@ def write_project(folder: Path) -> Path:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(text.replace("\n", "\r\n").encode())
     return folder / "Plant.plcproj"
+
+
+AXIS = HEAD + """  <POU Name="FB_Axis" Id="{11}">
+    <Declaration><![CDATA[FUNCTION_BLOCK FB_Axis
+VAR_OUTPUT
+    aSteps : ARRAY[1..Param.nSteps] OF INT;
+    nLast : INT;
+END_VAR
+]]></Declaration>
+    <Implementation>
+      <ST><![CDATA[nLast := Param.nSteps; aSteps[5] := 7;]]></ST>
+    </Implementation>
+  </POU>
+</TcPlcObject>
+"""
+PARAM = HEAD + """  <GVL Name="Param" Id="{12}" ParameterList="True">
+    <Declaration><![CDATA[{attribute 'qualified_only'}
+VAR_GLOBAL CONSTANT
+    nSteps : INT := 3; // of an axis
+END_VAR
+]]></Declaration>
+  </GVL>
+</TcPlcObject>
+"""
+CORE = """<?xml version="1.0" encoding="utf-8"?>
+<Project xmlns="http://schemas.microsoft.com/developer/msbuild/2003">
+  <PropertyGroup><Name>CoreProject</Name><Title>Core</Title><DefaultNamespace>Core</DefaultNamespace></PropertyGroup>
+  <ItemGroup>
+    <Compile Include="FB_Axis.TcPOU"/><Compile Include="Param.TcGVL"/><Compile Include="PlcTask.TcTTO"/>
+  </ItemGroup>
+</Project>
+"""
+LINE_MAIN = HEAD + """  <POU Name="MAIN" Id="{13}">
+    <Declaration><![CDATA[PROGRAM MAIN
+VAR
+    fbAxis : Core.FB_Axis;
+END_VAR
+]]></Declaration>
+    <Implementation><ST><![CDATA[fbAxis();]]></ST></Implementation>
+  </POU>
+</TcPlcObject>
+"""
+LINE = """<?xml version="1.0" encoding="utf-8"?>
+<Project xmlns="http://schemas.microsoft.com/developer/msbuild/2003">
+  <PropertyGroup><Name>Line</Name></PropertyGroup>
+  <ItemGroup><Compile Include="MAIN.TcPOU"/><Compile Include="PlcTask.TcTTO"/></ItemGroup>
+  <ItemGroup>
+    <PlaceholderReference Include="Core">
+      <DefaultResolution>Core, * (us)</DefaultResolution><Namespace>Core</Namespace>
+      <Parameters><Parameter ListName="Param"><Key>NSTEPS</Key><Value>5</Value></Parameter></Parameters>
+    </PlaceholderReference>
+    <PlaceholderReference Include="Tc2_Standard"/>
+  </ItemGroup>
+</Project>
+"""
+
+
+def write_solution(folder: Path) -> Path:
+    """Writes a solution of two projects, of which Line uses Core; the path of Line."""
+    files = {"Line/Line.plcproj": LINE, "Line/MAIN.TcPOU": LINE_MAIN, "Line/PlcTask.TcTTO": TASK, "Core/Core.plcproj": CORE,
+             "Core/FB_Axis.TcPOU": AXIS, "Core/Param.TcGVL": PARAM, "Core/PlcTask.TcTTO": TASK, "All.sln": ""}  # fmt: skip
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder / "Line" / "Line.plcproj"

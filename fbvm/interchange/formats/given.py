@@ -113,14 +113,41 @@ def sources_by_name(found: Mapping[Path, Imported | None]) -> dict[str, Path | s
     """By the name that messages use, each source of files in which `within` has looked: its path, or its text.
 
     Of several projects of TwinCAT the first runs its tasks; the others are libraries that it uses."""
+    found = with_used(found)
     sources: dict[str, Path | str] = {}
     projects = [path for path in found if path.suffix.lower() in PROJECT_SUFFIXES]
+    values = {key: value for made in found.values() if made is not None for key, value in made.parameters.items()}
     for path, made in found.items():
+        if made is not None and values and path in projects[1:]:
+            from fbvm.interchange.twincat.references import with_parameters
+
+            made = with_parameters(made, values)
         sources.update({str(path): path} if made is None else made.files)
         if path in projects[1:]:
             for name in [name for name in made.files if name.endswith(f"{PROJECT_SUFFIX}/{TASKS}")] if made else []:
                 sources.pop(name)
     return sources
+
+
+def with_used(found: Mapping[Path, Imported | None]) -> dict[Path, Imported | None]:
+    """The same files, and behind them the projects that those among them refer to, and these to others.
+
+    A project that cannot be read is left out: what names something of it says that it is not known."""
+    known = dict(found)
+    waiting = [used for made in found.values() if made is not None for used in made.uses]
+    named = {path.resolve() for path in known} if waiting else set()
+    while waiting:
+        path = waiting.pop(0)
+        if path.resolve() in named:
+            continue
+        named.add(path.resolve())
+        try:
+            made = within(path)
+        except OSError:
+            continue
+        known[path] = made
+        waiting += made.uses if made is not None else ()
+    return known
 
 
 def source_files(sources: Mapping[str, Path | str]) -> dict[str, Path]:
@@ -138,5 +165,6 @@ def inputs(paths: Sequence[Path], resource: str | None = None,
 
 def inputs_of(found: Mapping[Path, Imported | None]) -> tuple[list[Path | Source], list[Diagnostic]]:
     """What the compiler takes for files in which `within` has looked, and what is said about projects among them."""
+    found = with_used(found)
     diagnostics = [one for made in found.values() if made is not None for one in made.diagnostics]
     return [Source(name, one) if isinstance(one, str) else one for name, one in sources_by_name(found).items()], diagnostics

@@ -13,6 +13,7 @@ from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import Element, parse_markup
 from fbvm.interchange.twincat import OBJECT_SUFFIXES, TASK_SUFFIX, TASKS
 from fbvm.interchange.twincat.objects import ImportedObject, read_object
+from fbvm.interchange.twincat.references import parameters, references, referred, used_projects
 
 SPACE = "// a name that stands in front of other names\nVAR_GLOBAL\nEND_VAR\n"
 """A list of no global variables, whose file's name is known as a name space by that."""
@@ -54,9 +55,9 @@ def read_project(path: Path, settings: Mapping[str, TaskSettings] | None = None)
     if tasks:
         sources.append(task_source(str(path), tasks, _property(root, "Name"), settings))
         diagnostics += _other_settings(xml, root, tasks, settings or {})
-    references = tuple(item.get("Include").partition(",")[0] for item in _references(root))
     return Imported({source.name: source.text for source in sources}, diagnostics, "twincat",
-                    f"{path.name} is a project of TwinCAT", references)  # fmt: skip
+                    f"{path.name} is a project of TwinCAT", tuple(map(referred, references(root))),
+                    uses=tuple(used_projects(path, root)), parameters=parameters(root))  # fmt: skip
 
 
 def task_source(name: str, tasks: list[Element], application: str = "",
@@ -85,13 +86,9 @@ def _property(root: Element, name: str) -> str:
     return next((found.text.strip() for group in root.all("PropertyGroup") if (found := group.one(name)) is not None), "")
 
 
-def _references(root: Element) -> list[Element]:
-    return [item for group in root.all("ItemGroup") for item in group.all("PlaceholderReference", "LibraryReference")]
-
-
 def _spaces(root: Element) -> list[str]:
     """The names that may stand in front of names of this project, where others use it, and of the libraries it refers to."""
-    named = [found.text.strip() for item in _references(root) if (found := item.one("Namespace")) is not None]
+    named = [found.text.strip() for item in references(root) if (found := item.one("Namespace")) is not None]
     named.append(_property(root, "DefaultNamespace") or _property(root, "Title"))
     return [name for name in dict.fromkeys(named) if _IDENTIFIER.fullmatch(name) and "." not in name]
 

@@ -41,6 +41,7 @@ def read_system(path: Path) -> Imported:
             found.append(made)
     if said or not found:
         return Imported({}, said) if said else _refused(xml, root, "the system has no PLC project")
+    found = _not_used(found) or found
     if len(found) > 1:
         names = " ".join(project.name for project in found)
         return _refused(xml, root, f"the system has {len(found)} PLC projects: {names}",
@@ -49,6 +50,18 @@ def read_system(path: Path) -> Imported:
         return read_project(found[0], dict(_tasks(root)))
     except OSError as error:
         return _refused(xml, root, f"{found[0]} cannot be read: {reason(error)}")
+
+
+def _not_used(found: list[Path]) -> list[Path]:
+    """Of several PLC projects those that no other one refers to as a library; none if one cannot be read."""
+    if len(found) == 1:
+        return found
+    try:
+        made = [read_project(path) for path in found]
+    except OSError:
+        return []
+    used = {path.resolve() for each in made for path in each.uses}
+    return [path for path in found if path.resolve() not in used]
 
 
 def _refused(xml: Source, element: Element, message: str, hint: str = "") -> Imported:
