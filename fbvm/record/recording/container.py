@@ -16,8 +16,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 MAGIC = b"FBVMREC1"
 START, PLC, KEYFRAME, SCANS, END = 1, 2, 3, 4, 5
@@ -36,8 +35,7 @@ class RecordingError(ValueError):
     """The file is no recording or is damaged; the message says in which way."""
 
 
-@dataclass(frozen=True)
-class BlockHead:
+class BlockHead(NamedTuple):
     """What the head of a block says, and where in the file the block begins."""
 
     kind: int

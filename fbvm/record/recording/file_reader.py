@@ -224,7 +224,7 @@ class FileRecordedPlc(RecordedPlc):
 
     def keyframe(self, scan: int) -> int:
         """The number of the chunk in which a scan is."""
-        return max(bisect_right(self._blocks.chunks, scan, key=lambda chunk: chunk.first) - 1, 0)
+        return max(bisect_right(self._blocks.chunks.firsts, scan) - 1, 0)
 
     @property
     def count(self) -> int:
@@ -271,10 +271,10 @@ class FileRecordedPlc(RecordedPlc):
 
     def _base(self, at: int) -> list[Snapshot]:
         """The memories of the keyframe at a byte of the file."""
-        head: BlockHead | None = self._blocks.keyframes.get(at)
+        head = self._blocks.keyframes.get(at)
         if head is None:
             raise ValueError(f"no keyframe at byte {at}")
-        return self._keyframes.base(read_block(self._file, head))
+        return self._keyframes.base(read_block(self._file, BlockHead(*head)))
 
     def inputs(self, scan: int) -> ScanInputs | None:
         chunk = self.chunk(scan)
