@@ -101,3 +101,54 @@ def test_a_run_begins_with_the_memory_window_if_asked_to(tmp_path: Path) -> None
     for options, value in (([], 0), (["--memory"], 500)):
         done = CliRunner().invoke(main, ["run", str(file), *options, "--for", "10ms", "--show", "D200"])
         assert (done.exit_code, done.output.split()[:3]) == (0, ["D200", "=", str(value)])
+
+
+WORKER = """  Program[1]:=
+  BEGIN
+   Name:="Worker";
+   TaskID:=259;
+   Sections:=
+   BEGIN
+    SC:=1;
+    Sec[0]:=
+    BEGIN
+     IEC1131Type:=11;
+     SecName:="Work";
+     ProgramData:=
+     BEGIN
+      RC:=1;
+      R[0]:=
+      BEGIN
+       Com:="";
+       Flags:="1,0";
+       SL:=
+$?St$Bk?_#[90]
+LD P_On
+++(590) D7
+$?St$Bk?_#[90]
+      END;
+     END;
+    END;
+   END;
+  END;
+"""
+"""A program of cyclic task 3 that does not run from the start."""
+
+
+@pytest.mark.slow
+def test_a_task_that_an_instruction_starts_runs_and_goes_through_sources_and_back(tmp_path: Path) -> None:
+    text = SAMPLE.text.replace("OUT Pump\n", "OUT Pump\n@TKON(820) 3\n")
+    text = text.replace("  END;\r\n END;\r\nEND;", f"  END;\r\n{WORKER} END;\r\nEND;")
+    file, folder, made = tmp_path / "line3.cxt", tmp_path / "line3", tmp_path / "made.cxt"
+    file.write_bytes(text.encode("cp1252"))
+    run = CliRunner().invoke
+    imported = run(main, ["import", str(file), "-o", str(folder)])
+    assert imported.exit_code == 0 and "warning" not in imported.output, imported.output
+    for where in (file, folder):
+        done = run(main, ["run", str(where), "--set", "Start_PB=TRUE@20ms", "--scans", "6", "--show", "D7"])
+        assert (done.exit_code, done.output) == (0, "D7 = 4 (16#0004)\n")
+    assert "IF NOT CX_Task(3, FALSE) THEN" in (folder / "Worker.st").read_text(encoding="utf-8")
+    done = run(main, ["export", str(folder), "--into", str(file), "-o", str(made)])
+    assert done.exit_code == 0, done.output
+    assert made.read_bytes() == file.read_bytes()
+    assert run(main, ["diff", "-q", str(file), str(folder)]).exit_code == 0

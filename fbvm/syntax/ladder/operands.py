@@ -45,6 +45,8 @@ _TASK = re.compile(r"TK\d+", re.I)
 _REGISTER = re.compile(r"([ID]R)(\d+)", re.I)
 _POINTED = re.compile(r"([+-]?\d+|DR\d+)?,(-{0,2})IR(\d+)(\+{0,2})", re.I)
 """An operand by index register: `5,IR0` with an offset, `,-IR0` counted down before its use, `,IR0+` counted up after it."""
+TASKS = 128
+"""Number of cyclic tasks, and of their flags."""
 REGISTERS = 16
 """Number of index registers, and of data registers."""
 BCD = {"z": "w", "Z": "d"}
@@ -90,7 +92,7 @@ class Operands:
         if wanted == "x" and not _REGISTER.fullmatch(text):
             raise OperandError(f"{text} cannot be {role}", "write IR0 to IR15")
         if _TASK.fullmatch(text):
-            raise OperandError(f"{text} is understood and not executed", "tasks have names here, and no flags")
+            return self._task(text, wanted, start, end)
         if register := _REGISTER.fullmatch(text):
             return self._register(register, wanted, start, end)
         if "," in text and not _REAL.fullmatch(text):
@@ -179,6 +181,13 @@ class Operands:
         return self._memory(Binary(start, end, "+", self._number(base, start, end), number, start), wanted, start, end)
 
     # --- index and data registers ---
+
+    def _task(self, text: str, wanted: str, start: int, end: int) -> Expr:
+        """TK03: whether a cyclic task is executed."""
+        number = whole_number(text[2:])
+        if number >= TASKS or wanted != "b":
+            raise OperandError(f"{text} cannot be {self.role}", f"TK000 to TK{TASKS - 1} are flags that are read")
+        return Index(start, end, NameRef(start, end, "CX_TK"), (self._index(number, start, end),))
 
     def _register(self, register: re.Match[str], wanted: str, start: int, end: int) -> Expr:
         """IR0 as two words, DR0 as one."""

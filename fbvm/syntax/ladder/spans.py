@@ -14,7 +14,8 @@ from fbvm.base.digits import whole_number
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.context import Interlock, RungContext, StepRefused
 from fbvm.syntax.ladder.mnemonics import RungText
-from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
+from fbvm.syntax.ladder.operands import TASKS
+from fbvm.syntax.tree import Action, Argument, Block, Call, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
 from fbvm.syntax.tree.ladder import Rung
 
 INTERLOCK = "$IL"
@@ -70,7 +71,7 @@ class Spans:
         self._closing: str = ""
         """FOR, JMP or RET if the rung at work ends the innermost loop or subroutine."""
         self.instructions: dict[str, Callable[[], None]] = {
-            ".end": self.end,
+            ".end": self.end, ".task_on": self.task_on, ".task_off": self.task_off,
             ".interlock": self.interlock, ".interlock_clear": self.interlock_clear,
             ".interlock_number": self.interlock_number, ".interlock_end": self.interlock_end,
             ".jump": self.jump, ".jump_end": self.jump_end,
@@ -175,6 +176,23 @@ class Spans:
     def end(self) -> None:
         """END: the rungs that follow are not executed."""
         self.context.out.append(Return(self.context.start, self.context.end))
+
+    def task_on(self) -> None:
+        """TKON: a cyclic task is executed from now on."""
+        self._switch_task("CX_TKON")
+
+    def task_off(self) -> None:
+        """TKOF: a cyclic task is executed no longer; the rungs that follow are not executed if it is the own one."""
+        self._switch_task("CX_TKOF")
+
+    def _switch_task(self, function: str) -> None:
+        """Calls a function with the number of a task, and leaves the program if it says so."""
+        context = self.context
+        number = context.number(whole_number(self._number(context.line.step.operands[0], "cyclic task", TASKS)))
+        leaves = Call(context.start, context.end, NameRef(context.start, context.end, function),
+                      (Argument(context.start, context.end, "", None, number),))  # fmt: skip
+        done = context.if_reachable(context.when(leaves, Return(context.start, context.end)))
+        context.emit(context.when(context.variation(context.power()), *done))
 
     # --- interlocks ---
 

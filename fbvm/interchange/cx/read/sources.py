@@ -20,6 +20,8 @@ _TYPES = {"0": "BOOL", "1": "INT", "2": "UINT", "3": "DINT", "4": "UDINT", "5": 
           "9": "LWORD", "10": "REAL", "11": "LREAL"}  # fmt: skip
 """Numbers in the rows of a function block's variables -> types."""
 TIMER, COUNTER = "13", "14"
+_SWITCH = re.compile(r"[!@%]?(?:TKON|TKOF)\b|\S+ TK\d+$", re.I)
+"""An instruction that starts or stops a task, or reads the flag of one."""
 _ASKS_FOR = ("EN", "ENO")
 
 
@@ -38,6 +40,9 @@ class _Sources:
         taken = {symbol.own.casefold() for symbol in plc.symbols}
         self.names: dict[int, str] = {}
         """By identity of a function block or program, its name in the sources."""
+        self._switches_tasks = any(_SWITCH.match(line) for program in plc.programs for section in program.sections
+                                   for rung in section.rungs for line in rung.lines)  # fmt: skip
+        """Whether instructions start and stop tasks, or read the flags of tasks."""
         pous: list[FunctionBlock | Program] = [*plc.blocks, *plc.programs]
         for pou in pous:
             name = free = spelling(pou.name)
@@ -123,7 +128,7 @@ class _Sources:
                    if symbol.type == BLOCK and symbol.own in called]
         lines = [f"// {' '.join(program.comment.split())}"] if program.comment else []
         lines += [f"PROGRAM {name}", *(["VAR_EXTERNAL", *outside, "END_VAR"] if outside else []),
-                  *self._declarations(program.symbols, "VAR", f"program {program.name}"), "LADDER"]
+                  *self._declarations(program.symbols, "VAR", f"program {program.name}"), *self._gate(program), "LADDER"]
         lines += self._rows((*self.plc.symbols, *program.symbols) if is_first else program.symbols, named=False)
         if not is_first:
             lines += self._rows(self.plc.symbols, named=True)
@@ -131,6 +136,12 @@ class _Sources:
         rows = _rows_by_name((*self.plc.symbols, *program.symbols))
         self.origins[file] = Origin(f"program {program.name}", rows, tuple(sections), (), program.value.start)
         reading.where = ""
+
+    def _gate(self, program: Program) -> list[str]:
+        """What a program of a cyclic task begins with where instructions start and stop tasks."""
+        if not self._switches_tasks or program.task is None or program.task not in CYCLIC:
+            return []
+        return [f"IF NOT CX_Task({program.task - CYCLIC.start}, {str(program.starts).upper()}) THEN", "RETURN;", "END_IF;"]
 
     def _configuration(self) -> None:
         """Which programs run: cyclic tasks in the order of their numbers."""
@@ -160,7 +171,7 @@ class _Sources:
             return "it is given to no task"
         if program.task not in CYCLIC:
             return f"it belongs to interrupt task {program.task}, and interrupts are not emulated"
-        return "" if program.starts or not any_starts else "its task does not run from the start"
+        return "" if program.starts or self._switches_tasks or not any_starts else "its task does not run from the start"
 
     # --- function blocks ---
 
