@@ -5,6 +5,7 @@ for `sys` in its place, and uses the names that only one system has behind that 
 
 from __future__ import annotations
 
+import errno
 import mmap
 import os
 import re
@@ -16,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PureWindowsPath
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import selectors
@@ -179,6 +180,40 @@ def ignore(numbers: Iterable[signal.Signals]) -> None:
 def can_end_others() -> bool:
     """True if a program can ask another one to end, and not only end it: Windows has no SIGTERM."""
     return sys.platform != "win32"
+
+
+# --- files that one process has ---------------------------------------------------------------------------------------
+
+LOCKED_AT = 1 << 62
+"""Which byte is locked under Windows: one that nobody reads or writes."""
+
+
+def taken_alone(file: IO[bytes]) -> bool:
+    """Takes an open file for this process alone, until it is closed or the process ends; False if another process has it.
+
+    Others may still read and write it; they only cannot take it."""
+    number = file.fileno()
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            at = os.lseek(number, 0, os.SEEK_CUR)
+            try:
+                os.lseek(number, LOCKED_AT, os.SEEK_SET)
+                msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+            finally:
+                os.lseek(number, at, os.SEEK_SET)
+        else:
+            import fcntl
+
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK):
+            return False
+        if error.errno in (errno.ENOTSUP, errno.ENOLCK, errno.ENOSYS):
+            return True  # some file systems of networks lock nothing
+        raise
+    return True
 
 
 # --- sockets ----------------------------------------------------------------------------------------------------------

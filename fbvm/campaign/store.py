@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from fbvm.base.files import write_file
+from fbvm.base.host import taken_alone
 from fbvm.base.version import VERSION
 from fbvm.campaign.execution import Result
 from fbvm.campaign.judge import Failure
@@ -26,22 +27,30 @@ class OtherCampaign(Exception):
     """The folder holds results of another campaign; the message says so."""
 
 
+class InUse(Exception):
+    """Another process writes results into the folder; the message says so."""
+
+
 class Store:
-    """The file of results of a folder, which is made if it is missing.  `mark` stands for all that results depend on.
+    """The file of results of a folder, which is made if it is missing.  `mark` stands for all that results depend on; `fresh`
+    drops what is there.
 
-    Raises OtherCampaign for a file with results of anything else, OSError."""
+    Raises InUse while another process has it, OtherCampaign for a file with results of anything else, OSError."""
 
-    def __init__(self, folder: Path, mark: str) -> None:
+    def __init__(self, folder: Path, mark: str, fresh: bool = False) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / LINES
         self.known: list[Result] = []
         """The results that are there."""
         head = {"format": FORMAT, "fbvm": VERSION, "campaign": mark}
-        if path.exists():
-            self._file: BinaryIO = open(path, "r+b")  # noqa: SIM115 - close closes it
-            self._resume(head)
-        else:
-            self._file = open(path, "wb")  # noqa: SIM115
+        path.touch()
+        self._file: BinaryIO = open(path, "r+b")  # noqa: SIM115 - close closes it
+        if not taken_alone(self._file):
+            self._file.close()
+            raise InUse("is in use: another campaign writes its results there")
+        if fresh:
+            self._file.truncate(0)
+        self._resume(head)
         if not self._file.tell():
             self._write(head)
 

@@ -131,13 +131,13 @@ def _changed(written: Written, usual_ns: int | None, options: dict[str, Any]) ->
 
 def _open(make: type[Store], folder: Path, mark: str, fresh: bool) -> Store:
     """The results that a folder has, or none yet."""
-    from fbvm.campaign.store import LINES, OtherCampaign
+    from fbvm.campaign.store import InUse, OtherCampaign
 
     with writing(folder):
-        if fresh:
-            (folder / LINES).unlink(missing_ok=True)
         try:
-            return make(folder, mark)
+            return make(folder, mark, fresh)
+        except InUse as error:
+            raise click.UsageError(f"{named(folder)} {error}; wait for it, or name another folder by --out") from None
         except OtherCampaign as error:
             raise click.UsageError(f"{named(folder)} {error}: name another folder by --out, or begin anew by --fresh") from None
 

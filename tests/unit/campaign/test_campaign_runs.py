@@ -7,6 +7,8 @@ import json
 import os
 import shutil
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -17,6 +19,7 @@ import pytest
 from click.testing import CliRunner
 
 from fbvm.base.data import data_folder
+from fbvm.base.host import can_end_others
 from fbvm.campaign.axes import axis_from_text
 from fbvm.campaign.execution import Result
 from fbvm.campaign.executors import InThisProcess, in_processes
@@ -25,7 +28,7 @@ from fbvm.campaign.plan import Moments, PowerRule
 from fbvm.campaign.plan_file import Written, with_about
 from fbvm.campaign.planning import images_of, plan_of, program_project
 from fbvm.campaign.runs import Outcome, conduct
-from fbvm.campaign.store import LINES, TABLE, OtherCampaign, Store, write_table
+from fbvm.campaign.store import LINES, TABLE, InUse, OtherCampaign, Store, write_table
 from fbvm.campaign.work import Batch, Bench, Done, Task
 from fbvm.cli.main import main
 
@@ -166,6 +169,32 @@ def test_a_campaign_goes_on_where_it_was_cut_off(folder: Path) -> None:
     assert fbvm(*arguments)[0] == 1
     assert kept.read_bytes() == whole
     assert lines.read_bytes().splitlines(keepends=True) == [text[0], text[1], marked, *text[3:]]
+
+
+def lines_in(path: Path) -> int:
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not can_end_others(), reason="Windows cannot end a process as SIGKILL does")
+def test_a_campaign_whose_own_process_is_killed_gives_the_same_table_when_it_is_called_again(folder: Path) -> None:
+    """With its processes at work; a second campaign in the folder is refused meanwhile."""
+    arguments = ["mix.st", "--runs", "500", "--cuts", "1", "--for", "600ms", "--never", "Main.Up AND Main.Down", "--jobs", "2"]
+    lines = folder / "killed" / LINES
+    victim = subprocess.Popen([sys.executable, "-m", "fbvm", "campaign", *arguments, "--out", "killed"])
+    try:
+        while lines_in(lines) < 20:
+            assert victim.poll() is None, "it has ended before it was killed"
+        with pytest.raises(InUse, match="another campaign writes its results there"):
+            Store(lines.parent, "mark", fresh=True)
+    finally:
+        victim.kill()
+        victim.wait()
+    kept = lines_in(lines)
+    assert 20 <= kept < 501
+    assert [fbvm(*arguments, "--out", name)[0] for name in ("killed", "whole")] == [0, 0]
+    assert (folder / "killed" / TABLE).read_bytes() == (folder / "whole" / TABLE).read_bytes()
+    assert lines_in(folder / "whole" / LINES) == lines_in(lines) == 501
 
 
 def test_results_of_another_campaign_are_not_mixed(folder: Path) -> None:
