@@ -1,10 +1,14 @@
 """How many runs a second a campaign executes: python tests/bench/campaigns.py [RUNS].
 
 The client of examples/demo.st under two network faults and a power cut a run, two seconds of virtual time each: in one process,
-in two, and by two Dask workers of this machine; and whether all came to the same results."""
+in two, and by two Dask workers of this machine; and whether all came to the same results.
+
+Beside the rate stands the processor time of a run, by whoever executes it, and in this process, which hands out and collects:
+on a machine that does nothing else the rate of N processes is N over their sum."""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -37,6 +41,12 @@ def demo(runs: int) -> Bench:
     return Bench.of(plan_of(written, project, images), images)
 
 
+def processor_s() -> tuple[float, float]:
+    """Seconds of processor time: of this process, and of those that it has started and that are over."""
+    used = os.times()
+    return used.user + used.system, used.children_user + used.children_system
+
+
 def conducted(bench: Bench, executor: Executor, jobs: int) -> tuple[float, Outcome]:
     """Seconds from the first result to the last one, and what came of it: to start processes takes a second or two."""
     outcome, times = Outcome(bench.plan), list[float]()
@@ -65,11 +75,14 @@ def main() -> None:
     first: list[Result] = []
     alone = 0.0
     for name, (executor, jobs) in ways.items():
+        before = processor_s()
         took, outcome = conducted(bench, executor, jobs)
+        here, there = (1000 * (now - then) / runs for now, then in zip(processor_s(), before, strict=True))
         rate = runs / max(took, 1e-9)
         alone = alone or rate
         first = first or outcome.rows
-        row(f"{runs:,} runs by {name}", f"{rate:.0f} a second", f"{rate / alone:.2f} times one process")
+        row(f"{runs:,} runs by {name}", f"{rate:.0f} a second", f"{rate / alone:.2f} times one process; processor time of a run "
+            f"{there:.2f} ms there, {here:.2f} ms here")  # fmt: skip
         assert outcome.rows == first, f"{name} came to other results"
     row("  scans in all, all ways with the same results", f"{sum(result.scans for result in first):,}")
 

@@ -14,6 +14,7 @@ import fbvm
 from fbvm.cli.projects.cluster import cluster_of, cluster_option
 from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
 from fbvm.cli.projects.runs_of_tests import bench_of_tests, record_test, travelling
+from fbvm.cli.projects.shown_progress import PAGE, ShownProgress
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.options import moment_ns
@@ -56,6 +57,8 @@ FOLDER = Path("campaign-results")
 @click.option("--only", type=click.IntRange(min=0), metavar="N", help="Execute run N alone, and record it.")
 @click.option("--write-golden", is_flag=True, help="Write golden files, from a run with the first values and without faults.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--json-lines", is_flag=True, help="Print a JSON object a line about once a second while it runs; the last is that "
+              "of --json.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     """Run a program, a project or tests many times, each time under other faults and parameters, in virtual time on all
     processors.
@@ -83,11 +86,12 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
             sys.exit(_execute_one(bench, options["only"], options["folder"]))
         store = _open(Store, options["folder"], bench.mark, options["fresh"])
         outcome.add(store.known)
+        shown = ShownProgress(outcome, options["folder"] / PAGE, options["json_lines"])
         try:
-            _conduct(bench, outcome, store, processes(options["jobs"]), options["cluster"])
+            _conduct(bench, outcome, store, shown, processes(options["jobs"]), options["cluster"])
         finally:
+            _finish(bench, outcome, options, shown, as_json or options["json_lines"])
             store.close()
-            _finish(bench, outcome, options, as_json)
     except Wrong as error:
         refuse(error.diagnostics)
     except (Mismatch, Unreachable) as error:
@@ -142,22 +146,17 @@ def _open(make: type[Store], folder: Path, mark: str, fresh: bool) -> Store:
             raise click.UsageError(f"{named(folder)} {error}: name another folder by --out, or begin anew by --fresh") from None
 
 
-def _conduct(bench: AnyBench, outcome: Outcome, store: Store, jobs: int, cluster: str | None) -> None:
+def _conduct(bench: AnyBench, outcome: Outcome, store: Store, shown: ShownProgress, jobs: int, cluster: str | None) -> None:
     """Executes what is left of a campaign, and shows how it goes."""
     from fbvm.campaign.executors import ByWorkers
     from fbvm.campaign.runs import conduct
-    from fbvm.run.time_limit import stopwatch
 
-    known, there = outcome.plan.count, len(outcome.results)
     with show_progress("campaign") as update:
-        elapsed = stopwatch()
 
         def take(found: Sequence[Result]) -> None:
             store.add(found)
             outcome.add(found)
-            done = len(outcome.results)
-            rate = (done - there) * 1_000_000_000 / max(elapsed(), 1)
-            update(f"{done:,} of {known:,} runs, {outcome.failing:,} failing, {rate:.0f} a second,", done, known)
+            update(shown.add(found), len(outcome.results), outcome.plan.count)
 
         conduct(bench, outcome, jobs, take, ByWorkers(cluster_of(travelling(bench), cluster, jobs)) if cluster else None)
 
@@ -165,8 +164,8 @@ def _conduct(bench: AnyBench, outcome: Outcome, store: Store, jobs: int, cluster
 # --- what is left behind ----------------------------------------------------------------------------------------------
 
 
-def _finish(bench: AnyBench, outcome: Outcome, options: dict[str, Any], as_json: bool) -> None:
-    """Writes table and recordings, and prints what came of the campaign, also of one that was interrupted."""
+def _finish(bench: AnyBench, outcome: Outcome, options: dict[str, Any], shown: ShownProgress, as_json: bool) -> None:
+    """Writes table, recordings and the last page, and prints what came of the campaign, also of one that was interrupted."""
     from fbvm.campaign.store import TABLE, write_table
 
     if not outcome.results:
@@ -182,6 +181,7 @@ def _finish(bench: AnyBench, outcome: Outcome, options: dict[str, Any], as_json:
             again = _recorded(bench, group.shrunk.variant, path)
             if again != group.shrunk.result:
                 say(f"{named(path)}: run {group.first} did not give the same result again", fg="red", err=True)
+    shown.end({first: str(path.relative_to(folder)) for first, path in recordings.items() if path.exists()})
     if as_json:
         say_json(_as_dict(outcome, recordings))
     else:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from fbvm.base.memory import Memory
+from fbvm.base.types import fold
 from fbvm.code.image import Image
 from fbvm.machine.servicing.registers import Registers
 from fbvm.processor.contract import Contract
-from fbvm.watch.paths import UnknownPlace
+
+SETTING = "CX_Clock_Setting"
 
 
 class ClockSetting:
     """The variable of one PLC whose program has DATE."""
 
     def __init__(self, image: Image, memory: Memory) -> None:
-        self._words, self._at = memory.views["i64"], Contract(image).offset("CX_Clock_Setting") // 8
+        self._words, self._at = memory.views["i64"], Contract(image).offset(SETTING) // 8
 
     def serve(self, registers: Registers, now_ns: int) -> bool:
         """Sets the clock if the program has asked for it.  Returns True if it did."""
@@ -26,7 +28,4 @@ class ClockSetting:
 
 def clock_setting_of(image: Image, memory: Memory) -> ClockSetting | None:
     """The variable of a program; None if it has no DATE."""
-    try:
-        return ClockSetting(image, memory)
-    except UnknownPlace:
-        return None
+    return ClockSetting(image, memory) if fold(SETTING) in image.symbols else None

@@ -13,9 +13,9 @@ from typing import Any
 
 from fbvm.base.areas import E_NAMES, E_PLC_ADDRESS, E_WORDS, FLAG_AREAS, NEVER, PLC_ADDRESSES
 from fbvm.base.memory import STRUCTS, Memory
+from fbvm.base.types import fold
 from fbvm.code.image import Image
 from fbvm.processor.contract import Contract
-from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.fins.areas import WORD_CODES
 from fbvm.wire.fins.codes import EndCode
 from fbvm.wire.fins.frames import COMMAND, EVERY_NODE, MAX_PARAMETER_BYTES, NO_RESPONSE, Address, Command, Header, Response
@@ -210,10 +210,7 @@ class CommunicationsPorts:
 
 def ports_of(image: Image, memory: Memory) -> CommunicationsPorts | None:
     """The ports of a program; None if it has no network instruction."""
-    try:
-        return CommunicationsPorts(image, memory)
-    except UnknownPlace:
-        return None
+    return CommunicationsPorts(image, memory) if fold(PORTS) in image.symbols else None
 
 
 _RANGES = sorted(((first, area) for area, first in (
