@@ -84,6 +84,12 @@ def test_every_script_is_tried() -> None:
     assert tried | {"mutants"} == set(SCRIPTS)  # test_mutants.py
 
 
+def test_the_script_latencies(load: Load) -> None:
+    script = load("latencies")
+    rows = [*script.editor(300, 300, 1), *script.debugger(20)]
+    assert len(rows) == 7 and all(taken > 0 for _, taken, _ in rows)
+
+
 def test_the_script_checking(load: Load) -> None:
     assert set(load("checking").measured(100)) == {"lines", "parse", "compile", "check", "mib"}
 
