@@ -29,6 +29,8 @@ class Block:
     step: int
     runs_base: bool
     bonus: int | None
+    taken: int | None
+    """What SET takes off the value; None if it is inherited."""
     derived: list[Block] = field(default_factory=list)
 
     def lineage(self) -> list[Block]:
@@ -45,6 +47,8 @@ class Instance:
 
     def __init__(self, block: Block) -> None:
         self.block, self.count = block, 0
+        self.own = {level.name: 0 for level in block.lineage()}
+        """The variable that each block of the lineage declares."""
 
     def call(self, number: int, given: int, above: list[Block] | None = None) -> int:
         """m<number>(given), as seen from the blocks `above`, the most derived first."""
@@ -64,7 +68,8 @@ class Instance:
         block, *more = above if above is not None else self.block.lineage()
         if block.runs_base:
             self.run(more)
-        self.count = wrapped(self.count + block.step)
+        self.own[block.name] = wrapped(self.own[block.name] + block.step)
+        self.count = wrapped(self.count + self.own[block.name])
 
     @property
     def level(self) -> int:
@@ -74,7 +79,8 @@ class Instance:
 
     @level.setter
     def level(self, value: int) -> None:
-        self.count = wrapped(value - 1)
+        taken = next(block.taken for block in self.block.lineage() if block.taken is not None)
+        self.count = wrapped(value - taken)
 
 
 def hierarchy(random: Random) -> list[Block]:
@@ -85,7 +91,8 @@ def hierarchy(random: Random) -> list[Block]:
         own = [m for m in range(METHODS) if base is None or random.random() < 0.5]
         methods = {m: _override(random, m, base is not None) for m in own}
         bonus = random.randint(-50, 50) if base is None or random.random() < 0.4 else None
-        block = Block(f"B{number}", base, methods, random.randint(1, 9), base is not None and random.random() < 0.6, bonus)
+        taken = random.randint(-9, 9) if base is None or random.random() < 0.4 else None
+        block = Block(f"B{number}", base, methods, random.randint(1, 9), base is not None and random.random() < 0.6, bonus, taken)
         blocks.append(block)
     return blocks
 
@@ -103,35 +110,45 @@ def text(random: Random, blocks: list[Block], instances: list[Block]) -> tuple[s
     for place in range(24):
         which, number, given = random.randrange(len(objects)), random.randrange(METHODS), random.randint(-1000, 1000)
         target, one = f"r[{place}] := ", objects[which]
-        way = random.choice(("name", "in-out", "interface", "pointer", "body", "get", "set", "array"))
+        base = random.choice(one.block.lineage()).name
+        pointed, referred = f"p{base} := ADR(o{which}); ", f"r{base} REF= o{which}; "
+        way = random.choice(("body", "get", "set", *("call",) * 5))
         if way == "body":
             one.run()
-            lines.append(random.choice((f"o{which}();", f"p := ADR(o{which}); p^();", f"Run(o{which});")))
+            lines.append(random.choice((f"o{which}();", f"{pointed}p{base}^();", f"{referred}r{base}();", f"Run(o{which});")))
         if way == "set":
             one.level = given
-            lines.append(random.choice((f"o{which}.Level := {given};", f"i := o{which}; i.Level := {given};")))
+            lines.append(random.choice((f"o{which}.Level := {given};", f"i := o{which}; i.Level := {given};",
+                                        f"{pointed}p{base}^.Level := {given};", f"{referred}r{base}.Level := {given};")))
         if way in ("body", "set", "get"):
             results.append(one.level)
-            lines.append(target + random.choice((f"o{which}.Level;", f"LevelOf(o{which});")))
+            lines.append(random.choice((f"{target}o{which}.Level;", f"{target}LevelOf(o{which});",
+                                        f"{referred}{target}r{base}.Level;", f"{target}o{which}.Me.Level;")))
             continue
         results.append(one.call(number, given))
         call = f".m{number}({random.choice(('', 'x := '))}{given});"
-        lines.append({"name": f"{target}o{which}{call}", "in-out": f"{target}Call{number}(o{which}, {given});",
-                      "interface": f"i := o{which}; {target}i{call}", "pointer": f"p := ADR(o{which}); {target}p^{call}",
-                      "array": f"list[{which}] := o{which}; {target}list[{which}]{call}"}[way])
+        lines.append(random.choice((
+            f"{target}o{which}{call}", f"{target}Call{number}(o{which}, {given});", f"i := o{which}; {target}i{call}",
+            f"{pointed}{target}p{base}^{call}", f"{referred}{target}r{base}{call}", f"{target}Refer{number}(o{which}, {given});",
+            f"list[{which}] := o{which}; {target}list[{which}]{call}", f"all[{which}] := ADR(o{which}); {target}all[{which}]^{call}",
+            f"{target}o{which}.Itself(){call}", f"{target}o{which}.Me{call}", f"held.i := o{which}; {target}held.i{call}")))
     declared = "".join(f"o{number} : {block.name}; " for number, block in enumerate(instances))
-    main = f"PROGRAM Main\nVAR {declared}p : POINTER TO B0; i : I; list : ARRAY [0..{len(instances)}] OF I; " \
-        f"r : ARRAY [0..23] OF DINT; done : BOOL; END_VAR\nIF done THEN RETURN; END_IF\ndone := TRUE;\n" + "\n".join(lines)
+    declared += "".join(f"p{block.name} : POINTER TO {block.name}; r{block.name} : REFERENCE TO {block.name}; " for block in blocks)
+    main = f"PROGRAM Main\nVAR {declared}i : I; held : Held; list : ARRAY [0..{len(instances)}] OF I; " \
+        f"all : ARRAY [0..{len(instances)}] OF POINTER TO B0; r : ARRAY [0..23] OF DINT; done : BOOL; END_VAR\n" \
+        "IF done THEN RETURN; END_IF\ndone := TRUE;\n" + "\n".join(lines)
     return f"{_interface()}{''.join(map(_block, blocks))}{_functions()}{main}\nEND_PROGRAM\n", results
 
 
 def _interface() -> str:
     heads = "".join(f"METHOD m{m} : DINT VAR_INPUT x : DINT; END_VAR END_METHOD\n" for m in range(METHODS))
-    return f"INTERFACE I\n{heads}PROPERTY Level : DINT GET END_GET SET END_SET END_PROPERTY\nEND_INTERFACE\n"
+    return f"INTERFACE I\n{heads}PROPERTY Level : DINT GET END_GET SET END_SET END_PROPERTY\nEND_INTERFACE\n" \
+        "TYPE Held : STRUCT i : I; END_STRUCT END_TYPE\n"
 
 
 def _functions() -> str:
     calls = "".join(f"FUNCTION Call{m} : DINT VAR_IN_OUT b : B0; END_VAR VAR_INPUT x : DINT; END_VAR Call{m} := b.m{m}(x); "
+                    f"END_FUNCTION\nFUNCTION Refer{m} : DINT VAR_INPUT b : REFERENCE TO B0; x : DINT; END_VAR Refer{m} := b.m{m}(x); "
                     "END_FUNCTION\n" for m in range(METHODS))
     return calls + "FUNCTION LevelOf : DINT VAR_INPUT i : I; END_VAR LevelOf := i.Level; END_FUNCTION\n" \
         "FUNCTION Run : BOOL VAR_IN_OUT b : B0; END_VAR b(); END_FUNCTION\n"
@@ -139,8 +156,11 @@ def _functions() -> str:
 
 def _block(block: Block) -> str:
     head = f"FUNCTION_BLOCK {block.name} " + (f"EXTENDS {block.base.name}" if block.base else "IMPLEMENTS I")
-    own = "" if block.base else "\nVAR count : DINT; END_VAR"
+    own = f"\nVAR {'' if block.base else 'count : DINT; '}own{block.name} : DINT; END_VAR"
     parts = [head + own]
+    if block.base is None:
+        parts += ["METHOD Itself : REFERENCE TO B0 Itself REF= THIS^; END_METHOD",
+                  "PROPERTY Me : REFERENCE TO B0 GET Me REF= THIS^; END_GET END_PROPERTY"]
     for number, made in block.methods.items():
         body = f"count := count + 1; t := x * {made.factor} + {made.summand};"
         if made.adds_super:
@@ -148,8 +168,10 @@ def _block(block: Block) -> str:
         body += "".join(f" t := t + {how}m{other}(t);" for other, how in made.calls)
         parts.append(f"METHOD m{number} : DINT VAR_INPUT x : DINT; END_VAR VAR t : DINT; END_VAR {body} m{number} := t + count; "
                      "END_METHOD")
-    setter = " SET count := Level - 1; END_SET" if block.base is None else ""
-    if block.bonus is not None:
-        parts.append(f"PROPERTY Level : DINT GET Level := count * 3 + {block.bonus}; END_GET{setter} END_PROPERTY")
+    accessors = f"GET Level := count * 3 + {block.bonus}; END_GET " * (block.bonus is not None)
+    accessors += f"SET count := Level - {block.taken}; END_SET " * (block.taken is not None)
+    if accessors:
+        parts.append(f"PROPERTY Level : DINT {accessors}END_PROPERTY")
     run = "SUPER(); " if block.runs_base else ""
-    return "\n".join([*parts, f"{run}count := count + {block.step};", "END_FUNCTION_BLOCK\n"])
+    body = f"{run}own{block.name} := own{block.name} + {block.step}; count := count + own{block.name};"
+    return "\n".join([*parts, body, "END_FUNCTION_BLOCK\n"])

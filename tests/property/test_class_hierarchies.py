@@ -29,7 +29,8 @@ def compared(seed: int, engines: tuple[str, ...]) -> None:
         plc = Plc(made.image, engine="native") if engine == "native" else Plc(made.image, observed=engine == "observed")
         assert plc.scan() is None, f"seed {seed}, {engine}"
         assert [plc.read(f"Main.r[{place}]") for place in range(len(wanted))] == wanted, f"seed {seed}, {engine}\n{text}"
-        memories.append([plc.read(f"Main.o{number}.count") for number in range(len(instances))])
+        memories.append([plc.read(f"Main.o{number}.{name}") for number, block in enumerate(instances)
+                         for name in ("count", *(f"own{level.name}" for level in block.lineage()))])
     assert all(memory == memories[0] for memory in memories), f"seed {seed}"
 
 
