@@ -188,6 +188,14 @@ class SourceBuilder(SfcElements):
                         "write GET .. END_GET, SET .. END_SET, or both")
         return Members(word.start, end.end, tuple(methods))
 
+    def property_half(self, word: Token, head: Head, colon: Token, spec: TypeSpec, sections: list[Section], items: Items,
+                      end: Token) -> Members:
+        """`PROPERTY_GET name : T .. END_PROPERTY` and PROPERTY_SET: one accessor of a property."""
+        kind = word.text.upper().removeprefix("PROPERTY_")
+        accessor = self.accessor([], Token("ACCESSOR", kind, word.start, word.end), sections, items,
+                                 Token("END_ACCESSOR", f"END_{kind}", end.start, end.end))
+        return self.property(word, head, colon, spec, [accessor], end)
+
     @contextmanager
     def _apart(self, start: int) -> Iterator[None]:
         """Build what was read from `start` on as a POU of its own, inside the POU that is being read."""

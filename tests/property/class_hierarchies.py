@@ -130,10 +130,11 @@ def text(random: Random, blocks: list[Block], instances: list[Block]) -> tuple[s
         lines.append(random.choice((
             f"{target}o{which}{call}", f"{target}Call{number}(o{which}, {given});", f"i := o{which}; {target}i{call}",
             f"{pointed}{target}p{base}^{call}", f"{referred}{target}r{base}{call}", f"{target}Refer{number}(o{which}, {given});",
-            f"list[{which}] := o{which}; {target}list[{which}]{call}", f"all[{which}] := ADR(o{which}); {target}all[{which}]^{call}",
+            f"list[{which}] := o{which}; {target}list[{which}]{call}",
+            f"all[{which}] := ADR(o{which}); {target}all[{which}]^{call}",
             f"{target}o{which}.Itself(){call}", f"{target}o{which}.Me{call}", f"held.i := o{which}; {target}held.i{call}")))
     declared = "".join(f"o{number} : {block.name}; " for number, block in enumerate(instances))
-    declared += "".join(f"p{block.name} : POINTER TO {block.name}; r{block.name} : REFERENCE TO {block.name}; " for block in blocks)
+    declared += "".join(f"p{each.name} : POINTER TO {each.name}; r{each.name} : REFERENCE TO {each.name}; " for each in blocks)
     main = f"PROGRAM Main\nVAR {declared}i : I; held : Held; list : ARRAY [0..{len(instances)}] OF I; " \
         f"all : ARRAY [0..{len(instances)}] OF POINTER TO B0; r : ARRAY [0..23] OF DINT; done : BOOL; END_VAR\n" \
         "IF done THEN RETURN; END_IF\ndone := TRUE;\n" + "\n".join(lines)
@@ -148,7 +149,8 @@ def _interface() -> str:
 
 def _functions() -> str:
     calls = "".join(f"FUNCTION Call{m} : DINT VAR_IN_OUT b : B0; END_VAR VAR_INPUT x : DINT; END_VAR Call{m} := b.m{m}(x); "
-                    f"END_FUNCTION\nFUNCTION Refer{m} : DINT VAR_INPUT b : REFERENCE TO B0; x : DINT; END_VAR Refer{m} := b.m{m}(x); "
+                    f"END_FUNCTION\nFUNCTION Refer{m} : DINT VAR_INPUT b : REFERENCE TO B0; x : DINT; END_VAR "
+                    f"Refer{m} := b.m{m}(x); "
                     "END_FUNCTION\n" for m in range(METHODS))
     return calls + "FUNCTION LevelOf : DINT VAR_INPUT i : I; END_VAR LevelOf := i.Level; END_FUNCTION\n" \
         "FUNCTION Run : BOOL VAR_IN_OUT b : B0; END_VAR b(); END_FUNCTION\n"

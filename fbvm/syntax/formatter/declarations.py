@@ -108,6 +108,10 @@ class DeclarationLayout(TypeLayout, SfcLayout):
         return Phrase(word.start, self.leaf(word), " ", head, " ", self.leaf(colon), " ", spec.doc, self.block(accessors, end),
                       HARD, self.leaf(end), level="method")
 
+    def property_half(self, word: Token, head: Doc, colon: Token, spec: Phrase, sections: list[Phrase], items: list[Phrase],
+                      end: Token) -> Phrase:
+        return self.method(word, head, colon, spec, None, sections, items, end)
+
     def accessor(self, modifiers: list[Leaf], word: Token, sections: list[Phrase], items: list[Phrase], end: Token) -> Phrase:
         words = tuple(part for each in modifiers for part in (each, " "))
         made = self.function(word, (), None, None, None, sections, items, [], end)

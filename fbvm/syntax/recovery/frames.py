@@ -19,7 +19,8 @@ ENDS = {
     "CONFIGURATION": "END_CONFIGURATION", "RESOURCE": "END_RESOURCE", "ACTION": "END_ACTION", "ACTIONS": "END_ACTIONS",
     "VAR_ACCESS": "END_VAR", "VAR_CONFIG": "END_VAR", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION",
     "CLASS": "END_CLASS", "INTERFACE": "END_INTERFACE", "METHOD": "END_METHOD", "PROPERTY": "END_PROPERTY",
-    "ACCESSOR": "END_ACCESSOR"}
+    "PROPERTY_HALF": "END_PROPERTY",
+    "ACCESSOR": "END_ACCESSOR", "NAMESPACE": "END_NAMESPACE"}
 """Word that opens -> word that ends it."""
 
 OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}
@@ -27,7 +28,8 @@ OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL"
 for _opener, _end in ENDS.items():
     OPENERS.setdefault(_end, set()).add(_opener)
 
-UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "CLASS", "INTERFACE", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "$END"}
+UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "CLASS", "INTERFACE", "NAMESPACE", "TYPE", "VAR_GLOBAL", "CONFIGURATION",
+         "$END"}
 """Tokens that begin a declaration at the outermost level, and the end of the text."""
 
 POUS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM"}

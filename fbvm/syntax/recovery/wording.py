@@ -12,7 +12,8 @@ GROUPS = (
         "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "NAMESPACE", "END_NAMESPACE",
         "USING", "CLASS", "INTERFACE", "ACTION", "ACTIONS", "VAR_CONFIG", "SEMICOLON", "$END"}),
     ("a statement", {"IF", "FOR", "SEMICOLON"}, {
-        "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "METHOD", "PROPERTY",
+        "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "METHOD",
+        "PROPERTY", "PROPERTY_HALF",
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
         "NOT", "DIRECT", "LADDER", "INSTRUCTION_LIST"}),
     ("an expression", {"NAME", "NUMBER", "LPAR"}, {
@@ -37,7 +38,8 @@ LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
 UNSAID = {"NAMESPACE", "USING", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "JMP", "QUALIFIER", "EDGE",
-          "OVERLAP", "ACTION", "DIRECTION", "STEP", "TRANSITION", "METHOD", "PROPERTY", "ACCESSOR", "CLASS", "INTERFACE"}
+          "OVERLAP", "ACTION", "DIRECTION", "STEP", "TRANSITION", "METHOD", "PROPERTY", "PROPERTY_HALF",
+          "ACCESSOR", "CLASS", "INTERFACE"}
 """Terminals that are allowed and never mentioned: they would be refused later, or are seldom meant."""
 
 FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPAR", "RSQB")

@@ -24,7 +24,7 @@ NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "ST
 REFUSED = frozenset(("TRY",))
 DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
                       "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION", "END_TRANSITION", "END_CLASS",
-                      "END_METHOD", "END_ACCESSOR", "END_NAMESPACE"))
+                      "END_METHOD", "END_ACCESSOR", "END_NAMESPACE", "END_PROPERTY"))
 """Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the
 wrong one; the recovery needs the stacks as they are before that."""
 
