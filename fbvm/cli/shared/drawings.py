@@ -22,6 +22,7 @@ from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartRecorder
 from fbvm.record.draw.sfc_text import sfc_text
 from fbvm.record.trace.observing import observing
+from fbvm.syntax.ladder.drawing.cells import columns, padded
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
@@ -84,7 +85,7 @@ def rung_lines(image: Image, rungs: Sequence[RungPicture], width: int) -> list[l
 def _aligned(rungs: Sequence[tuple[RungPicture, Annotations]], width: int) -> list[list[str]]:
     """The lines of rungs, all right rails in one column."""
     drawn = [ladder_text(rung, width, annotations) for rung, annotations in rungs]
-    widest = max(len(row) for lines in drawn for row in ("", *lines[1:]) if row[:1] != " ")
+    widest = max(columns(row) for lines in drawn for row in ("", *lines[1:]) if row[:1] != " ")
     return [ladder_text(rung, width, annotations, widest) for rung, annotations in rungs]
 
 
@@ -103,8 +104,8 @@ def comment_lines(rung: RungPicture, pou: str, address: Callable[[str], str], kn
         comment = declared.comment if declared else known.addresses.get(operand, "")
         if comment:
             rows.setdefault(name, (name, operand if name == other else other, comment))
-    widths = [max((len(row[column]) for row in rows.values()), default=0) for column in (0, 1)]
-    return [f"  {name:{widths[0]}}  {place:{widths[1]}}  {comment}" for name, place, comment in rows.values()]
+    widths = [max((columns(row[column]) for row in rows.values()), default=0) for column in (0, 1)]
+    return [f"  {padded(name, widths[0])}  {place:{widths[1]}}  {comment}" for name, place, comment in rows.values()]
 
 
 _WORDS = re.compile(r"(?:(?<=:=)|(?<==>)|^)[@*]?([^\W]\w*(?:\.\w+)?)$")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher, unified_diff
 
 from fbvm.interchange.contents import Contents, Declared, Program, WrittenRung
+from fbvm.syntax.ladder.drawing.cells import cells, columns, padded, text_of
 from fbvm.syntax.ladder.drawing.drawing import rung_text
 
 GAP = "   "
@@ -89,11 +90,11 @@ def _pair(old: tuple[int, WrittenRung] | None, new: tuple[int, WrittenRung] | No
     half = (width - len(GAP)) // 2
     if half >= LEAST:
         left, right = _drawn("-", old, half), _drawn("+", new, half)
-        if max(map(len, left), default=0) <= half:
+        if max(map(columns, left), default=0) <= half:
             rows = max(len(left), len(right))
             left += [""] * (rows - len(left))
             right += [""] * (rows - len(right))
-            return [f"{one:{half}}{GAP}{other}".rstrip() for one, other in zip(left, right, strict=True)]
+            return [f"{padded(one, half)}{GAP}{other}".rstrip() for one, other in zip(left, right, strict=True)]
     return _drawn("-", old, width) + _drawn("+", new, width)
 
 
@@ -106,7 +107,14 @@ def _drawn(sign: str, rung: tuple[int, WrittenRung] | None, width: int) -> list[
     steps = [(step.prefix, step.mnemonic, step.operands) for step in written.steps]
     remarks = [f"{sign} {step.text} {' '.join(step.operands)}  // {step.remark}" for step in written.steps if step.remark]
     picture = [f"{sign} {line}" for line in rung_text(steps, width - 2)] if steps else []
-    return [head[:width], *(f"{sign} ' {note}"[:width] for note in notes), *picture, *(line[:width] for line in remarks)]
+    notes, remarks, [head] = ([_cut(line, width) for line in lines]
+                              for lines in ([f"{sign} ' {note}" for note in notes], remarks, [head]))  # fmt: skip
+    return [head, *notes, *picture, *remarks]
+
+
+def _cut(line: str, width: int) -> str:
+    """The beginning of a line that has this many columns."""
+    return text_of(cells(line)[:width])
 
 
 def _text(key: str, old: Contents, new: Contents) -> Difference:

@@ -7,6 +7,7 @@ from html import escape
 
 from fbvm.record.draw.sfc_text import TOKEN
 from fbvm.syntax.ladder.drawing.box_lines import DOUBLE, DOWN, LEFT, RIGHT, THICK, UP, Surface
+from fbvm.syntax.ladder.drawing.cells import cells, text_of
 
 CELL_WIDTH, CELL_HEIGHT = 9, 18
 """Pixels of a character."""
@@ -41,9 +42,9 @@ def ladder_svg(rungs: Sequence[Drawn]) -> str:
     row = columns = 0
     for head, surface in rungs:
         places = [*surface.lines, *surface.texts]
-        parts.append(_text(0, row, head, "head"))
+        parts.append(_text(0, row, cells(head), "head"))
         parts += _parts(surface, row + 1)
-        columns = max(columns, len(head), *(x + 1 for x, _ in places))
+        columns = max(columns, len(cells(head)), *(x + 1 for x, _ in places))
         row += max((y for _, y in places), default=-1) + 3
     width, height = (columns + 2) * CELL_WIDTH, row * CELL_HEIGHT - CELL_HEIGHT // 2
     return (f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
@@ -124,10 +125,10 @@ def _texts(surface: Surface, row: int) -> list[str]:
 
 
 def _text(x: int, y: int, text: str, kind: str = "") -> str:
-    """A text stretched to its cells, whatever the reader's font."""
+    """A text, in cells, stretched to them, whatever the reader's font."""
     named = f' class="{kind}"' if kind else ""
     return (f'<text{named} x="{_across(x - 0.5)}" y="{_down(y + 0.28)}" textLength="{len(text) * CELL_WIDTH}" '
-            f'lengthAdjust="spacingAndGlyphs">{escape(text, quote=False)}</text>') if text.strip() else ""
+            f'lengthAdjust="spacingAndGlyphs">{escape(text_of(text), quote=False)}</text>') if text.strip() else ""
 
 
 def _across(x: float) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from fbvm.syntax.ladder.drawing.cells import cells, text_of
 from fbvm.syntax.ladder.drawing.diagram import StepText, Undrawable, diagram
 from fbvm.syntax.ladder.drawing.reading import Picture
 from fbvm.syntax.ladder.drawing.steps import steps
@@ -44,7 +45,8 @@ class Notation:
                 self.kept.append(text.count("\n", 0, at + rung.start) + 1)
             made.append(other or rung)
         if any(bool(new.picture) != bool(old.picture) for new, old in zip(made, rungs, strict=True)):
-            made = [replace(rung, declared=True) for rung in made]  # an empty line alone does not part every two rungs
+            # an empty line alone does not part every two rungs; a section without rungs has none to be parted
+            made = [replace(rung, declared=True) if rung.lines or rung.notes else rung for rung in made]
         return made
 
 
@@ -56,13 +58,13 @@ def _in_form(rung: RungText, form: Form, places: Mapping[str, str]) -> RungText 
     wanted = _texts(rung)
     if form is Form.DRAWING:
         try:
-            bar = diagram(wanted)
+            bar = diagram([(prefix, mnemonic, tuple(map(cells, operands))) for prefix, mnemonic, operands in wanted])
         except Undrawable:
             return None
         named = {operand for _, _, operands in wanted for operand in operands}
-        made.picture = Picture(bar, WIDTH, True, {name: place for name, place in places.items() if name in named})
+        made.picture = Picture(bar, WIDTH, True, {cells(name): cells(place) for name, place in places.items() if name in named})
         made.notes = _comments(rung)
-        wanted = [(step.prefix, step.mnemonic, step.operands) for step in steps(bar)]
+        wanted = [(step.prefix, step.mnemonic, tuple(map(text_of, step.operands))) for step in steps(bar)]
     return made if _read_back(made) == (wanted, [note for _, note in made.notes], rung.comment) else None
 
 

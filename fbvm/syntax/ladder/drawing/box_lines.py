@@ -5,6 +5,8 @@ from __future__ import annotations
 import unicodedata
 from functools import cache
 
+from fbvm.syntax.ladder.drawing.cells import text_of
+
 LEFT, RIGHT, UP, DOWN = range(4)
 WAY_WORDS = {"LEFT": (LEFT,), "RIGHT": (RIGHT,), "UP": (UP,), "DOWN": (DOWN,), "HORIZONTAL": (LEFT, RIGHT),
              "VERTICAL": (UP, DOWN)}
@@ -75,7 +77,7 @@ class Surface:
             self._leave(x, at + 1, UP, weight)
 
     def write(self, x: int, y: int, text: str) -> None:
-        """Write text over the cells there."""
+        """Write text, in which wide characters have their fillers, over the cells there."""
         for at, character in enumerate(text):
             self.texts[x + at, y] = character
 
@@ -95,7 +97,7 @@ class Surface:
             return []
         depth = max(y for _, y in cells) + 1
         width = max(x for x, _ in cells) + 1
-        return ["".join(cells.get((x, y), " ") for x in range(width)).rstrip() for y in range(depth)]
+        return [text_of("".join(cells.get((x, y), " ") for x in range(width))).rstrip() for y in range(depth)]
 
 
 def _character(ways: list[int]) -> str:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from fbvm.syntax.ladder.drawing.box_lines import Surface
 from fbvm.syntax.ladder.drawing.boxes import Shape
+from fbvm.syntax.ladder.drawing.cells import cells
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Point, Series, StepText, Undrawable, diagram
 from fbvm.syntax.ladder.drawing.widths import LEAD, LINK, SLACK, Annotations, Widths
 
@@ -27,17 +28,20 @@ def rung_text(steps: Sequence[StepText], width: int = 80, annotations: Annotatio
 
 def rung_surface(steps: Sequence[StepText], width: int = 80, annotations: Annotations = AT_REST, least: int = 0) -> Surface:
     """The drawing of a rung; see `ladder.text`."""
+    filled = [(prefix, mnemonic, tuple(map(cells, operands))) for prefix, mnemonic, operands in steps]
     try:
-        return drawn(diagram(steps), width, annotations, least)
+        return drawn(diagram(filled), width, annotations.in_cells(), least)
     except Undrawable:
         surface = Surface()
-        for row, (prefix, mnemonic, operands) in enumerate(steps):
+        for row, (prefix, mnemonic, operands) in enumerate(filled):
             surface.write(4, row, f"{prefix}{mnemonic} {' '.join(operands)}".rstrip())
         return surface
 
 
 def drawn(bar: Point, width: int = 80, annotations: Annotations = AT_REST, least: int = 0) -> Surface:
-    """The drawing of a diagram.  It is wider than `width` only if a single element is, and never narrower than `least`."""
+    """The drawing of a diagram whose texts are cells.
+
+    It is wider than `width` only if a single element is, and never narrower than `least`."""
     widths = Widths(annotations)
     reach = max(LEAST, widths.reach(bar))
     width = max(LEAST, least, min(width, reach))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT
+from fbvm.syntax.ladder.drawing.cells import cells, place_in, text_of
 from fbvm.syntax.ladder.drawing.diagram import Box, Point
 from fbvm.syntax.ladder.drawing.grid import DrawingError, DrawnBox, Grid
 from fbvm.syntax.ladder.drawing.network import Network
@@ -55,53 +56,77 @@ def read_drawing(lines: Sequence[str], offsets: Sequence[int]) -> tuple[list[Pla
     if bare is not None:
         raise DrawingError(len(lines[bare]) - len(lines[bare].lstrip()), bare, 1, "the left rail is missing",
                            "each row of a drawing begins with │ or |")
-    grid = Grid([_REMARK.sub("", line).rstrip() for line in lines])
+    filled = [cells(_REMARK.sub("", line).rstrip()) for line in lines]
+    try:
+        return _read(Grid(filled), offsets)
+    except DrawingError as error:
+        x, y, width, message, hint = error.args
+        x = place_in(filled[y], x) if 0 <= y < len(filled) else x
+        raise DrawingError(x, y, width, text_of(message), text_of(hint)) from None
+
+
+def _read(grid: Grid, offsets: Sequence[int]) -> tuple[list[Placed], Picture]:
     network = Network(grid)
     bar = network.diagram()
     if not bar.outs:
         raise DrawingError(grid.left, 0, 1, "nothing hangs on the bus bar", "draw a wire from it, with contacts and a coil")
     width = max(map(len, grid.lines)) - grid.left
-    return _placed(steps(bar), network, offsets), Picture(bar, width, bool(grid.links), grid.places)
+    places = _Places(grid.lines, offsets)
+    return _placed(steps(bar), network, places), Picture(bar, width, bool(grid.links), grid.places)
 
 
-def _placed(coded: Sequence[Coded], network: Network, offsets: Sequence[int]) -> list[Placed]:
+class _Places:
+    """Places in the text of the cells of a drawing."""
+
+    def __init__(self, lines: Sequence[str], offsets: Sequence[int]) -> None:
+        self._lines, self._offsets = lines, offsets
+
+    def at(self, x: int, y: int) -> int:
+        return self._offsets[y] + place_in(self._lines[y], x)
+
+    def span(self, x: int, until: int, y: int) -> tuple[int, int]:
+        return self.at(x, y), self.at(until, y)
+
+
+def _placed(coded: Sequence[Coded], network: Network, places: _Places) -> list[Placed]:
     """The instructions with their places; an instruction that is not drawn, such as AND LD, has the place of the one before."""
     made: list[Placed] = []
-    end = offsets[0]
+    end = places.at(0, 0)
     for one in coded:
+        written = one._replace(mnemonic=text_of(one.mnemonic), operands=tuple(map(text_of, one.operands)))
         if one.drawn is None:
-            made.append(Placed(one, end, end, [(end, end)] * len(one.operands)))
+            made.append(Placed(written, end, end, [(end, end)] * len(one.operands)))
             continue
         drawn = network.sources[id(one.drawn)]
         if isinstance(drawn, DrawnBox):
-            start = offsets[drawn.y + 1] + drawn.x + 1
-            end = start + drawn.until - drawn.x - 1
-            operands = _operands(one, drawn, network.grid, offsets)
+            start, end = places.span(drawn.x + 1, drawn.until, drawn.y + 1)
+            operands = _operands(one, drawn, network.grid, places)
         else:
-            start, end = offsets[drawn.y] + drawn.x, offsets[drawn.y] + drawn.until + 1
-            row = offsets[drawn.y if drawn.inside else drawn.y - 1]
-            operands = [(row + x, row + until) for x, until in drawn.operand_at]
-        made.append(Placed(one, start, end, operands))
+            start, end = places.span(drawn.x, drawn.until + 1, drawn.y)
+            row = drawn.y if drawn.inside else drawn.y - 1
+            operands = [places.span(x, until, row) for x, until in drawn.operand_at]
+        made.append(Placed(written, start, end, operands))
     return made
 
 
-def _operands(one: Coded, drawn: DrawnBox, grid: Grid, offsets: Sequence[int]) -> list[tuple[int, int]]:
+def _operands(one: Coded, drawn: DrawnBox, grid: Grid, places: _Places) -> list[tuple[int, int]]:
     """The places of the operands of a box.  That of a pin is moved so that the operand behind its sign is in its place."""
     assert isinstance(one.drawn, Box)
     if drawn.title is None:
-        words = [(offsets[y] + drawn.x + 1 + found.start(), offsets[y] + drawn.x + 1 + found.end())
+        words = [places.span(drawn.x + 1 + found.start(), drawn.x + 1 + found.end(), y)
                  for y, text in drawn.rows.items() for found in re.finditer(r"\S+", text.split(" = ")[0])]  # fmt: skip
         return words[1:]
     named, typed = drawn.heads
-    title = offsets[named] + grid.lines[named].index(drawn.title[0], drawn.x)
-    at = offsets[typed] + grid.lines[typed].rindex(drawn.title[1], drawn.x, drawn.until)
-    places = [(at, at + len(drawn.title[1])), (title, title + len(drawn.title[0]))]
-    places += [places[1]] * (len(one.operands) - len(places) - len(one.drawn.pins))  # pins that the wire enters and leaves
+    title = grid.lines[named].index(drawn.title[0], drawn.x)
+    at = grid.lines[typed].rindex(drawn.title[1], drawn.x, drawn.until)
+    found = [places.span(at, at + len(drawn.title[1]), typed), places.span(title, title + len(drawn.title[0]), named)]
+    found += [found[1]] * (len(one.operands) - len(found) - len(one.drawn.pins))  # pins that the wire enters and leaves
     for pin, ((side, y), operand) in zip(one.drawn.pins, _stubs(drawn), strict=True):
-        line, length = grid.lines[y], len(operand)
+        line = grid.lines[y]
         x = line.rindex(operand, 0, drawn.x) if side == LEFT else line.index(operand, drawn.until)
-        places.append((offsets[y] + x - len(pin.name) - 2, offsets[y] + x + length))
-    return places
+        start, end = places.span(x, x + len(operand), y)
+        found.append((start - len(text_of(pin.name)) - 2, end))
+    return found
 
 
 def _stubs(drawn: DrawnBox) -> list[tuple[tuple[int, int], str]]:

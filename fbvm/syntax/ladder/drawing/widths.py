@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from fbvm.syntax.ladder.drawing.boxes import Shape, shape
+from fbvm.syntax.ladder.drawing.cells import cells, text_of
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Part, Point, Series
 
 LINK = 5
@@ -38,6 +39,15 @@ class Annotations(NamedTuple):
     others: Callable[[str], str] = _nothing
     """What is drawn in brackets behind an operand of a box, and below a comparison: the address of a symbol, or the symbol at an
     address; "" for nothing."""
+
+    def in_cells(self) -> Annotations:
+        """The same for operands that are cells, as cells."""
+        return Annotations(
+            self.states,
+            lambda symbol: cells(self.places(text_of(symbol))),
+            lambda step, operand: cells(self.values(step, text_of(operand))),
+            lambda operand: cells(self.others(text_of(operand))),
+        )
 
     def operand(self, step: int, operand: str) -> str:
         """An operand of a box as it is drawn."""
