@@ -2,8 +2,9 @@
 
 The names are those of the literature (Enoiu et al. on function block diagrams; STMutants, arXiv 2606.05499): ROR relational
 operator replacement, LRO logical, ARO arithmetic, NIO negation insertion or omission, CRO constant replacement, TRO timers and
-other standard blocks, SRO set for reset, SDL statement deletion, SWAP two statements in the other order.  Rungs have CONTACT
-(open for closed), COIL (another output instruction), EDGE (a differentiated instruction without its edge), RDL (rung deletion).
+other standard blocks, VRO a variable replaced by another one of its type, SRO set for reset, SDL statement deletion, SWAP two
+statements in the other order.  Rungs have CONTACT (open for closed), COIL (another output instruction), EDGE (a differentiated
+instruction without its edge), RDL (rung deletion); see also `charts_and_lists`.
 """
 
 from __future__ import annotations
@@ -11,17 +12,15 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import TypeAlias
 
 from fbvm.base.types import fold
+from fbvm.campaign.mutation.charts_and_lists import Replacement, Table, of_association, of_list, of_transition
 from fbvm.campaign.mutation.mutants import Change
 from fbvm.syntax import tree
+from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
-from fbvm.syntax.tree.node import Node, names_of
-
-Replacement: TypeAlias = tuple[str, int, int, str]
-"""Operator, start, end, new text."""
-Table: TypeAlias = dict[str, tuple[str, ...]]
+from fbvm.syntax.tree.node import Node, names_of, walk
+from fbvm.syntax.tree.sfc import Association, Sfc, Transition
 
 _RELATIONS: Table = {"<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "=": ("<>",), "<>": ("=",)}
 _LOGICAL: Table = {"AND": ("OR",), "OR": ("AND",), "XOR": ("OR",), "AND_THEN": ("OR_ELSE",), "OR_ELSE": ("AND_THEN",)}
@@ -56,11 +55,14 @@ def changes(text: str, node: tree.Pou) -> Iterator[Change]:
 
 
 def _replacements(text: str, pou: tree.Pou) -> Iterator[Replacement]:
+    others = _others(text, pou)
     for part in _written(pou):
+        if isinstance(part, tree.NameRef) and (other := others.get(fold(part.text))):
+            yield "VRO", part.start, part.end, other
         for kind, rule in _RULES:
             if isinstance(part, kind):
                 yield from rule(text, part)
-        for name in names_of(part) if not isinstance(part, Rung) else ():
+        for name in names_of(part) if not isinstance(part, Rung | Sfc | InstructionList) else ():
             yield from _of_statements(text, getattr(part, name))
 
 
@@ -73,9 +75,26 @@ def _written(pou: tree.Pou) -> Iterator[Node]:
             left += item
         elif isinstance(item, Ladder):
             yield from (each for rung in item.rungs for each in (rung, *rung.steps))
+        elif isinstance(item, Sfc):
+            yield item
+            left += [item.steps, item.transitions]
+        elif isinstance(item, InstructionList):
+            yield item
+            yield from (each for each in walk(item) if isinstance(each, tree.Literal | tree.NameRef))  # at their operands
         elif isinstance(item, Node) and not (isinstance(item, tree.VarSection) and item.hidden):
             yield item
             left += [getattr(item, name) for name in names_of(item)]
+
+
+def _others(text: str, pou: tree.Pou) -> dict[str, str]:
+    """For each variable of a POU the next one of the same type, and for the last the first; by folded names."""
+    by_type: dict[str, list[str]] = {}
+    for section in (node for node in _written(pou) if isinstance(node, tree.VarSection)):
+        for declared in section.variables:
+            type_ = fold(" ".join(text[declared.spec.start : declared.spec.end].split()))
+            by_type.setdefault(type_, []).extend(name.text for name in declared.names)
+    return {fold(name): names[(number + 1) % len(names)] for names in by_type.values() if len(names) > 1
+            for number, name in enumerate(names)}  # fmt: skip
 
 
 # --- expressions ------------------------------------------------------------------------------------------------------
@@ -217,5 +236,5 @@ def _rung(text: str, node: Node) -> Iterator[Replacement]:
 _RULES: tuple[tuple[type[Node], Callable[[str, Node], Iterator[Replacement]]], ...] = (
     (tree.Binary, _binary), (tree.Binary, _operand), (tree.If, _condition), (tree.While, _condition), (tree.Repeat, _condition),
     (tree.Unary, _negation), (tree.Assign, _assigned), (tree.Literal, _literal), (tree.VarDecl, _block), (Step, _step),
-    (Rung, _rung))  # fmt: skip
+    (Rung, _rung), (Transition, of_transition), (Association, of_association), (InstructionList, of_list))  # fmt: skip
 """What is tried at each kind of node."""

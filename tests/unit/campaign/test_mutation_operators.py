@@ -11,10 +11,10 @@ from fbvm.campaign.mutation.session import mutants_of
 HEAD = "PROGRAM Main\nVAR a, b, c : BOOL; n : INT; t : TIME; END_VAR\n"
 
 
-def lines(body: str, head: str = HEAD) -> set[str]:
-    """The mutants of a body of one line, each as `OPERATOR the line afterwards`."""
+def lines(body: str, head: str = HEAD, without: str = "VRO") -> set[str]:
+    """The mutants of a body, each as `OPERATOR the body afterwards`, but for those of one operator."""
     text = f"{head}{body}\nEND_PROGRAM\n"
-    found = mutants_of([Source("main.st", text)])
+    found = [each for each in mutants_of([Source("main.st", text)]) if each.change.operator != without]
     return {f"{each.change.operator} {each.applied(text)[len(head):-len('END_PROGRAM') - 2]}" for each in found}
 
 
@@ -32,6 +32,55 @@ STATEMENTS = {
 @each_of("body", STATEMENTS)
 def test_a_statement_has_these_mutants(body: str) -> None:
     assert lines(body) == STATEMENTS[body]
+
+
+def test_a_variable_is_replaced_by_the_next_one_of_its_type() -> None:
+    found = lines("a := b AND t > T#0s;", without="")
+    assert {each for each in found if each.startswith("VRO")} == {"VRO b := b AND t > T#0s;", "VRO a := c AND t > T#0s;"}
+
+
+CHART = """INITIAL_STEP One: a(N);{} END_STEP
+TRANSITION FROM One TO Two := b; END_TRANSITION
+STEP Two: c(L, T#1s); END_STEP
+TRANSITION FROM Two TO One := n > 1; END_TRANSITION"""
+BACK = "TRANSITION FROM Two TO One := n > 1; END_TRANSITION"
+
+
+def test_a_chart_loses_transitions_and_actions_and_has_other_qualifiers_and_conditions() -> None:
+    """What the chart is lowered to stands in no text, and has no mutants."""
+    chart = CHART.format("")
+    first, rest = "a(N);", "TRANSITION FROM One TO Two := b; END_TRANSITION"
+    assert lines(chart) == {
+        "TRD " + chart.replace(rest, ""), "TRD " + chart.replace(BACK, ""),
+        "NIO " + chart.replace(":= b;", ":= NOT (b);"), "NIO " + chart.replace("n > 1", "NOT (n > 1)"),
+        "ASD " + chart.replace(first, ""), "ASD " + chart.replace("c(L, T#1s);", ""),
+        "QUAL " + chart.replace("(N)", "(S)"), "QUAL " + chart.replace("(N)", "(P)"), "QUAL " + chart.replace("(L,", "(D,"),
+        "CRO " + chart.replace("T#1s", "T#1010ms"), "CRO " + chart.replace("T#1s", "T#990ms"),
+        "CRO " + chart.replace("> 1", "> 2"), "CRO " + chart.replace("> 1", "> 0"),
+        "ROR " + chart.replace("> 1", ">= 1"), "ROR " + chart.replace("> 1", "<= 1")}  # fmt: skip
+
+
+LIST = """LD a
+ANDN b
+ST c
+LD n
+GT (
+LD 3
+ADD n
+)
+S c"""
+
+
+def test_an_instruction_list_has_its_operators_changed_where_they_stand() -> None:
+    def after(line: int, new: str) -> str:
+        rows = LIST.split("\n")
+        return "\n".join([*rows[:line], new, *rows[line + 1:]])
+
+    left_out = {f"SDL {after(line, '')}" for line in (0, 1, 2, 3, 5, 6, 8)}
+    changed = {"NIO": [(0, "LDN a"), (1, "AND b"), (2, "STN c"), (3, "LDN n"), (5, "LDN 3")], "LRO": [(1, "ORN b")],
+               "ROR": [(4, "GE ("), (4, "LT (")], "ARO": [(6, "SUB n")], "SRO": [(8, "R c")],
+               "CRO": [(5, "LD 2"), (5, "LD 4")]}  # fmt: skip
+    assert lines(LIST) == left_out | {f"{name} {after(*row)}" for name, rows in changed.items() for row in rows}
 
 
 BLOCKS = {"TON": {"TOF", "TP"}, "TOF": {"TON"}, "R_TRIG": {"F_TRIG"}, "RS": {"SR"}, "CTU": {"CTD"}}
