@@ -319,7 +319,7 @@ class Session:
         return {"scan": scan}
 
     def _write(self, plc: str, name: str, value: str) -> dict[str, Any]:
-        return {"value": self._bench.write(plc, name, value)}
+        return {"value": self._bench.write(plc, name, value), "scan": self._bench.plc(plc).plc.scans}
 
     def _keep_group(self, name: str, names: list[str]) -> None:
         self._bench.keep_group(name, names)

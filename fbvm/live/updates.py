@@ -171,7 +171,8 @@ class Updates:
         if look.memory:
             area, first = look.memory
             words = self._memory(live).words(area)
-            made["memory"] = {"area": area, "first": first, "words": list(words[first : first + MEMORY_WORDS])}
+            made["memory"] = {"area": area, "first": first, "words": list(words[first : first + MEMORY_WORDS]),
+                              "forced": sorted(self._forced_words(area, first))}
         if look.network:
             made["faults"] = fault_rows(bench.faults)
             rows = live.frame_rows(self.frames, None)
@@ -190,6 +191,17 @@ class Updates:
             made["acts"] = [[act.plc, act.scan, act.text] for act in acts if act.what != "keep"]
             self.acts = len(bench.acts)
         return made
+
+    def _forced_words(self, area: str, first: int) -> set[int]:
+        """The words in which something is forced, counted from `first`."""
+        live, found = self._look.live, set[int]()
+        begin = live.plc.memory.areas[area].offset + 2 * first
+        for name in self._look.seen.forces:
+            place = live.plc.find(name)
+            if isinstance(place, Place):
+                low, high = (place.offset - begin) // 2, (place.offset + max(1, place.type.size) - 1 - begin) // 2
+                found |= {word for word in range(low, high + 1) if 0 <= word < MEMORY_WORDS}
+        return found
 
     def _panels(self, made: dict[str, Any], view: ScanView | PowerView | None) -> Steps:
         """What takes longer."""

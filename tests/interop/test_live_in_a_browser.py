@@ -2,115 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from live_pages import state, value, watch
 
 from fbvm.testing.course.lessons import lessons
 
 pytestmark = pytest.mark.slow
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-PUMP = """
-PROGRAM Main
-VAR
-    Level : INT := 20;      (* <script>document.title = 'broken'</script> *)
-    Pump, Hand : BOOL;
-    High AT D10 : INT := 90;
-    Said : STRING[60] := '<img src=x onerror=document.title=1>';
-END_VAR
-IF Level >= High THEN Pump := TRUE; ELSIF Level <= 10 THEN Pump := FALSE; END_IF
-IF Hand THEN
-    Level := 0;
-ELSIF Pump THEN
-    Level := Level - 2;
-ELSE
-    Level := Level + 1;
-END_IF
-END_PROGRAM
-"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'fbvm[browser]'")
-    program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if program is None:
-        pytest.skip(f"needs a browser: {' or '.join(BROWSERS)}")
-    with playwright.sync_playwright() as running:
-        root = hasattr(os, "geteuid") and os.geteuid() == 0
-        started = running.chromium.launch(executable_path=program, args=["--no-sandbox"] if root else [])
-        yield started
-        started.close()
-
-
-class Live:
-    """`fbvm live` in a process of its own, and its page in windows."""
-
-    def __init__(self, browser: Any, folder: Path, text: str, *options: str, verb: str = "live") -> None:
-        self.file = file = folder / "pump.st"
-        file.write_text(text)
-        self._browser = browser
-        given = [] if verb in ("serve", "demo", "learn") or options and options[-1].startswith(str(folder)) else [str(file)]
-        self.process = subprocess.Popen([sys.executable, "-m", "fbvm", verb, *given, *options], stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE, text=True)  # fmt: skip
-        assert self.process.stdout is not None
-        self.url = next((line.strip() for line in self.process.stdout if line.startswith("http:")), "")
-        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#token=[\w-]{32,}", self.url), self.process.stderr
-        self.complaints: list[str] = []
-
-    def window(self, url: str = "", **settings: Any) -> Any:
-        """The page in a window of its own; what it complains about is in `complaints`."""
-        page = self._browser.new_context(**{"viewport": {"width": 1400, "height": 1000}, **settings}).new_page()
-        page.set_default_timeout(20_000)
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("console", lambda message: self.complaints.append(message.text) if message.type == "error" else None)
-        page.goto(url or self.url)
-        return page
-
-    def close(self) -> None:
-        for context in self._browser.contexts:
-            context.close()
-        self.process.terminate()
-        self.process.communicate(timeout=30)
-
-
-@pytest.fixture
-def live(browser: Any, tmp_path: Path) -> Iterator[Any]:
-    made: list[Live] = []
-
-    def start(*options: str, text: str = PUMP, verb: str = "live") -> Live:
-        made.append(Live(browser, tmp_path, text, *options, verb=verb))
-        return made[-1]
-
-    yield start
-    for one in made:
-        one.close()
-
-
-def watch(page: Any, name: str) -> Any:
-    """Searches a name and watches it; returns its row."""
-    page.fill("#find", name)
-    page.locator("#found button").first.wait_for()
-    page.press("#find", "Enter")
-    row = page.locator(f"#watched tr[data-name='{name}']")
-    row.wait_for()
-    return row
-
-
-def value(row: Any, text: str) -> None:
-    row.locator(".value", has_text=re.compile(f"^{re.escape(text)}$")).wait_for()
-
-
-def state(page: Any, name: str) -> None:
-    page.locator(f"#state[data-state={name}]").wait_for()
 
 
 def test_values_are_seen_written_held_and_released(live: Any) -> None:
@@ -176,6 +79,61 @@ def test_a_reload_comes_back_to_what_was_watched_and_two_pages_see_one_plc(live:
     value(other_row, "55")
     other.locator("#log li", has_text="Main.Level := 55").wait_for()
     assert run.complaints == []
+
+
+def test_a_reload_comes_back_to_the_past_and_to_the_trend(live: Any) -> None:
+    page = (run := live("--paused")).window()
+    row = watch(page, "Main.Level")
+    page.locator("#where").click()
+    page.keyboard.press("S")
+    value(row, "30")
+    page.click("#exact")
+    page.locator("#cursorA").fill("4")
+    measured = page.locator("figure[data-name='Main.Level'] .between")
+    measured.filter(has_text="A 25").wait_for()
+    page.locator("#where").click()
+    page.keyboard.press("ArrowLeft")
+    value(row, "29")
+    page.reload()
+    state(page, "past")
+    value(row, "29")
+    measured.filter(has_text="A 25").wait_for()
+    assert run.complaints == []
+
+
+LADDER = """
+PROGRAM Main
+VAR Start : BOOL; Stop AT D5.01 : BOOL; Motor : BOOL; END_VAR
+LADDER
+    RUNG 1 The motor holds itself
+    LD Start
+    OR Motor
+    ANDNOT Stop
+    OUT Motor
+END_LADDER
+END_PROGRAM
+"""
+
+
+def test_a_name_in_a_rung_is_watched_by_a_click_and_a_force_is_seen_wherever_it_acts(live: Any) -> None:
+    page = (run := live(text=LADDER)).window()
+    state(page, "run")
+    page.locator("#rungs text", has_text="Start").first.click()
+    row = page.locator("#watched tr[data-name='Main.Start']")
+    row.locator("input").fill("TRUE")
+    row.get_by_role("button", name="Hold at this value").click()
+    page.locator("#rungs figcaption", has_text="Main.Start forced to TRUE").wait_for()
+    page.locator("#rungs text.held", has_text="Start").wait_for()
+    page.locator("#held", has_text="1 forced").wait_for()
+    stop = watch(page, "Main.Stop")
+    stop.locator("input").fill("TRUE")
+    stop.locator("input").press("Shift+Enter")
+    page.locator("#held", has_text="2 forced").wait_for()
+    page.click("[data-panel=memory]")
+    page.locator("#words td.forced", has_text="0002").wait_for()
+    page.click("#free")
+    page.locator("#held").wait_for(state="hidden")
+    assert page.locator("#rungs text.held").count() == 0 and run.complaints == []
 
 
 def test_a_cable_is_pulled_and_a_fault_switched_on(live: Any) -> None:
@@ -350,9 +308,7 @@ def test_a_picture_moves_with_the_machine_and_its_buttons_are_pressed(live: Any,
     motor, box = page.locator("#m-motor"), page.locator("#m-box")
     page.locator("#m-box[style*='visible']").wait_for()
     page.locator("#m-start").focus()
-    page.keyboard.down("Enter")
-    page.locator("#bound tr", has_text="Main.Start").locator("td", has_text="TRUE").first.wait_for()
-    page.keyboard.up("Enter")
+    page.keyboard.press("Enter")  # however short, a scan sees it
     page.locator("#m-motor[style*='rgb(27, 127, 77)']").wait_for()
     before = box.bounding_box()["x"]
     page.wait_for_function("x => document.querySelector('#m-box').getBoundingClientRect().x > x + 20", arg=before)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import shutil
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -32,7 +30,6 @@ from fbvm.wire.link import Peer
 
 pytestmark = pytest.mark.slow
 HOUSE = Path(__file__).resolve().parents[2]
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 Opener = Callable[[PageData], Any]
 SCANS = 40
 SENDING = 4
@@ -69,19 +66,6 @@ def url(trace: Trace, tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("page") / "run.html"
     path.write_text(page(page_data(trace, title="<demo> & more")), encoding="utf-8")
     return path.as_uri()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'fbvm[browser]'")
-    program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if program is None:
-        pytest.skip(f"needs a browser: {' or '.join(BROWSERS)}")
-    with playwright.sync_playwright() as running:
-        root = hasattr(os, "geteuid") and os.geteuid() == 0
-        started = running.chromium.launch(executable_path=program, args=["--no-sandbox"] if root else [])
-        yield started
-        started.close()
 
 
 def opened(browser: Any, url: str, **settings: Any) -> Any:

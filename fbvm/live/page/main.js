@@ -61,7 +61,11 @@ class Page {
     this.isNew = false;
     this.scan.begin();
     this.change.begin();
+    const past = remembered("past", null); // before a reload, or before the connection was lost
     await this.choose(this.plc);
+    if (past?.plc !== this.plc) return;
+    if (past.future !== undefined) at("future").value = String(past.future);
+    await this.connection.ask("view", past).catch(() => {}); // the scan may have left the recording
   }
 
   async choose(name) {
@@ -109,6 +113,7 @@ class Page {
   }
 
   lost(tries, hasToken) {
+    if (this.about) this.panels.trend.keep();
     this.about = null;
     at("state").textContent = "no connection";
     at("state").dataset.state = "lost";
@@ -118,14 +123,22 @@ class Page {
 
   update(update) {
     if (update.restarted) {
+      remember("past", null);
       this.begin();
       return;
     }
     this.change.update(update);
     Object.assign(this.state, update);
+    if (update.state || update.scan !== undefined) this.keepPast();
     this.scan.update(update, this.state);
     for (const panel of Object.values(this.panels)) panel.update(update, this.state);
     for (const [plc, scan, text] of update.acts ?? []) at("log").prepend(make("li", {}, `${plc}, before scan ${scan}: ${text}`));
+  }
+
+  keepPast() {
+    const future = Number(at("future").value);
+    const { state, scan } = this.state;
+    remember("past", state === "past" ? { plc: this.plc, scan, ...(future >= 0 ? { future } : {}) } : null);
   }
 
   open(id) {

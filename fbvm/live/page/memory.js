@@ -24,6 +24,7 @@ export class MemoryPanel {
     if (!update.memory) return;
     this.before = this.words;
     this.words = update.memory.words;
+    this.forced = new Set(update.memory.forced);
     this.from = update.memory.first;
     this.draw();
   }
@@ -44,7 +45,7 @@ export class MemoryPanel {
     for (let row = 0; row < this.words.length; row += wide) {
       rows.push(make("tr", {}, make("th", { scope: "row" }, `${at("area").value}${this.from + row}`),
         ...this.words.slice(row, row + wide).map((word, number) => make("td", {
-          class: [word ? "" : "zero", this.before?.length && this.before[row + number] !== word ? "moved" : ""].join(" ").trim(),
+          class: [word ? "" : "zero", this.forced.has(row + number) ? "forced" : "", this.before?.length && this.before[row + number] !== word ? "moved" : ""].join(" ").trim(),
           title: `${at("area").value}${this.from + row + number}: who wrote it?` }, make("button", { on: { click: () => this.why(this.from + row + number) } }, shown(word))))));
     }
     at("words").tBodies[0].replaceChildren(...rows);

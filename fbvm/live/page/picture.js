@@ -2,12 +2,15 @@
 
 import { at, drawing, inSvg, make, number, options, remember, remembered } from "/dom.js";
 
+const OTHER_MS = 300; // so long the button of another PLC is held at least: its scans are not seen here
+
 export class PicturePanel {
   constructor(page) {
     this.page = page;
     this.pictures = [];
     this.values = {};
     this.changes = [];
+    this.pressed = []; // what is let go as soon as a scan has seen it: number of the scan, and how
     at("drawing").addEventListener("change", () => {
       remember("picture", at("drawing").value);
       this.build();
@@ -16,7 +19,9 @@ export class PicturePanel {
 
   begin() {}
 
-  update(update) {
+  update(update, state) {
+    if (update.scan !== undefined) this.let(state);
+    if (update.forces) for (const row of at("bound").querySelectorAll("tr")) row.children[2].classList.toggle("forced", row.dataset.plc === this.page.plc && row.dataset.name in state.forces);
     if (update.pictures) {
       this.pictures = update.pictures;
       options(at("drawing"), this.pictures.map((one) => one.title), remembered("picture", ""));
@@ -55,7 +60,8 @@ export class PicturePanel {
     this.changes.push([binding.key, what]);
     const wanted = binding.click;
     if (wanted !== undefined && !this.page.about?.read_only) this.clicked(element, binding);
-    return make("tr", {}, make("th", { scope: "row" }, binding.element), make("td", { class: "mono" }, `${binding.plc}: ${binding.name}`), cell,
+    if (binding.plc === this.page.plc && binding.name in (this.page.state.forces ?? {})) cell.classList.add("forced");
+    return make("tr", { "data-plc": binding.plc, "data-name": binding.name }, make("th", { scope: "row" }, binding.element), make("td", { class: "mono" }, `${binding.plc}: ${binding.name}`), cell,
       make("td", { class: "dim" }, wanted === undefined ? "" : wanted === "toggle" ? "click: the other value" : wanted === "press" ? "TRUE while held" : `click: ${wanted}`));
   }
 
@@ -65,11 +71,12 @@ export class PicturePanel {
     element.setAttribute("tabindex", "0");
     element.setAttribute("aria-label", `${id}: writes ${name}`);
     const down = click === "press" ? () => write("TRUE") : () => write(click === "toggle" ? (this.values[key] === "TRUE" ? "FALSE" : "TRUE") : click);
-    const up = click === "press" ? () => write("FALSE") : () => {};
+    const up = click === "press" ? () => this.release(plc, pressed, () => write("FALSE")) : () => {};
+    let pressed = null;
     let isHeld = false;
     const begin = (event) => {
       event.preventDefault();
-      if (!isHeld) down();
+      if (!isHeld) pressed = down();
       isHeld = true;
     };
     const end = () => {
@@ -83,6 +90,20 @@ export class PicturePanel {
     for (const kind of ["pointerup", "pointercancel", "blur"]) element.addEventListener(kind, end);
     element.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") begin(event); });
     element.addEventListener("keyup", (event) => { if (event.key === "Enter" || event.key === " ") end(); });
+  }
+
+  // Calls `up` when a scan has seen what was pressed, however short that was.
+  async release(plc, pressed, up) {
+    const found = await pressed;
+    if (plc !== this.page.plc) setTimeout(up, OTHER_MS);
+    else this.pressed.push([found?.scan ?? 0, up]);
+    this.let(this.page.state);
+  }
+
+  let({ scan }) {
+    const seen = this.pressed.filter(([first]) => scan >= first);
+    this.pressed = this.pressed.filter(([first]) => scan < first);
+    for (const [, up] of seen) up();
   }
 
   show() {

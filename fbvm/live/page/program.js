@@ -1,6 +1,8 @@
 // The program panel: the source of an instance with values beside its lines, its rungs and charts with power.
 
-import { at, drawing, make, options, remember, remembered } from "/dom.js";
+import { at, drawing, inSvg, make, options, remember, remembered } from "/dom.js";
+
+const DRAWN = /[\u2500-\u257f]/; // a rung or a chart that is drawn in the source: its lines stay whole
 
 export class ProgramPanel {
   constructor(page) {
@@ -9,9 +11,15 @@ export class ProgramPanel {
     this.lines = [];
     this.chips = new Map();
     this.rows = new Map();
+    this.values = new Map();
+    this.pictures = { pictures: [], scan: 0 };
     at("breaking").addEventListener("submit", (event) => {
       event.preventDefault();
       this.stop("");
+    });
+    at("rungs").addEventListener("click", (event) => {
+      const name = event.target.closest("text")?.dataset.name;
+      if (name) page.panels.watch.add(name);
     });
     at("instance").addEventListener("change", async () => {
       await this.choose(at("instance").value);
@@ -62,7 +70,8 @@ export class ProgramPanel {
   async choose(instance) {
     this.instance = instance;
     remember(`instance.${this.page.plc}`, instance);
-    at("rungs").replaceChildren();
+    this.pictures = { pictures: [], scan: 0 };
+    this.draw();
     const found = instance ? await this.page.ask("source", { plc: this.page.plc, instance }) : null;
     this.lines = found?.lines ?? [];
     this.path = found?.file ?? "";
@@ -85,7 +94,7 @@ export class ProgramPanel {
       this.chips.set(name, [...known, [chip, value]]);
       return chip;
     });
-    const row = make("tr", {}, make("td", { class: "line", title: "A breakpoint", on: { click: () => this.stop(`${this.path}:${number}`) } }, String(number)), make("td", {}, line.text), make("td", { class: "values" }, ...chips));
+    const row = make("tr", {}, make("td", { class: "line", title: "A breakpoint", on: { click: () => this.stop(`${this.path}:${number}`) } }, String(number)), make("td", { class: DRAWN.test(line.text) ? "drawn" : "" }, line.text), make("td", { class: "values" }, ...chips));
     this.rows.set(number, row);
     return row;
   }
@@ -114,16 +123,44 @@ export class ProgramPanel {
 
   update(update, state) {
     for (const [name, text] of Object.entries(update.values ?? {})) {
+      this.values.set(name, text);
       for (const [, value] of this.chips.get(name) ?? []) value.textContent = text;
     }
     if (update.forces) {
       for (const [name, pairs] of this.chips) for (const [chip] of pairs) chip.classList.toggle("forced", name in state.forces);
+      this.draw();
     }
     if (update.breaks || update.halt !== undefined) this.breakpoints(state);
     if (!update.inside) return;
     const executed = new Set(update.inside.executed);
     for (const [number, row] of this.rows) row.classList.toggle("executed", executed.has(number));
-    at("rungs").replaceChildren(...update.inside.pictures.map(([head, svg]) =>
-      make("figure", {}, make("figcaption", {}, head), svg ? drawing(svg, `${head}, scan ${update.inside.scan}`) : "")));
+    this.pictures = update.inside;
+    this.draw();
+  }
+
+  // Rungs and charts; a name in them can be clicked, and says its value and whether it is forced.
+  draw() {
+    const { forces = {} } = this.page.state;
+    at("rungs").replaceChildren(...this.pictures.pictures.map(([head, svg]) => {
+      const made = svg ? drawing(svg, `${head}, scan ${this.pictures.scan}`) : "";
+      const forced = new Set();
+      for (const text of svg ? made.querySelectorAll("text") : []) {
+        const name = this.named(text.textContent.split(" = ")[0]);
+        if (!name) continue;
+        text.dataset.name = name;
+        text.append(inSvg("title", {}));
+        text.lastChild.textContent = `${name} = ${this.values.get(name) ?? ""}: click to watch it`;
+        if (!(name in forces)) continue;
+        text.classList.add("held");
+        forced.add(`${name} forced to ${forces[name]}`);
+      }
+      return make("figure", {}, make("figcaption", {}, head, forced.size ? make("b", { class: "mistake" }, ` ${[...forced].join(", ")}`) : ""), made);
+    }));
+  }
+
+  // The full name of a variable that a drawing calls so; undefined if the source has none.
+  named(text) {
+    const wanted = [`${this.instance}.${text}`, text].map((one) => one.trim().toUpperCase());
+    return [...this.chips.keys()].find((name) => wanted.includes(name.toUpperCase()));
   }
 }

@@ -15,6 +15,7 @@ export class ScanTools {
     on("ten", () => page.ask("step", { scans: 10 }));
     on("warm", () => page.ask("start", { plc: page.plc, kind: "warm" }));
     on("cold", () => page.ask("start", { plc: page.plc, kind: "cold" }));
+    on("held", () => { page.open("watch"); page.panels.watch.add(...Object.keys(page.state.forces)); });
     on("help", () => at("keys").showModal());
     on("back", () => this.travel(-1));
     on("forth", () => this.travel(1));
@@ -51,6 +52,7 @@ export class ScanTools {
       at("state").textContent = NAMES[update.state] ?? update.state;
       at("state").dataset.state = update.state;
     }
+    if (update.forces) this.forces(Object.entries(update.forces));
     if (update.trap) this.page.fail(update.trap);
     if (update.mode) at("mode").value = update.mode;
     if (update.speed !== undefined) at("speed").value = String(update.speed);
@@ -68,6 +70,13 @@ export class ScanTools {
     }
     if (update.state) at("now").disabled = at("branch").disabled = update.state !== "past";
     if (update.state && update.state !== "past") at("future").value = "-1";
+  }
+
+  // What is forced stands in the head, whatever panels are open.
+  forces(rows) {
+    at("held").hidden = !rows.length;
+    at("held").textContent = `${rows.length} forced`;
+    at("held").title = `${rows.map(([name, value]) => `${name} = ${value}`).join("\n")}\nClick to watch`;
   }
 
   view(scan) {

@@ -1,7 +1,7 @@
 // The trend panel: what is watched over time, sampled as the page sees it, or every one of the last recorded scans.  Two cursors
 // measure it; a part of it can be enlarged, and all of it saved.
 
-import { at, inSvg, make, number, save } from "/dom.js";
+import { at, inSvg, make, number, remember, remembered, save } from "/dom.js";
 
 const MOST_SAMPLES = 3000;
 const WIDTH = 600;
@@ -13,6 +13,7 @@ export class TrendPanel {
   constructor(page) {
     this.page = page;
     this.clear();
+    addEventListener("pagehide", () => this.keep());
     at("clear").addEventListener("click", () => { this.clear(); this.draw(); });
     at("exact").addEventListener("click", () => this.exact());
     at("csv").addEventListener("click", () => this.csv());
@@ -38,9 +39,24 @@ export class TrendPanel {
     this.cursors = {}; // scans by the names of cursors
   }
 
-  begin() {
+  begin(plc) {
     this.clear();
+    this.plc = plc.name;
+    const kept = remembered("trend", null);
+    remember("trend", null);
+    if (kept?.plc === plc.name) {
+      this.samples = kept.samples.map(([scan, ns, values]) => ({ scan, ns, values: new Map(values) }));
+      this.window = kept.window;
+      this.cursors = kept.cursors;
+      at("hold").checked = kept.hold;
+    }
     this.draw();
+  }
+
+  // For the page that comes behind a reload, or a lost connection; what is too much for the browser is not kept.
+  keep() {
+    const samples = this.samples.map(({ scan, ns, values }) => [scan, ns, [...values]]);
+    remember("trend", { plc: this.plc, samples, window: this.window, cursors: this.cursors, hold: at("hold").checked });
   }
 
   update(update, state) {

@@ -69,7 +69,7 @@ export class UnitsPanel {
     return make("table", { "aria-label": `Words of ${unit.name}` }, make("tbody", {}, ...words.map(([address, said, text, meaning]) =>
       make("tr", { class: this.before.has(address) && this.before.get(address) !== text ? "moved" : "" },
         make("td", { class: "mono" }, address),
-        make("td", { class: `value${text === "TRUE" ? " on" : ""}` }, text === "TRUE" ? "ON" : text === "FALSE" ? "OFF" : text),
+        make("td", { class: `value${text === "TRUE" ? " on" : ""}${address in (this.page.state.forces ?? {}) ? " forced" : ""}` }, text === "TRUE" ? "ON" : text === "FALSE" ? "OFF" : text),
         make("td", {}, said, meaning ? make("b", {}, `: ${meaning}`) : "")))));
   }
 }

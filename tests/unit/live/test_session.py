@@ -63,7 +63,7 @@ def test_a_name_that_does_not_exist_is_said_and_the_others_are_shown(page: Page)
 
 
 def test_a_value_is_written_once_and_the_program_goes_on_with_it(page: Page) -> None:
-    assert page.done("write", plc="pump", name="Main.Level", value="50") == {"value": "50"}
+    assert page.done("write", plc="pump", name="Main.Level", value="50") == {"value": "50", "scan": page.plc.scans}
     page.scan()
     assert page.plc.read("Main.Level") == 51
 
