@@ -55,7 +55,7 @@ def cause(diagnostics: Sequence[Diagnostic]) -> str:
 def compare(first: Plc, second: Plc, seed: int = 1) -> str:
     """Run two PLCs side by side with the same inputs; the first variable that differs, or the trap, "" if all was the same."""
     random = Random(seed)
-    common = [name for name in first.image.symbols if name in second.image.symbols]
+    common = [name for name in first.image.symbols if name in second.image.symbols and " " not in name]
     inputs = [name for name in _bools(first.image) if name in set(_bools(second.image))]
     for scan in range(1, SCANS + 1):
         if scan % EVERY == 1:

@@ -190,3 +190,36 @@ def test_a_body_without_a_statement_is_exported_with_a_text() -> None:
     exported = export_xml([Source("Main.st", "PROGRAM Main\nEND_PROGRAM\n")]).text
     assert exported is not None
     assert re.search(r"<ST>\s*<xhtml:p>\n</xhtml:p>", exported)
+
+
+WIRED = """PROGRAM Main
+VAR go, on, both, last : BOOL; t1, t2 : TON; e : R_TRIG; was : TIME; END_VAR
+    LADDER
+        LD go
+        OUT on
+    END_LADDER
+    e(CLK := NOT on);
+    t1(IN := e.Q, PT := T#20ms);
+    both := go OR NOT t1.Q;
+    was := t1.ET;
+    t2(IN := both, PT := t1.PT);
+    last := t2.Q;
+END_PROGRAM
+"""
+
+
+def test_what_is_exported_is_evaluated_in_its_order_by_each_generator() -> None:
+    exported = export_xml([Source("Main.st", WIRED)])
+    assert not exported.errors
+    assert exported.text is not None
+    runs = []
+    for order in ORDERS:
+        made = plc(import_xml(exported.text.encode(), order=order))
+        seen = []
+        for scan in range(12):
+            made.write("Main.go", scan % 5 > 2)
+            made.scan()
+            seen.append([made.read(f"Main.{name}") for name in ("on", "both", "last", "was", "t1.ET", "e.Q")])
+        runs.append(seen)
+    assert all(seen == runs[0] for seen in runs)
+    assert len({str(row) for row in runs[0]}) > 3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,6 +21,9 @@ XHTML = "http://www.w3.org/1999/xhtml"
 BEGINNING = "1970-01-01T00:00:00"
 """The creation time in a document, if none is given."""
 _NAME = re.compile(r"[^\W\d]\w*")
+_ACTING = re.compile(r"(?i)'(pack_mode|qualified_only|strict|call_after_init|call_after_global_init_slot|global_init_slot|"
+                     r"to_string|instance-path)'")
+"""Attributes that change what a program does."""
 
 
 @dataclass(frozen=True)
@@ -54,24 +57,35 @@ def export_xml(sources: Sequence[Source | Path | str], name: str = "project", cr
 
     `created` is the time that the document names, as 2024-03-01T08:00:00.  Never raises for what sources contain."""
     parts = _Parts()
+    texts: list[tuple[Source, tree.SourceText]] = []
     for given in sources:
         source = given if isinstance(given, Source) else read(Path(given), str(given))
         if isinstance(source, Diagnostic):
             parts.diagnostics.append(source)
-        else:
-            _source(parts, source)
+            continue
+        text, diagnostics = parse(source)
+        wrong = [d for d in errors(diagnostics) if d.code != "S0901"]
+        parts.diagnostics += wrong
+        if not wrong:  # there will be no document, and a damaged tree has no drawing
+            texts.append((source, text))
+    pous = (pou for _, text in texts for pou in text.declarations if isinstance(pou, tree.Pou))
+    outputs = {pou.name.text.upper(): _outputs(pou) for pou in pous}
+    for source, text in texts:
+        _source(parts, source, text, outputs)
     unread = [d for d in parts.diagnostics if d.code[0] == "S" and d.severity == "error"]
     found = sorted(parts.diagnostics, key=Diagnostic.order)
     return Exported(None if unread else written(_project(parts, name, created)), found)
 
 
-def _source(parts: _Parts, source: Source) -> None:
-    text, diagnostics = parse(source)
-    wrong = [d for d in errors(diagnostics) if d.code != "S0901"]
-    parts.diagnostics += wrong
-    if wrong:
-        return  # there will be no document, and a damaged tree has no drawing
+def _outputs(pou: tree.Pou) -> frozenset[str]:
+    return frozenset(name.text.upper() for section in pou.sections if section.kind == "VAR_OUTPUT"
+                     for variable in section.variables for name in variable.names)
+
+
+def _source(parts: _Parts, source: Source, text: tree.SourceText, outputs: Mapping[str, frozenset[str]]) -> None:
+    """Add the elements of a source; `outputs` are those of all POUs that are exported, by their names in capitals."""
     types = Types(source, (each.name.text for each in text.declarations if isinstance(each, tree.Pou | tree.TypeDecl)))
+    types.outputs |= outputs
     types.note(declared.section for declared in text.declarations if isinstance(declared, tree.GlobalVars))
     named = Path(source.name).stem
     for declared in text.declarations:
@@ -112,7 +126,7 @@ def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: 
 
 def _matters(pragma: str) -> bool:
     """Whether a pragma in front of a declaration changes the meaning of the program."""
-    return not harmless(pragma) or bool(re.search(r"(?i)'(pack_mode|qualified_only|strict)'", pragma))
+    return not harmless(pragma) or bool(_ACTING.search(pragma))
 
 
 # --- configurations ---------------------------------------------------------------------------------------------------

@@ -83,11 +83,11 @@ class Drawing:
         self.elements.append(made)
         return End(self.number, "", x, y)
 
-    def out_variable(self, text: str, end: End) -> None:
-        """A variable right of an output."""
-        x = end.x + 30
+    def out_variable(self, text: str, end: End, y: int | None = None) -> None:
+        """A variable right of an output, in its row or where the wire of another row runs."""
+        x, y = end.x + 30, end.y if y is None else y
         self.elements.append(element(
-            "outVariable", _position(x, end.y - VARIABLE_HEIGHT // 2), wired((end,), x, end.y, 0, VARIABLE_HEIGHT // 2),
+            "outVariable", _position(x, y - VARIABLE_HEIGHT // 2), wired((end,), x, y, 0, VARIABLE_HEIGHT // 2),
             element("expression", text), localId=self.next_id(), height=VARIABLE_HEIGHT, width=VARIABLE_WIDTH, negated="false"))
 
     def block(self, kind: str, instance: str, inputs: list[tuple[str, Ends | str]], outputs: list[tuple[str, str]], column: int,
@@ -116,6 +116,19 @@ class Drawing:
             if variable:
                 self.out_variable(variable, made_ends[name])
         return made_ends
+
+    def output(self, block: Element, pin: str) -> End:
+        """The end of an output of a block that is drawn already; the block gets the output if it has none of that name."""
+        outs = block.all("outputVariables")[0]
+        names = [one.get("formalParameter").upper() for one in outs.all("variable")]
+        if pin.upper() not in names:
+            outs.content.append(element("variable", element("connectionPointOut", _relative(BLOCK_WIDTH, PIN * (len(names) + 1))),
+                                        formalParameter=pin))
+            names.append(pin.upper())
+            block.attributes["height"] = str(max(int(block.get("height")), PIN * (len(names) + 1)))
+        at, place = names.index(pin.upper()) + 1, block.all("position")[0]
+        return End(int(block.get("localId")), outs.all("variable")[at - 1].get("formalParameter"),
+                   int(place.get("x")) + BLOCK_WIDTH, int(place.get("y")) + PIN * at)
 
     def close(self, rail: Element, coils: list[End], columns: int, rows: int) -> None:
         """Finish a network: the right rail, and as many outputs of the left one as it needs."""

@@ -130,6 +130,7 @@ def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str])
     statements = StatementWriter(drawing, types)
     for statement in body:
         if isinstance(statement, Ladder):
+            statements.end_network()
             rungs.ladder(statement)
         else:
             statements.write(statement)

@@ -14,6 +14,12 @@ from fbvm.syntax import tree
 
 LONG = {"DATE_AND_TIME": "DT", "TIME_OF_DAY": "TOD"}
 UNSIGNED = {"USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD"}
+OUTPUTS = {
+    **dict.fromkeys(("TON", "TOF", "TP"), frozenset(("Q", "ET"))), **dict.fromkeys(("CTU", "CTD"), frozenset(("Q", "CV"))),
+    **dict.fromkeys(("R_TRIG", "F_TRIG"), frozenset("Q")), **dict.fromkeys(("SR", "RS"), frozenset(("Q1",))),
+    "CTUD": frozenset(("QU", "QD", "CV")),
+}
+"""The outputs of the standard's blocks."""
 LISTS = {word: name for name, word in SECTIONS.items()}
 WORDS = {word: name for name, word in QUALIFIERS.items()}
 _TEXTS = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\"|\(\*.*?\*\)|//[^\n]*"""
@@ -41,6 +47,8 @@ class Types:
         """Variable in capitals -> the timer or counter that it is declared AT."""
         self.instances: dict[str, str] = {}
         """Variable of the POU at work, in capitals -> the name of its type."""
+        self.outputs: dict[str, frozenset[str]] = dict(OUTPUTS)
+        """By the name of a block in capitals, the names of its outputs in capitals."""
         self.owner = ""
         """The declaration at work, whose name those of its own types begin with."""
         self.made: dict[str, Element] = {}
