@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from random import Random
 from typing import Any
@@ -62,7 +63,7 @@ def compare(first: Plc, second: Plc, seed: int = 1) -> str:
             for name in inputs:
                 value = random.random() < 0.5
                 for plc in (first, second):
-                    plc.write(name, value)
+                    _set(plc, name, value)
         traps = [_trap(plc) for plc in (first, second)]
         if traps[0] != traps[1]:
             return f"one stops: {traps[0] or traps[1]}"
@@ -81,10 +82,16 @@ def run(plc: Plc, seed: int = 1) -> str:
     for scan in range(SCANS):
         if scan % EVERY == 0:
             for name in inputs:
-                plc.write(name, random.random() < 0.5)
+                _set(plc, name, random.random() < 0.5)
         if trap := _trap(plc):
             return trap
     return ""
+
+
+def _set(plc: Plc, name: str, value: bool) -> None:
+    """Set an input; one that lies behind a reference which is still null stays."""
+    with suppress(ValueError):
+        plc.write(name, value)
 
 
 def _trap(plc: Plc) -> str:

@@ -17,3 +17,6 @@ LOCATION = "urn:fbvm:location"
 """Name of fbvm's `addData` at a variable: an address that is no IEC location, such as D100."""
 MNEMONIC = "urn:fbvm:mnemonic"
 """Name of fbvm's `addData` at a block: the mnemonic of the ladder instruction that the block stands for."""
+SIGNS = {"OR": "OR", "XOR": "XOR", "AND": "AND", "EQ": "=", "NE": "<>", "LT": "<", "GT": ">", "LE": "<=", "GE": ">=", "ADD": "+",
+         "SUB": "-", "MUL": "*", "DIV": "/", "MOD": "MOD"}
+"""The functions of diagrams that are operators in text, and their signs."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from fbvm.interchange.plcopen.schema import SIGNS
+
 LOOSE, OR, XOR, AND, EQUAL, COMPARE, ADD, MULTIPLY, UNARY, ATOM = range(10)
 """How tightly an operator binds, the weakest first (IEC 61131-3 table 71)."""
-INFIX = {"OR": ("OR", OR), "XOR": ("XOR", XOR), "AND": ("AND", AND), "EQ": ("=", EQUAL), "NE": ("<>", EQUAL),
-         "LT": ("<", COMPARE), "GT": (">", COMPARE), "LE": ("<=", COMPARE),
-         "GE": (">=", COMPARE), "ADD": ("+", ADD), "SUB": ("-", ADD),
-         "MUL": ("*", MULTIPLY), "DIV": ("/", MULTIPLY), "MOD": ("MOD", MULTIPLY)}
+_LEVELS = {"OR": OR, "XOR": XOR, "AND": AND, "=": EQUAL, "<>": EQUAL, "<": COMPARE, ">": COMPARE, "<=": COMPARE, ">=": COMPARE,
+           "+": ADD, "-": ADD, "*": MULTIPLY, "/": MULTIPLY, "MOD": MULTIPLY}
+INFIX = {name: (sign, _LEVELS[sign]) for name, sign in SIGNS.items()}
 """Functions that are written as operators."""
 CHAINED = ("OR", "XOR", "AND", "ADD", "MUL")
 """Those that take more than two inputs."""

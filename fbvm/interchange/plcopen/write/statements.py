@@ -8,13 +8,13 @@ then.
 from __future__ import annotations
 
 from fbvm.interchange.markup import Element
-from fbvm.interchange.plcopen.read.values import INFIX
+from fbvm.interchange.plcopen.schema import SIGNS
 from fbvm.interchange.plcopen.write.layout import Drawing, Ends
 from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import walk
 
-FUNCTIONS = {operator: name for name, (operator, _) in INFIX.items()}
+FUNCTIONS = {sign: name for name, sign in SIGNS.items()}
 """By operator, the function that is drawn for it."""
 COLUMN = 3
 """Where blocks stand, so that their values fit in front of them."""
