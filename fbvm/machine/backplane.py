@@ -15,7 +15,8 @@ UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc, "Tianxin
 KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "ETN21": ("Etn21", {"number": "unit_number", "timing": "timing", "seed": "seed", "fins": "fins", "fins_port": "fins_port",
                         "fins_node": "fins_node", "fins_nodes": "fins_nodes", "fins_clients": "fins_clients",
-                        "fins_permitted": "fins_permitted", "fins_access": "fins_access"}),
+                        "fins_permitted": "fins_permitted", "fins_access": "fins_access",
+                        "fins_error_flags": "fins_error_flags"}),
     "NOC": ("Noc", {"slot": "rack_slot", "mac": "mac", "module": "module_type", "http": "http", "ftp": "ftp",
                     "restart": "restart_ns"}),
     "Tianxing": ("Tianxing", {"model": "model"}),

@@ -103,6 +103,8 @@ UNIT: Keys = {
                           None),
     "fins_access": Key(one_of(tuple(ACCESS)), "ETN21: what may be done by FINS: everything, no change of the mode, reads only.",
                        None),
+    "fins_error_flags": Key(flag, "ETN21: whether end codes of FINS say, as those of the device, that the PLC has an error (40 "
+                                  "or 80 hexadecimal): many clients take that for an error of the command.", None),
     "slot": Key(whole(0, 254), "NOC: the slot in the rack, 0 to 16, or 254 for the port of the CPU.", None),
     "mac": Key(text, "NOC: the MAC address that the program reads.", None),
     "module": Key(whole(0, 31), "NOC: the number of the module type that the program reads.", None),

@@ -319,6 +319,20 @@ def test_a_connection_by_tcp_that_breaks_lets_the_command_go_by_udp_assumed() ->
     assert (pair.word(202), pair.word(219), pair.word(205)) == (0x80FF, 0, 0)
 
 
+@pytest.mark.slow
+def test_an_alarm_of_the_other_plc_is_no_error_of_recv_assumed() -> None:
+    pair = Pair("@RECV D100 D200 D0", other=False)
+    other = Plc(pair.other.image)
+    other.attach(Etn21(0, THERE, fins=True, fins_error_flags=True), pair.network)
+    pair.other, pair.has_other = other, True
+    other.write("A402", 0x8000)
+    other.write("D100", 17)
+    pair.control(0, [1, 0, NODE_2, 0, 0])
+    pair.scan(3)
+    pair.go()
+    assert (pair.one.read("D200"), pair.word(203), pair.word(219)) == (17, 0x0040, 0)
+
+
 def test_a_node_elsewhere_is_found_by_the_address_table() -> None:
     pair = Pair("@SEND D100 D200 D0", fins_nodes={"7": f"{THERE}:9600"})
     pair.one.write("D100", 8)

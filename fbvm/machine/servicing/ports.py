@@ -17,7 +17,7 @@ from fbvm.base.types import fold
 from fbvm.code.image import Image
 from fbvm.processor.contract import Contract
 from fbvm.wire.fins.areas import WORD_CODES
-from fbvm.wire.fins.codes import EndCode
+from fbvm.wire.fins.codes import FATAL, NON_FATAL, EndCode
 from fbvm.wire.fins.frames import COMMAND, EVERY_NODE, MAX_PARAMETER_BYTES, NO_RESPONSE, Address, Command, Header, Response
 
 Send = Callable[[Command], tuple[int, bytes] | None]
@@ -143,10 +143,10 @@ class CommunicationsPorts:
 
     def _end(self, port: int, end_code: int, data: bytes) -> None:
         """Stores what came back, and frees the port."""
-        instruction, error = self._get(port, "Instruction"), end_code
+        instruction, error = self._get(port, "Instruction"), end_code & ~(FATAL | NON_FATAL)
         if instruction == self._cmnd:
             error, end_code = self._store_response(port, end_code, data)
-        elif instruction == self._recv and not end_code:
+        elif instruction == self._recv and not error:
             if len(data) != 2 * self._get(port, "Size"):
                 error = end_code = EndCode.COUNT
             else:

@@ -49,8 +49,8 @@ class Etn21:
     `fins` lets the unit serve FINS by UDP and TCP on `fins_port`, as node `fins_node` (None: the host part of its address; 0:
     whatever node a frame is for).  `fins_nodes` is its IP address table, `fins_clients` the FINS/TCP connections (1 to 16) that
     it opens itself, with their servers, `fins_permitted` the addresses of FINS/TCP clients if not all may connect, `fins_access`
-    what may be done by FINS: "full", "no-control" (no change of the operating mode) or "read-only".  Raises ValueError for a
-    wrong argument."""
+    what may be done by FINS: "full", "no-control" (no change of the operating mode) or "read-only".  With `fins_error_flags`
+    end codes have a bit while the PLC has an error.  Raises ValueError for a wrong argument."""
 
     def __init__(
         self,
@@ -69,6 +69,7 @@ class Etn21:
         fins_clients: Mapping[str, str] | None = None,
         fins_permitted: Sequence[str] = (),
         fins_access: str = "full",
+        fins_error_flags: bool = False,
     ) -> None:
         if timing not in TIMINGS:
             raise ValueError(f"timing {timing!r} is neither 'exact' nor 'real'")
@@ -95,11 +96,11 @@ class Etn21:
             nodes, clients = endpoints_of(fins_nodes or {}), endpoints_of(fins_clients or {}, "FINS/TCP connection")
             self._fins = FinsService(
                 FinsSettings(address, unit_number, fins_port, fins_node, nodes, clients, tuple(fins_permitted),
-                                   ACCESS[fins_access]))
+                             fins_error_flags, ACCESS[fins_access]))
             self._error_status = at.DISAGREEMENT if self._fins.settings.disagrees else 0
             self._made |= {"fins": True, "fins_port": fins_port, "fins_node": fins_node, "fins_nodes": dict(fins_nodes or {}),
                            "fins_clients": dict(fins_clients or {}), "fins_permitted": list(fins_permitted),
-                           "fins_access": fins_access}  # fmt: skip
+                           "fins_error_flags": fins_error_flags, "fins_access": fins_access}  # fmt: skip
         self.changed_words = False
         self._engine = "auto"
         self._times_set = 0

@@ -157,3 +157,26 @@ def test_finscommand_reads_990_words_and_then_none(rig: FinsRig) -> None:
     head, answer = "80 00 02 00 01 00 00 7F 00 00", "C0 00 02 00 7F 00 00 01 00 00"
     assert len(bytes.fromhex(rig.ask(f"{head} 01 01 82 00 64 00 03 DE"))) == 14 + 1980
     assert rig.ask(f"{head} 01 01 82 04 42 00 00 00") == f"{answer} 01 01 00 00"
+
+
+def test_omron_fins_reads_three_words(rig: FinsRig) -> None:
+    assert rig.ask(f"{OMRON_FINS} 01 01 82 00 64 00 00 03") == f"{OMRON_ANSWER} 01 01 00 00 12 30 12 31 12 32"
+
+
+def test_omron_fins_runs_and_stops(rig: FinsRig) -> None:
+    assert rig.ask(f"{OMRON_FINS} 04 02") == f"{OMRON_ANSWER} 04 02 00 00"
+    assert rig.ask(f"{OMRON_FINS} 04 01") == f"{OMRON_ANSWER} 04 01 00 00"
+
+
+@pytest.mark.parametrize(("word", "flags"), [("A402", "40"), ("A401", "80")])
+def test_an_error_of_the_plc_is_in_the_end_code_beside_its_number_if_that_is_asked_for(word: str, flags: str) -> None:
+    for asked in (False, True):
+        rig = FinsRig(fins_error_flags=asked)
+        rig.plc.write("D100..D101", [0x1230, 0x1231])
+        rig.plc.write(word, 0x8000)
+        end_code = f"00 {flags}" if asked else "00 00"
+        assert rig.ask(f"{OMRON_FINS} 01 01 82 00 64 00 00 02") == f"{OMRON_ANSWER} 01 01 {end_code} 12 30 12 31"
+        bad = f"11 {0x03 | int(flags, 16):02X}" if asked else "11 03"
+        assert rig.ask(f"{OMRON_FINS} 01 01 82 80 00 00 00 01") == f"{OMRON_ANSWER} 01 01 {bad}"
+        unit = rig.ask("80 00 02 00 01 10 00 19 00 01 08 01 55")
+        assert unit == "C0 00 02 00 19 00 00 01 10 01 08 01 00 00 55", "of the CPU unit only"

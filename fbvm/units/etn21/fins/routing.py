@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.units.contract import CpuUnit
 from fbvm.units.etn21.fins import unit_commands
 from fbvm.units.etn21.fins.state import FinsSettings, FinsState
-from fbvm.wire.fins.codes import COMMANDS, EndCode
+from fbvm.wire.fins.codes import COMMANDS, FATAL, NON_FATAL, EndCode
 from fbvm.wire.fins.frames import (
     ANY_ETHERNET_UNIT,
     CPU_BUS_UNITS,
@@ -21,6 +21,8 @@ from fbvm.wire.link import Peer
 MAX_BROADCAST_BYTES = 1473
 OF_THE_UNIT = {0x0403, 0x0501, 0x0601, 0x0801, 0x0802, 0x0803, 0x2102, 0x2103, *range(0x2701, 0x2766)}
 """Commands that an ETN21 has; those of them that are in `COMMANDS` and not served here are not supported."""
+FATAL_ERRORS, OTHER_ERRORS = 401, 402
+"""Words of the auxiliary area."""
 ECHO, RESET = 0x0801, 0x0403
 
 
@@ -53,6 +55,13 @@ def execute(settings: FinsSettings, state: FinsState, error_status: int, command
         return unit_commands.execute(command.code, unit_commands.Asked(settings, state, error_status, command.parameters))
     known = command.code in OF_THE_UNIT and command.code in COMMANDS
     return EndCode.NOT_SUPPORTED if known else EndCode.UNDEFINED, b""
+
+
+def error_flags(cpu: CpuUnit) -> int:
+    """What an end code of the CPU unit has beside its number while there is a fatal (A401) or another error (A402) of the PLC;
+    W342 5-1-3 p155."""
+    a = cpu.memory.words("A")
+    return FATAL * bool(a[FATAL_ERRORS]) | NON_FATAL * bool(a[OTHER_ERRORS])
 
 
 def restarts(command: Command, end_code: int) -> bool:

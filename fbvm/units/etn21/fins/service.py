@@ -23,7 +23,7 @@ from fbvm.units.etn21.fins.state import (
 )
 from fbvm.wire.fins import tcp
 from fbvm.wire.fins.codes import EndCode
-from fbvm.wire.fins.frames import EVERY_NODE, LAST_NODE, Command, Response, parse_frame
+from fbvm.wire.fins.frames import CPU_UNIT, EVERY_NODE, LAST_NODE, Command, Response, parse_frame
 from fbvm.wire.link import (
     Bind,
     Broken,
@@ -369,4 +369,6 @@ class FinsService:
             self.asks_restart = self.asks_restart or routing.restarts(frame, end_code)
         if not header.wants_response or header.destination.node == EVERY_NODE:
             return b""
+        if self.settings.error_flags and header.destination.unit == CPU_UNIT:
+            end_code |= routing.error_flags(self._cpu)
         return Response(header.answer(), frame.code, end_code, found).to_bytes()

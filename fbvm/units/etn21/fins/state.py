@@ -29,7 +29,8 @@ class FinsSettings:
     `node` None is the host part of the unit's address, as automatic address generation has it; 0 takes frames for every node.
     `nodes` is the IP address table: nodes with an endpoint of their own.  `clients` are the FINS/TCP connections of which this
     unit is the client, by number, each with its server; all others wait for clients, of which `permitted` are the addresses, all
-    if it is empty.  Raises ValueError for what cannot be."""
+    if it is empty.  With `error_flags` end codes of the CPU unit say whether it has an error.  Raises ValueError for what cannot
+    be."""
 
     address: str
     unit_number: int = 0
@@ -38,6 +39,7 @@ class FinsSettings:
     nodes: Mapping[int, Peer] = field(default_factory=dict)
     clients: Mapping[int, Peer] = field(default_factory=dict)
     permitted: tuple[str, ...] = ()
+    error_flags: bool = False
     access: FinsAccess = ACCESS["full"]
 
     def __post_init__(self) -> None:
