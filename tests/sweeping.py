@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from random import Random
 from typing import Any
@@ -63,7 +62,7 @@ def compare(first: Plc, second: Plc, seed: int = 1) -> str:
             for name in inputs:
                 value = random.random() < 0.5
                 for plc in (first, second):
-                    _set(plc, name, value)
+                    plc.write(name, value)
         traps = [_trap(plc) for plc in (first, second)]
         if traps[0] != traps[1]:
             return f"one stops: {traps[0] or traps[1]}"
@@ -82,16 +81,10 @@ def run(plc: Plc, seed: int = 1) -> str:
     for scan in range(SCANS):
         if scan % EVERY == 0:
             for name in inputs:
-                _set(plc, name, random.random() < 0.5)
+                plc.write(name, random.random() < 0.5)
         if trap := _trap(plc):
             return trap
     return ""
-
-
-def _set(plc: Plc, name: str, value: bool) -> None:
-    """Set an input; one that lies behind a reference which is still null stays."""
-    with suppress(ValueError):
-        plc.write(name, value)
 
 
 def _trap(plc: Plc) -> str:
@@ -104,9 +97,10 @@ def _bools(image: Image) -> list[str]:
     found = []
     for symbol in image.symbols.values():
         fields = symbol.type.fields.values() if isinstance(symbol.type, StructType) else ()
-        names = [f"{symbol.name}.{field.name}" for field in fields if _is_bool(field.type) and not field.constant]
+        names = [f"{symbol.name}.{field.name}" for field in fields if _is_bool(field.type) and not field.constant
+                 and not field.reference]
         found += names or ([symbol.name] if _is_bool(symbol.type) and not symbol.constant else [])
-    return [name for name in found if "$" not in name]
+    return [name for name in found if not set("$ ") & set(name)]
 
 
 def _is_bool(kind: Type) -> bool:

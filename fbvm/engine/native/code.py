@@ -49,15 +49,14 @@ class Code:
         if level is not None:
             if level not in self._linked:
                 self._load(level, self._known(level) or self._made(level))
-        elif FAST not in self._linked and not self._waiting:
-            known = self._known(FAST)
+        elif FAST not in self._linked:
+            known = None if self._waiting else self._known(FAST)
             if known:
                 self._load(FAST, known)
                 return
-            if QUICK not in self._linked:
+            if QUICK not in self._linked:  # nobody needed it yet if fast code was requested from a run in Python
                 self._load(QUICK, self._known(QUICK) or self._made(QUICK))
-            self._waiting = True
-            worker.compile(lambda: self.translation.text, self._improve)
+            self._compile_apart()
 
     @property
     def ready(self) -> bool:
@@ -72,8 +71,13 @@ class Code:
         if known:
             self._load(FAST, known)
             return
-        self._waiting = True
-        worker.compile(lambda: self.translation.text, self._improve)
+        self._compile_apart()
+
+    def _compile_apart(self) -> None:
+        """Has the helper process compile fast code, unless it does already."""
+        if not self._waiting:
+            self._waiting = True
+            worker.compile(lambda: self.translation.text, self._improve)
 
     def _improve(self, compiled: bytes) -> None:
         """Called in the worker's thread with the object of fast code: loads it, and points the entry points that follow to it."""

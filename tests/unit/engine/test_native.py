@@ -27,6 +27,7 @@ if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
 from fbvm.base import cache
+from fbvm.engine.native.code import code_of
 from fbvm.engine.native.emit import conversions
 from fbvm.engine.native.emit.module import BodyWriter, translate
 from fbvm.engine.native.llvm import compiler as native_compiler
@@ -51,6 +52,16 @@ def slot(e: NativeEngine, machine: str = "i16", offset: int = 0) -> Any:
 def test_every_operation_has_a_row() -> None:
     assert set(BodyWriter.values) | set(BodyWriter.texts) == set(EXPRESSIONS)
     assert set(BodyWriter.statements) == set(STATEMENTS)
+
+
+def test_an_engine_is_made_while_fast_code_is_compiled_for_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "compile", lambda text, ready: None)  # it never gets ready
+    program = image((store("i16", 0, ("add", "i16", load("i16", 0), const("i16", 77))),))
+    code = code_of(program)  # which lives as long as somebody holds it
+    code.request()
+    e = NativeEngine(program, power_on(program))
+    assert e.run(0) is None
+    assert slot(e) == 77
 
 
 @pytest.mark.parametrize("level", LEVELS)
