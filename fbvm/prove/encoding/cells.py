@@ -124,17 +124,24 @@ class Contents:
                  parent: Contents | None = None) -> None:  # fmt: skip
         self.terms, self.partition, self.initial, self.parent = terms, partition, initial, parent
         self.written: dict[Cell, Term] = {}
+        self._inherited: dict[Cell, Term] = {}
+        """What the parent was found to hold."""
 
     def child(self) -> Contents:
         return Contents(self.terms, self.partition, self.initial, self)
 
     def get(self, cell: Cell) -> Term:
-        at: Contents | None = self
-        while at is not None:
-            if (found := at.written.get(cell)) is not None:
-                return found
-            at = at.parent
-        return self.initial(cell)
+        if (found := self.written.get(cell)) is not None:
+            return found
+        if self.parent is None:
+            return self.initial(cell)
+        if (found := self._inherited.get(cell)) is None:
+            at: Contents | None = self.parent
+            while at is not None and found is None:
+                found = at.written.get(cell)
+                at = at.parent
+            found = self._inherited[cell] = self.initial(cell) if found is None else found
+        return found
 
     def written_since(self, ancestor: Contents | None) -> set[Cell]:
         """The cells that were written below an ancestor."""

@@ -16,11 +16,14 @@ from fbvm.prove.encoding.cells import BIT, Cell, Contents, Partition, Reshape, c
 from fbvm.prove.encoding.execution import Refused, TrapCondition
 from fbvm.prove.encoding.properties import place_term
 from fbvm.prove.encoding.scan import WIDTHS, Scanned, Signal, scan
+from fbvm.prove.encoding.term import constants_of
 from fbvm.prove.encoding.terms import Term, Terms, never
 from fbvm.watch.paths import Place
 
 FRAMES_A_LEVEL = 8
 """Python frames that executing takes at most for each level of nested code."""
+MOST_VALUES = 8
+"""Values that a number of the state has, up to which each is told apart: phases of a sequence, parameters of a request."""
 MOST_ROUNDS = 400
 """Symbolic executions until state and constants are told apart."""
 
@@ -97,6 +100,8 @@ class _Fixpoint:
         self.free_bytes = {at for offset, size, bit in free if bit is None for at in range(offset, offset + size)}
         self.free_bits = {(offset, bit) for offset, _, bit in free if bit is not None}
         self.variable: set[Cell] = set()
+        self.values: dict[Cell, set[int]] = {}
+        """The values that a number of the state can have, where they are few; empty where they are not."""
         self.changing: set[Signal] = set()
         self.written: set[Cell] = set()
         self.signals: dict[Term, Signal] = {}
@@ -104,12 +109,16 @@ class _Fixpoint:
 
     def summary(self) -> Summary:
         for _ in range(MOST_ROUNDS):
-            before = len(self.partition.at), len(self.variable), len(self.written), len(self.changing)
+            before = self._known()
             scanned = self._scan()
             self._take(scanned)
-            if before == (len(self.partition.at), len(self.variable), len(self.written), len(self.changing)):
+            if before == self._known():
                 return self._made(scanned)
         raise Refused("what is state cannot be told")
+
+    def _known(self) -> tuple[object, ...]:
+        sizes = tuple(len(some) for some in (self.partition.at, self.variable, self.written, self.changing))
+        return *sizes, {cell: len(values) for cell, values in self.values.items()}
 
     def is_input(self, cell: Cell) -> bool:
         """True for a cell that is free in each scan: named so, or a CIO cell that no code writes."""
@@ -125,8 +134,19 @@ class _Fixpoint:
         if self._is_named(cell):
             return self._input(cell)  # the code does not read it, the property does
         if cell in self.variable:
-            return self.terms.variable(("state", cell), cell.width)
+            return self._one_of(self.terms.variable(("state", cell), cell.width), self.values.get(cell))
         return constant_of(self.terms, cell, self.power_on(cell.offset, cell.size))
+
+    def _one_of(self, variable: Term, values: set[int] | None) -> Term:
+        """A variable of the state as one of the few values that it can have, so that comparisons with others fold."""
+        if not values:
+            return variable
+        first, *rest = sorted(values)
+        found = self.terms.constant(variable.width, first)
+        for value in rest:
+            constant = self.terms.constant(variable.width, value)
+            found = self.terms.ite(self.terms.eq(variable, constant), constant, found)
+        return found
 
     def _input(self, cell: Cell) -> Term:
         term = self.terms.variable(("input", cell), cell.width)
@@ -160,10 +180,20 @@ class _Fixpoint:
                 continue
             self.written.add(cell)
             if not self.is_input(cell) and value is not self.initial(cell):
+                if cell.width > 0:
+                    self._meet(cell, value)
                 self.variable.add(cell)
         for signal, term in scanned.following.items():
             if term is not self.signal(signal):
                 self.changing.add(signal)
+
+    def _meet(self, cell: Cell, value: Term) -> None:
+        """Notes the values that a cell of the state may have; none if there are many."""
+        if cell not in self.variable:
+            self.values[cell] = {constant_of(self.terms, cell, self.power_on(cell.offset, cell.size)).value}
+        if known := self.values[cell]:
+            found = constants_of(value, MOST_VALUES)
+            self.values[cell] = known | found if found and len(known | found) <= MOST_VALUES else set()
 
     def _made(self, scanned: Scanned) -> Summary:
         terms, x = self.terms, scanned.execution

@@ -56,6 +56,25 @@ def opposite(a: Term, b: Term) -> bool:
     return (a.op == "not" and a.args[0] is b) or (b.op == "not" and b.args[0] is a)
 
 
+def constants_of(term: Term, most: int) -> set[int] | None:
+    """The constants at the ends of nested `ite`; None if others stand there, or more than `most` of them."""
+    found: set[int] = set()
+    waiting, seen = [term], {term}
+    while waiting:
+        at = waiting.pop()
+        if at.op == "const":
+            found.add(at.value)
+        elif at.op != "ite":
+            return None
+        else:
+            fresh = [way for way in at.args[1:] if way not in seen]
+            seen.update(fresh)
+            waiting += fresh
+        if len(found) > most:
+            return None
+    return found
+
+
 def leaf_count(term: Term, most: int) -> int | None:
     """How many constants stand at the ends of nested `ite`; None if others do, or more than `most`."""
     if term.op == "const":
