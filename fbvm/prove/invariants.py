@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Protocol
 
 from fbvm.prove.encoding.clocks import Clock
 from fbvm.prove.encoding.summary import Summary
@@ -29,6 +30,16 @@ class Sample:
 
     values: Values
     now_ns: int
+
+
+class Guess(Protocol):
+    """What may hold of the state behind every scan."""
+
+    def term(self, terms: Terms, state: dict[Term, Term], now: Term) -> Term:
+        """The guess about a state, behind the scan of a time."""
+        ...
+
+    def holds(self, sample: Sample) -> bool: ...
 
 
 @dataclass(frozen=True)
@@ -95,7 +106,6 @@ class Ordered:
         return signed(sample.values[self.lesser], width) <= high
 
 
-Guess = Literal | Clause | Bounds | Ordered
 
 
 def guesses(variables: Sequence[Term], samples: Sequence[Sample], doubted: Collection[Guess] = ()) -> list[Guess]:
@@ -150,7 +160,7 @@ class Invariants:
         self.context = [stop, given]
         self._expired = expired
 
-    def kept(self, found: list[Guess]) -> list[Guess] | None:
+    def kept(self, found: Sequence[Guess]) -> list[Guess] | None:
         """The guesses that hold behind every scan; None if the time is over."""
         summary, terms = self.summary, self.summary.terms
         wanted = [*self.context, *self.behind]
@@ -162,7 +172,7 @@ class Invariants:
         now = terms.add(later.before, self.clock.passed(0, later=True))
         return self._filtered(first, anywhere.scan(0), later.facts, now, later.before)
 
-    def _filtered(self, found: list[Guess], scan: list[Term], facts: Sequence[Term], now: Term,
+    def _filtered(self, found: Sequence[Guess], scan: list[Term], facts: Sequence[Term], now: Term,
                   before: Term | None) -> list[Guess] | None:  # fmt: skip
         """The guesses that hold behind a scan, if they hold `before` it; None there is power-on."""
         terms, solver = self.summary.terms, Solver(self._expired)
@@ -176,7 +186,7 @@ class Invariants:
             open_ones = [broken[guess] for guess in found if broken[guess] is not terms.false]
             answer = solver.ask(*(assumed[guess] for guess in found if before), balanced(terms, open_ones))
             if answer != SAT:
-                return found if answer == UNSAT else None
+                return [*found] if answer == UNSAT else None
             values = solver.values({*behind, now})
             sample = Sample(dict(zip(self.variables, (values[term] for term in behind), strict=True)), values[now])
             found = [guess for guess in found if guess.holds(sample)]

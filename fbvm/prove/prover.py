@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from fbvm.base.types import EnumType, SubrangeType, base
 from fbvm.code.image import Image
 from fbvm.machine.plc import STEP_BUDGET
 from fbvm.prove.bounded import BoundedSearch, Goal, Inputs
+from fbvm.prove.copies import copied
 from fbvm.prove.cycle import show_cycle
 from fbvm.prove.encoding.clocks import Clock, clock_of
 from fbvm.prove.encoding.execution import UNWOUND, Refused
 from fbvm.prove.encoding.properties import condition_term, place_term
-from fbvm.prove.encoding.rewriting import cone, leaves
+from fbvm.prove.encoding.rewriting import cone, distances, leaves
 from fbvm.prove.encoding.scan import WIDTHS
 from fbvm.prove.encoding.summary import Summary, summarize
 from fbvm.prove.encoding.terms import Term, TimeOver
@@ -42,13 +43,15 @@ from fbvm.watch.paths import Place
 SIMULATED_SCANS = 2_000
 """Scans of each random run before the solver is asked."""
 SAMPLED_SCANS = 200
+FIRST_SCANS = 4
+"""Scans that are searched before anything is tried that looks back."""
 DEPTHS = (16, 64)
-"""Scans that are searched before induction, and before deeper induction."""
+"""Scans that are searched before random runs, and before deeper induction."""
 MOST_INDUCTION = 5
 MOST_LINES = 12
 """Lines that a note lists."""
 FEW_STATE, MOST_STATE = 24, 200
-"""Variables of the state up to which invariants are guessed before a longer search, and at all."""
+"""Variables of the state of which invariants are guessed, those next to the goal: before a longer search, and behind it."""
 
 
 @dataclass(frozen=True)
@@ -105,12 +108,14 @@ class Prover:
         self.unwound = [trap for trap in summary.traps if trap.code == UNWOUND]
         assumed = (condition_term(summary.contents, names.condition(text).term) for text in self.question.assumptions)
         given = terms.all_of(*assumed, *self._types())
+        self.condition = stop
         if self.question.kind == NO_TRAP:
             return Goal(stop, stop, given)
         condition = condition_term(summary.contents, names.condition(self.question.text).term)
         if self.question.kind == WITHIN:
             condition = self._awaited(condition, condition_term(summary.contents, names.condition(self.question.trigger).term))
         hit = terms.not_(condition) if self.question.kind == ALWAYS else condition
+        self.condition = hit
         return Goal(terms.and_(hit, terms.not_(stop)), stop, given)
 
     def _awaited(self, answer: Term, trigger: Term) -> Term:
@@ -153,16 +158,17 @@ class Prover:
         """Tries one method after the other, the cheap ones first."""
         self._note_limits()
         shallow, deeper = (min(depth, self.limits.scans) for depth in DEPTHS)
-        is_small = len(self._state()) <= FEW_STATE and self.question.kind != WITHIN
-        invariants: list[Callable[[], Verdict | None]] = [self._with_invariants]
+        has_more = len(self._state()) > FEW_STATE or self.question.kind == WITHIN
         methods: list[Callable[[], Verdict | None]] = [
-            lambda: self._searched(shallow),
+            lambda: self._searched(min(FIRST_SCANS, shallow)),
             lambda: self._induced([], 1),
+            self._with_copies,
+            lambda: self._searched(shallow),
             self._simulated,
-            *invariants * is_small,
+            lambda: self._with_invariants(FEW_STATE),
             lambda: self._searched(deeper),
             lambda: self._induced([], self._deepest()),
-            *invariants * (not is_small),
+            lambda: self._with_invariants(MOST_STATE) if has_more else None,
             lambda: self._searched(self.limits.scans),
         ]
         for method in methods:
@@ -256,7 +262,7 @@ class Prover:
         raise SpuriousRun(f"the solver's run of {len(inputs)} scans does not do on the engine what the solver says; this is a "
                           f"defect of the encoding, not of the program (image {self.image.fingerprint})")  # fmt: skip
 
-    def _induced(self, found: list[Guess], most: int) -> Verdict | None:
+    def _induced(self, found: Sequence[Guess], most: int) -> Verdict | None:
         """k-induction up to a depth, which the bounded search has cleared."""
         facts = facts_of(self.summary, found, self.clock)
         induction = Induction(self.summary, self._whole_goal(), self.clock, self.limits.expired, facts)
@@ -277,12 +283,13 @@ class Prover:
                     self.goal.given)  # fmt: skip
 
     def _state(self) -> list[Term]:
-        """The variables of the state on which the answer depends."""
-        return [variable for variable in self.search.unrolling.cone if variable in self.summary.cells]
+        """The variables of the state on which the answer depends, the nearest first."""
+        return [variable for variable in distances(self.summary.next, self.goal.terms) if variable in self.summary.cells]
 
-    def _with_invariants(self) -> Verdict | None:
-        state = self._state()
-        if not state or len(state) > MOST_STATE or self.limits.expired():
+    def _with_invariants(self, most: int) -> Verdict | None:
+        """Induction with invariants of so many variables that are guessed."""
+        state = self._state()[:most]
+        if not state or self.limits.expired():
             return None
         self.tell(f"guessing invariants of {len(state)} variables")
         cells = {variable: self.summary.cells[variable] for variable in state}
@@ -297,6 +304,16 @@ class Prover:
             known = {*found}
             kept = invariants.kept([*kept, *(guess for guess in guesses(state, samples, doubted) if guess not in known)])
         return self._induced(kept, self._deepest()) if kept else None
+
+    def _with_copies(self) -> Verdict | None:
+        """Induction with the same property of what the variables of the property are copied from."""
+        found = [*copied(self.summary, self.condition)]
+        if not found or self.limits.expired():
+            return None
+        self.tell("trying the property of what was copied")
+        kept = Invariants(self.summary, [*self.summary.cells], self.goal.stop, self.goal.given, self.clock,
+                          self.limits.expired).kept(found)  # fmt: skip
+        return self._induced(kept, MOST_INDUCTION) if kept else None
 
     def _deepest(self) -> int:
         """The scans that induction looks back: those in which an answer is awaited, if there are not too many."""

@@ -45,10 +45,15 @@ def leaves(wanted: Iterable[Term]) -> set[Term]:
 
 def cone(next_terms: Mapping[Term, Term], wanted: Iterable[Term]) -> set[Term]:
     """The variables of the state that the terms depend on, in this scan or by the scans before."""
-    found: set[Term] = set()
-    waiting = list(wanted)
+    return {*distances(next_terms, wanted)}
+
+
+def distances(next_terms: Mapping[Term, Term], wanted: Iterable[Term]) -> dict[Term, int]:
+    """The variables of the state that the terms depend on, and by how many scans before: the nearest first."""
+    found: dict[Term, int] = {}
+    waiting, scans = list(wanted), 0
     while waiting:
-        new = {leaf for leaf in leaves(waiting) if leaf in next_terms} - found
-        found |= new
-        waiting = [next_terms[leaf] for leaf in new]
+        new = sorted((leaf for leaf in leaves(waiting) if leaf in next_terms and leaf not in found), key=lambda leaf: leaf.number)
+        found.update(dict.fromkeys(new, scans))
+        waiting, scans = [next_terms[leaf] for leaf in new], scans + 1
     return found

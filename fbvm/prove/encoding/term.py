@@ -8,6 +8,9 @@ TEXT = -1
 FEW_LEAVES = 64
 """Constants at the ends of nested `ite` through which a comparison is carried."""
 
+FEW_CHOICES = 16
+"""Such constants through which arithmetic is carried."""
+
 
 class Term:
     """An operation (`op`) of operands (`args`); `value` is the number of a constant, the name of a variable, the lowest bit of an
@@ -73,6 +76,11 @@ def constants_of(term: Term, most: int) -> set[int] | None:
         if len(found) > most:
             return None
     return found
+
+
+def is_choice(term: Term) -> bool:
+    """True for one of a few constants, through which operations with another constant are carried."""
+    return term.op == "ite" and leaf_count(term, FEW_CHOICES) is not None
 
 
 def leaf_count(term: Term, most: int) -> int | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fbvm.prove.encoding.term import FEW_LEAVES, TEXT, Term, bounds, leaf_count, opposite, signed
+from fbvm.prove.encoding.term import FEW_LEAVES, TEXT, Term, bounds, is_choice, leaf_count, opposite, signed
 
 __all__ = ["TEXT", "Term", "Terms", "TimeOver", "bounds", "signed"]
 
@@ -205,6 +205,12 @@ class Terms:
                 return self.ite(other.args[0], *ways)
         return self._make(f"{'s' if is_signed else 'u'}l{'e' if or_equal else 't'}", 0, (a, b))
 
+    def _chosen(self, a: Term, make: Callable[[Term], Term]) -> Term:
+        """An operation of one of a few constants as one of its results."""
+        if a.op != "ite":
+            return make(a)
+        return self.ite(a.args[0], self._chosen(a.args[1], make), self._chosen(a.args[2], make))
+
     # --- bit-vectors
 
     def add(self, a: Term, b: Term) -> Term:
@@ -217,8 +223,8 @@ class Terms:
                 return a
             if a.op == "add" and a.args[1].op == "const":
                 return self.add(a.args[0], self.constant(a.width, a.args[1].value + b.value))
-            if a.op == "ite" and a.args[1].op == a.args[2].op == "const":
-                return self.ite(a.args[0], self.add(a.args[1], b), self.add(a.args[2], b))
+            if is_choice(a):
+                return self._chosen(a, lambda way: self.add(way, b))
         if a.high + b.high < 1 << a.width:
             return self._make("add", a.width, (a, b), None, a.low + b.low, a.high + b.high)
         return self._make("add", a.width, (a, b))
@@ -245,6 +251,8 @@ class Terms:
                 return self.constant(a.width, a.value * b.value)
             if b.value in (0, 1):
                 return a if b.value else b
+            if is_choice(a):
+                return self._chosen(a, lambda way: self.mul(way, b))
         high = a.high * b.high
         return self._make("mul", a.width, (a, b), None, *((a.low * b.low, high) if high < 1 << a.width else (0, None)))
 
@@ -254,6 +262,8 @@ class Terms:
             x, y = (signed(t.value, t.width) if op[0] == "s" else t.value for t in (a, b))
             quotient = abs(x) // abs(y) * (1 if (x < 0) == (y < 0) else -1)
             return self.constant(a.width, quotient if op.endswith("div") else x - y * quotient)
+        if b.op == "const" and b.value and is_choice(a):
+            return self._chosen(a, lambda way: self.divide(op, way, b))
         if b.op == "const" and b.value == 1:
             return a if op.endswith("div") else self.constant(a.width, 0)
         if op[0] == "s" and max(a.high, b.high) >> (a.width - 1) == 0:
@@ -276,6 +286,8 @@ class Terms:
                 return a
             if b.value == (0 if op == "bvand" else ones):
                 return self.invert(a) if op == "bvxor" else b
+            if is_choice(a):
+                return self._chosen(a, lambda way: self.bitwise(op, way, b))
         if a is b:
             return self.constant(a.width, 0) if op == "bvxor" else a
         high = min(a.high, b.high) if op == "bvand" else (1 << max(a.high, b.high).bit_length()) - 1
@@ -293,6 +305,8 @@ class Terms:
                 return self.constant(a.width, 0)
             if n.value == 0:
                 return a
+            if is_choice(a):
+                return self._chosen(a, lambda way: self.shift(op, way, n))
             zeros = self.constant(n.value, 0)
             if op == "shl":
                 return self.concat(self.extract(a, 0, a.width - n.value), zeros)
@@ -327,7 +341,7 @@ class Terms:
                 return self.constant(width, 0)
             if low == 0:
                 return self.extend(inner, width, a.op == "sext")
-        if a.op == "ite" and (a.args[1].op == "const" or a.args[2].op == "const"):
+        if a.op == "ite" and (a.args[1].op == "const" or a.args[2].op == "const" or is_choice(a)):
             return self.ite(a.args[0], self.extract(a.args[1], low, width), self.extract(a.args[2], low, width))
         if a.op in ("bvand", "bvor", "bvxor"):
             return self.bitwise(a.op, self.extract(a.args[0], low, width), self.extract(a.args[1], low, width))
@@ -365,8 +379,8 @@ class Terms:
             return self.extend(a.args[0], width, False)
         if a.op == "sext" and is_signed:
             return self.extend(a.args[0], width, True)
-        if a.op == "ite" and a.args[1].op == a.args[2].op == "const":
-            return self.ite(a.args[0], self.extend(a.args[1], width, is_signed), self.extend(a.args[2], width, is_signed))
+        if is_choice(a):
+            return self._chosen(a, lambda way: self.extend(way, width, is_signed))
         return self._make("sext", width, (a,)) if is_signed else self._make("zext", width, (a,), None, a.low, a.high)
 
     def resized(self, a: Term, width: int, is_signed: bool) -> Term:

@@ -1,0 +1,68 @@
+"""Proofs of the MTCP_ETN blocks, in whose words the unit may write anything at any time.
+
+They hold for a unit that keeps to its sheet all the more.  The parameters of requests are those of a program that gives them
+once; its commands come at any time."""
+
+from __future__ import annotations
+
+import pytest
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.prove.prover import Limits, Prover, prove
+from fbvm.prove.question import NEVER, NO_TRAP, Question, Verdict
+
+pytestmark = pytest.mark.slow
+UNIT_WORDS = ("CIO1509", "CIO1519", "D30001", "D30009", "D30018..D30027", "D32510..D32642")
+"""Status and switches of socket 1, its words of D memory, and where a reply is received."""
+READS = ("Fn01", "Coil"), ("Fn02", "Coil"), ("Fn03", "Register"), ("Fn04", "Register")
+WRITES = ("Fn0F", "Coil"), ("Fn10", "Register")
+SINGLE = ("Fn05", "Coil", "TRUE"), ("Fn06", "Register", "4711")
+
+CALLS = {
+    **{name: f"{what}_Address := 1000, {what}_Qty := 3, RespData_DM := 200, Cmd_Read := Command" for name, what in READS},
+    **{name: f"{what}_Address := 1000, {what}_Qty := 3, DataAddress_DM := 300, Cmd_Write := Command" for name, what in WRITES},
+    **{name: f"{what}_Address := 1000, Value := {value}, Cmd_Write := Command" for name, what, value in SINGLE},
+}
+LIMITS = Limits(scans=4, simulated_scans=20)
+
+
+def client(*names: str) -> Image:
+    """A program with a connection and a block for each name, commanded as the environment likes."""
+    blocks = "".join(f"    {name}_ : MTCP_ETN_{name};\n" for name in names)
+    calls = "".join(f"    {name}_(EN := conn.ENO, {CALLS[name]});\n" for name in names)
+    text = ("PROGRAM Main\nVAR_INPUT Connect, Command : BOOL; END_VAR\nVAR\n    conn : MTCP_ETN_Connect;\n"
+            f"{blocks}END_VAR\n    conn(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 2, "
+            f"Connect := Connect);\n{calls}END_PROGRAM\n")  # fmt: skip
+    image = compile_text(text, lint=False).image
+    assert image is not None
+    return image
+
+
+def asked(image: Image, text: str = "") -> Verdict:
+    return prove(image, Question(NEVER if text else NO_TRAP, text, free=UNIT_WORDS), LIMITS)
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_no_trap_whatever_the_unit_says(name: str) -> None:
+    assert asked(client(name)).word == "proved"
+
+
+@pytest.mark.parametrize("name", ["Fn03", "Fn05", "Fn10"])
+def test_error_and_success_are_never_told_together(name: str) -> None:
+    verdict = asked(client(name), f"Main.{name}_.Error <> (Main.{name}_.Error_Code <> 0)")
+    assert (verdict.word, verdict.notes) == ("proved", ())
+
+
+def test_a_connection_is_never_up_and_in_error() -> None:
+    assert asked(client(), "Main.conn.ENO AND Main.conn.Error").word == "proved"
+    assert asked(client(), "Main.conn.ENO AND Main.conn.Waiting_Server").word == "proved"
+
+
+def test_two_blocks_that_use_the_socket_at_once_are_not_found() -> None:
+    """That there never are any is not proved: who has a turn depends on how many scans each block was away, and the induction
+    knows no relation between these counts."""
+    text = "Main.Fn03_.Exchange.State > 1 AND Main.Fn05_.Exchange.State > 1"
+    prover = Prover(client("Fn03", "Fn05"), Question(NEVER, text, free=UNIT_WORDS), LIMITS, print)
+    assert prover.search.until(6) is None
+    assert prover.search.cleared == 6
