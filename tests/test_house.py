@@ -61,7 +61,7 @@ ORDERS = {
     "units": ("", "etn21/fins", "etn21", "port"),
     "machine": ("scan", "servicing", "fast", ""),
     "prove": ("encoding", ""),
-    "campaign": ("", "mutation", "items"),
+    "campaign": ("", "mutation", "items", "fleet"),
     "testing": ("", "course", "suites"),
     "record": ("trace", "recording", "draw", "export", "page"),
     "cli": ("shared", "shared/debug", "shared/live", "programs", "running", "recordings", "projects", "editors", ""),

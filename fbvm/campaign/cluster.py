@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
 from tempfile import TemporaryDirectory
 from typing import Any, Generic, Protocol, TypeVar, cast
@@ -16,6 +16,7 @@ from typing import Any, Generic, Protocol, TypeVar, cast
 from distributed import Client, LocalCluster, WorkerPlugin, as_completed, get_worker
 from distributed.scheduler import KilledWorker
 
+from fbvm.base.host import deaf_children
 from fbvm.base.version import VERSION
 from fbvm.campaign.processes import CRASHED, Crashed, Late
 from fbvm.campaign.work import Mismatch, Unreachable
@@ -61,6 +62,42 @@ def _work(mark: str, task: Any, limit_ns: int) -> Any:
     return cast(_Prepared, get_worker().plugins[mark]).bench.limited(task, limit_ns)
 
 
+@contextmanager
+def connected(address: str, jobs: int) -> Iterator[Client]:
+    """A client of the scheduler at `address`, or of `jobs` processes of this machine, LOCAL.
+
+    Raises Unreachable, and Mismatch for a worker with another version of fbvm or without it."""
+    with ExitStack() as stack:
+        cluster = address if address != LOCAL else stack.enter_context(_local(stack, jobs))
+        try:
+            client: Any = Client(cluster, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+            stack.enter_context(client)
+        except (OSError, ValueError) as error:
+            raise Unreachable(f"{address} is no Dask scheduler that answers: {error}") from None
+        _check(client, address)
+        yield client
+
+
+def _local(stack: ExitStack, jobs: int) -> Any:
+    scratch = stack.enter_context(TemporaryDirectory())
+    with deaf_children():  # they are ended by this process
+        return LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=jobs, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0,
+            local_directory=scratch, silence_logs=logging.CRITICAL)  # fmt: skip
+
+
+def _check(client: Any, address: str) -> None:
+    """Asks each worker for its version of fbvm."""
+    found = client.run(eval, ASK_VERSION, on_error="return")
+    if not found:
+        raise Unreachable(f"the scheduler {address} has no workers: start some by dask worker {address}")
+    for worker, version in found.items():
+        if isinstance(version, Exception):
+            raise Mismatch(f"the worker {worker} has no fbvm: {version}")
+        if version != VERSION:
+            raise Mismatch(f"the worker {worker} has fbvm {version}, not {VERSION}")
+
+
 class Cluster(Generic[Task, Result]):
     """Does tasks in a cluster as a `Pool` does: at `address`, such as tcp://192.168.1.5:8786, or in `jobs` processes of this
     machine, LOCAL.
@@ -74,13 +111,8 @@ class Cluster(Generic[Task, Result]):
 
     def __enter__(self) -> Cluster[Task, Result]:
         with ExitStack() as stack:
-            cluster = self._address if self._address != LOCAL else stack.enter_context(self._local(stack))
-            try:
-                client: Any = Client(cluster, timeout=CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
-                self._client = stack.enter_context(client)
-            except (OSError, ValueError) as error:
-                raise Unreachable(f"{self._address} is no Dask scheduler that answers: {error}") from None
-            self._check()
+            client: Any = stack.enter_context(connected(self._address, self._jobs))
+            self._client = client
             self._client.register_plugin(_Prepared(self._bench))
             stack.callback(self._leave)
             self._threads = sum(self._client.nthreads().values())
@@ -91,23 +123,6 @@ class Cluster(Generic[Task, Result]):
         """Takes the bench from the workers, as far as there are some."""
         with suppress(Exception):  # the scheduler may have gone
             self._client.unregister_worker_plugin(self._bench.mark)
-
-    def _local(self, stack: ExitStack) -> Any:
-        scratch = stack.enter_context(TemporaryDirectory())
-        return LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=self._jobs, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0,
-            local_directory=scratch, silence_logs=logging.CRITICAL)  # fmt: skip
-
-    def _check(self) -> None:
-        """Asks each worker for its version of fbvm."""
-        found = self._client.run(eval, ASK_VERSION, on_error="return")
-        if not found:
-            raise Unreachable(f"the scheduler {self._address} has no workers: start some by dask worker {self._address}")
-        for worker, version in found.items():
-            if isinstance(version, Exception):
-                raise Mismatch(f"the worker {worker} has no fbvm: {version}")
-            if version != VERSION:
-                raise Mismatch(f"the worker {worker} has fbvm {version}, not {VERSION}")
 
     def __exit__(self, *raised: object) -> None:
         self._stack.close()

@@ -13,7 +13,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from multiprocessing import connection
 from types import FrameType
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -58,14 +58,11 @@ class NotStarted(OSError):
 
 
 @dataclass
-class _Worker(Generic[Task]):
-    """A process, the task it does, and whether its time is over.  The time of a task begins when the process is ready."""
+class Process:
+    """A process that does what it is told at its line first: a function that pickle knows, which is called with the line."""
 
     process: subprocess.Popen[bytes]
     door: connection.Listener
-    task: Task | None = None
-    is_ready: bool = False
-    expired: Callable[[], bool] = lambda: False
 
     @cached_property
     def line(self) -> Line:
@@ -84,6 +81,31 @@ class _Worker(Generic[Task]):
         self.door.close()
         assert self.process.stdout
         self.process.stdout.close()
+
+
+def started() -> Process:
+    """A new process."""
+    with signals_held():
+        door = connection.Listener()  # where only this user comes in
+        code = CODE.format(address=door.address, path=sys.path)
+        return Process(subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                        stderr=subprocess.DEVNULL), door)  # fmt: skip
+
+
+@dataclass
+class _Worker(Generic[Task]):
+    """A process, the task it does, and whether its time is over.  The time of a task begins when the process is ready."""
+
+    process: Process
+    task: Task | None = None
+    is_told: bool = False
+    is_ready: bool = False
+    expired: Callable[[], bool] = lambda: False
+
+    @property
+    def line(self) -> Line:
+        """The connection to the process."""
+        return self.process.line
 
 
 @dataclass
@@ -136,7 +158,7 @@ class Pool(Generic[Task, Result]):
         """Gives each process that does nothing a task, as far as there are some.  Processes that are missing start together."""
         idle = [number for number, worker in enumerate(self._workers) if worker is None or worker.task is None][: len(left)]
         for number in idle:
-            self._workers[number] = self._workers[number] or self._started()
+            self._workers[number] = self._workers[number] or _Worker[Task](started())
         for number in idle:
             self._begin(number, left.popleft(), limit_ns)
 
@@ -160,27 +182,27 @@ class Pool(Generic[Task, Result]):
         if worker.is_ready:
             worker.expired = time_limit(limit_ns)
         with suppress(BrokenPipeError, ConnectionResetError):  # it has ended, which its line tells, too
-            if "line" not in vars(worker):
-                worker.line.send((number, self.prepare, self.work))
+            if not worker.is_told:
+                worker.line.send(partial(_do_tasks, number, self.prepare, self.work))
+                worker.is_told = True
             worker.line.send(task)
-
-    def _started(self) -> _Worker[Task]:
-        """A new process."""
-        with signals_held():
-            door = connection.Listener()  # where only this user comes in
-            code = CODE.format(address=door.address, path=sys.path)
-            process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                       stderr=subprocess.DEVNULL)  # fmt: skip
-            return _Worker[Task](process, door)
 
     def _end(self, number: int) -> None:
         worker, self._workers[number] = self._workers[number], None
         if worker:
-            worker.end()
+            worker.process.end()
+
+
+def _do_tasks(number: int, prepare: Callable[[int], None], work: Callable[[int, Any], Any], line: Line) -> None:
+    """Does tasks until nobody asks any more."""
+    prepare(number)
+    line.send(None)
+    while True:
+        line.send(work(number, line.recv()))
 
 
 def serve(line: Line) -> None:
-    """What a process does: tasks, until nobody asks any more.  What they print is dropped."""
+    """What a process does: what it is told first.  What it prints is dropped."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nowhere, stream)
@@ -188,11 +210,7 @@ def serve(line: Line) -> None:
     with handling([signal.SIGINT], _wait_for_the_end):
         let_signals_through()
         with suppress(EOFError, OSError):
-            number, prepare, work = line.recv()
-            prepare(number)
-            line.send(None)
-            while True:
-                line.send(work(number, line.recv()))
+            line.recv()(line)
 
 
 def _wait_for_the_end(number: int, frame: FrameType | None) -> None:

@@ -5,9 +5,9 @@ Images travel to it, not sources."""
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from fbvm.base.version import VERSION
 from fbvm.campaign.execution import Execution, Result
@@ -75,12 +75,33 @@ class AnyBench(Protocol):
         """Does a task."""
 
 
+PackedImage: TypeAlias = tuple[str, str, bytes]
+"""A program that travels: the name of its PLC, its fingerprint, and its bytes."""
+
+
+def packed(images: Mapping[str, Image]) -> tuple[PackedImage, ...]:
+    """Programs by the names of their PLCs, ready to travel."""
+    return tuple((name, image.fingerprint, encode(image)) for name, image in images.items())
+
+
+def unpacked(images: Iterable[PackedImage], version: str) -> dict[str, Image]:
+    """Programs that have come from a process with this version of fbvm.  Raises Mismatch."""
+    if version != VERSION:
+        raise Mismatch(f"this process has fbvm {VERSION}, not {version}")
+    found = {}
+    for name, fingerprint, content in images:
+        found[name] = decode(content)
+        if found[name].fingerprint != fingerprint:
+            raise Mismatch(f"{name} has arrived as another program")
+    return found
+
+
 @dataclass(frozen=True)
 class Bench:
     """All that a process needs: the plan, the programs as bytes with their fingerprints by name, and the version of fbvm."""
 
     plan: Plan
-    images: tuple[tuple[str, str, bytes], ...]
+    images: tuple[PackedImage, ...]
     version: str
     mark: str
     """A hash of all that results depend on."""
@@ -89,7 +110,7 @@ class Bench:
     @classmethod
     def of(cls, plan: Plan, images: Mapping[str, Image]) -> Bench:
         """The bench of a campaign."""
-        encoded = tuple((name, image.fingerprint, encode(image)) for name, image in images.items())
+        encoded = packed(images)
         depends = repr((VERSION, plan, [(name, fingerprint) for name, fingerprint, _ in encoded]))
         return cls(plan, encoded, VERSION, hashlib.sha256(depends.encode()).hexdigest())
 
@@ -99,14 +120,8 @@ class Bench:
 
     def execution(self) -> Execution:
         """What executes runs in this process.  Raises Mismatch."""
-        if self.version != VERSION:
-            raise Mismatch(f"this process has fbvm {VERSION}, not {self.version}")
         if self.mark not in _executions:
-            images = {}
-            for name, fingerprint, content in self.images:
-                images[name] = decode(content)
-                if images[name].fingerprint != fingerprint:
-                    raise Mismatch(f"{name} has arrived as another program")
+            images = unpacked(self.images, self.version)
             _executions.clear()
             _executions[self.mark] = Execution(self.plan, images)
         return _executions[self.mark]

@@ -39,6 +39,7 @@ VERB_GROUPS = {
         "test": "Run the tests of a project.",
         "campaign": "Run a project many times under faults, and tell in which ways it fails.",
         "sweep": "Run a program once for each value of its parameters, and print the results.",
+        "fleet": "Run the many equal PLCs of a project in several processes, or on a cluster.",
         "mutate": "Tell which small mistakes in a project's programs its tests would miss.",
         "learn": "Learn in sixteen lessons what a scan cycle really does.",
     }),

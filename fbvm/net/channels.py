@@ -25,10 +25,17 @@ def undeliverable(remote: Peer, data: bytes) -> str:
 class Channel:
     """A channel in use.  `send` and `send_to` return the errno name of a failure, or ""."""
 
+    _connected = False
+
     def __init__(self, link: ChannelLink, channel: int) -> None:
         self.link = link
         self.channel = channel
         self.granted = 0
+
+    @property
+    def is_connected(self) -> bool:
+        """True for a TCP connection that is open."""
+        return self._connected
 
     def grant(self, size_bytes: int) -> None:
         """Sets the number of bytes that the unit has room for."""

@@ -115,21 +115,30 @@ class Switchboard(ABC):
             raise OSError(errno.EACCES, "not mapped")
         return self.host_endpoint(endpoint, transport)
 
+    @property
+    def connections(self) -> int:
+        """How many connections of units are open."""
+        return sum(channel.is_connected for link in self.links.values() for channel in link.channels.values())
+
     def try_doors(self, endpoints: Iterable[Peer]) -> dict[Peer, Peer]:
         """Tries whether units will be able to listen on their endpoints; returns where on the host each is.
 
         Raises OSError with a message that names endpoint and port: for an endpoint of no unit, for two on one port, and for a
         port that the host does not give."""
         found: dict[Peer, Peer] = {}
+        by_port: dict[int, dict[str, Peer]] = {}
+        """The endpoints by the port and the address of their doors."""
         for endpoint in endpoints:
             if endpoint.host not in self.links:
                 there = ", ".join(sorted(self.links)) or "none"
                 raise OSError(f"{endpoint} cannot be used: no unit has the address {endpoint.host}; units: {there}")
             self.try_door(self.map.local(endpoint))
             real = self.host_endpoint(endpoint)
-            for other, its in found.items():
-                if its.port == real.port and ("0.0.0.0" in (its.host, real.host) or its.host == real.host):
-                    raise OSError(f"{real} cannot be used for {endpoint}: it is the door of {other}")
+            others = by_port.setdefault(real.port, {})
+            every = next(iter(others.values()), None) if real.host == "0.0.0.0" else None
+            if taken := others.get(real.host) or others.get("0.0.0.0") or every:
+                raise OSError(f"{real} cannot be used for {endpoint}: it is the door of {taken}")
+            others[real.host] = endpoint
             found[endpoint] = real
         self.doors |= found
         return found

@@ -51,7 +51,7 @@ class Kind:
         """A name for each PLC."""
         if self.row.count is None:
             return [self.row.name]
-        return [f"{self.row.name}[{number}]" for number in range(1, self.row.count + 1)]
+        return [f"{self.row.name}[{number}]" for number in range(self.row.first, self.row.first + self.row.count)]
 
     def values(self, run: Running) -> dict[str, Value]:
         """The present values of what is watched of one of them, by name."""
@@ -158,6 +158,7 @@ class Plant:
             kind.runs.append(running)
 
     def _attach(self, plc: Plc, row: PlcRow, number: int) -> bool:
+        number += row.first - 1
         for place, unit in enumerate(row.units):
             try:
                 address = str(IPv4Address(unit.address) + number)

@@ -20,9 +20,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,7 @@ NETS = ("loop", "tcp")
 MOST = 100_000
 """PLCs of one kind."""
 
+LAST_PORT = 65_535
 MOST_NAMED = 5
 """Files that a hint names."""
 MOST_NUMBER = 1 << 62
@@ -83,6 +85,8 @@ SERVER: Keys = {
 DOOR: Keys = {
     "address": Key(endpoint, "The address of a unit, and a port at which its program waits."),
     "bind": Key(host, "Address and port of this computer where others reach it; port 0: one that the system chooses.", None),
+    "count": Key(whole(1, MOST), "So many doors: further ones lead to the addresses that follow.", 1),
+    "counts": Key(one_of(("address", "port")), "What counts up with `count` in `bind`: the address, or the port.", "address"),
     "backlog": Key(flag, "Whether callers wait until a socket of the unit is free, where the unit refuses them.", False),
     "host": Key(host, "The former name of `bind`.", None),
 }
@@ -187,6 +191,8 @@ class PlcRow:
     watch: tuple[str, ...]
     units: tuple[UnitRow, ...]
     sets: tuple[SetRow, ...]
+    first: int = 1
+    """With `count`: the number of the first one; others of the project may run elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -261,8 +267,8 @@ def read_project(path: Path, *, allow_outside: bool = False, text: str | None = 
     made = Project(
         found, run["net"], run["seed"], run["for"], run["scans"],
         tuple((row["address"], row["host"]) for row in table["server"]),
-        tuple((row["address"], row["bind"] or row["host"]) for row in table["door"]),
-        frozenset(row["address"] for row in table["door"] if row["backlog"]),
+        tuple(door for row in table["door"] for door in doors_of(row)),
+        frozenset(unit for row in table["door"] if row["backlog"] for unit, _ in doors_of(row)),
         tuple(fault_of(row) for row in table["fault"]),
         tuple(_plc(name, row, path.parent) for name, row in table["plc"].items()),
         pictures_of(table["picture"], path.parent, table["plc"]),
@@ -277,12 +283,39 @@ def _check_endpoints(reading: Reading, table: Mapping[str, Any]) -> None:
             reading.report("P0104", ("door", number), f"door {number + 1}.bind is missing", DOOR["bind"].meaning)
         if row["bind"] is not None and row["host"] is not None:
             reading.report("P0103", ("door", number, "host"), f"door {number + 1} has bind and host, which are the same")
+        try:
+            list(doors_of(row))
+        except ValueError as error:
+            reading.report("P0103", ("door", number, "count"), f"door {number + 1}: {error}")
+            return
     for name in ("server", "door"):
         known: dict[Peer, int] = {}
         for number, row in enumerate(table[name]):
-            first = known.setdefault(row["address"], number)
+            addresses = [unit for unit, _ in doors_of(row)] if name == "door" else [row["address"]]
+            first = min((known.setdefault(address, number) for address in addresses), default=number)
             if first != number:
                 reading.report("P0103", (name, number), f"{name} {number + 1} has the address of {name} {first + 1}")
+
+
+def doors_of(row: Mapping[str, Any]) -> Iterator[tuple[Peer, tuple[str, int]]]:
+    """The units' endpoints of a row of doors, and where each is on the host.  Raises ValueError where these do not count up."""
+    if (real := row["bind"] or row["host"]) is None:
+        return
+    for number in range(row["count"]):
+        unit = replace(row["address"], host=str(IPv4Address(row["address"].host) + number))
+        if row["counts"] == "address":
+            yield unit, (real[0] if not number else str(_address_of(real[0]) + number), real[1])
+        elif not real[1] or real[1] + number <= LAST_PORT:
+            yield unit, (real[0], real[1] + number if real[1] else 0)
+        else:
+            raise ValueError(f"there are no {row['count']:,} ports from {real[1]} on")
+
+
+def _address_of(name: str) -> IPv4Address:
+    try:
+        return IPv4Address(name)
+    except ValueError:
+        raise ValueError(f'{name} is no address that counts up; write counts = "port"') from None
 
 
 def _check_inside(reading: Reading, plcs: Mapping[str, Any], folder: Path) -> None:

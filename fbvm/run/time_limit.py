@@ -16,3 +16,8 @@ def stopwatch() -> Callable[[], int]:
     """A function that answers how many nanoseconds have passed from now on."""
     began_ns = time.monotonic_ns()
     return lambda: time.monotonic_ns() - began_ns
+
+
+def pause(time_ns: int) -> None:
+    """Waits for so many nanoseconds, which Ctrl-C ends."""
+    time.sleep(time_ns / 1e9)

@@ -70,6 +70,7 @@ VERBS: dict[str, list[list[str]]] = {
     "peer": [["--port", "0"]], "demo": [[]], "new": [["project", ]], "test": [["tests"]], "learn": [["1"]],
     "mutate": [["--tests", "tests"]],
     "campaign": [[DEMO, *PEER, "--faults", "1", "--runs", "1000000", "--for", "100s", "--jobs", "2"]],
+    "fleet": [["fleet", *FOREVER, "--jobs", "2"]],
     "sweep": [[DEMO, *PEER, "--vary", "Main.Quantity=1..120", "--for", "10000s", "--jobs", "2"]],
     "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["long.fbtrace", "Main.Step"]],
     "lsp": [[]],
@@ -77,7 +78,7 @@ VERBS: dict[str, list[list[str]]] = {
     "convert": [["long.fbtrace", "out.html"], ["long.fbtrace", "out.csv"]],
 }  # fmt: skip
 """Arguments with which each verb has something to do for a while."""
-GOOD_AT_THE_END = {"serve", "peer", "dap", "live"}
+GOOD_AT_THE_END = {"serve", "peer", "dap", "live", "fleet"}
 """Verbs that are ended by a signal always, which is no failure."""
 MOMENTS_S = (0.0, 0.08, 0.25, 0.7)
 """How long after the process listens to signals one comes."""
@@ -91,6 +92,9 @@ def prepare(folder: Path) -> None:
     instances = " ".join(f"b{number} : B{number};" for number in range(40))
     calls = " ".join(f"b{number}();" for number in range(40))
     (folder / "big.st").write_text(f"{blocks}PROGRAM Main\nVAR {instances} END_VAR\n{calls}\nEND_PROGRAM\n")
+    (folder / "fleet").mkdir()
+    (folder / "fleet" / "fbvm.toml").write_text('[plc.a]\nsources = ["a.st"]\ncount = 2\n')
+    (folder / "fleet" / "a.st").write_text("PROGRAM Main\nEND_PROGRAM\n")
     (folder / "tests").mkdir()
     (folder / "tests" / "test_long.py").write_text("import time\n\ndef test_long():\n    time.sleep(60)\n")
     long = ["--journal", str(folder / "long.journal"), "--trace", str(folder / "long.fbtrace"), "--depth", "statements"]

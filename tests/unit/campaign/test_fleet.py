@@ -1,0 +1,129 @@
+"""Fleets: a project in parts that run apart, with the names, addresses and doors of the whole."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.base.diagnostics import Diagnostic
+from fbvm.base.version import VERSION
+from fbvm.campaign.fleet.shard import GO_ON, OVER, STOP, Figures, Shard, run_shard
+from fbvm.campaign.planning import images_of
+from fbvm.campaign.work import packed
+from fbvm.cli.main import main
+from fbvm.cli.shared import status
+from fbvm.run.plant import Plant
+from fbvm.run.project import Project, read_project
+from fbvm.run.shards import shards_of
+from fbvm.wire.link import Peer
+
+PROJECT = """[plc.one]
+sources = ["count.st"]
+[[plc.one.unit]]
+address = "10.0.0.1"
+[plc.many]
+sources = ["count.st"]
+count = 5
+[[plc.many.unit]]
+address = "10.0.1.254"
+[[door]]
+address = "10.0.1.254:502"
+bind = "127.0.1.1:5020"
+count = 5
+[[door]]
+address = "10.0.0.1:502"
+bind = "127.0.0.1:6020"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "count.st").write_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM")
+    (tmp_path / "fbvm.toml").write_text(PROJECT)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def project_of(text: str = PROJECT) -> Project:
+    found = read_project(Path("fbvm.toml"), text=text)
+    assert isinstance(found, Project)
+    return found
+
+
+def test_parts_have_the_names_addresses_and_doors_of_the_whole(folder: Path) -> None:
+    parts = shards_of(project_of(), 2)
+    names, addresses = [], []
+    for part in parts:
+        plant = Plant(part, for_ns=1)
+        plant.close()
+        names.append(list(plant.named_runs))
+        addresses.append([unit.unit.address for run in plant.runs for unit in run.plc.units])
+    assert names == [["one", "many[1]", "many[2]"], ["many[3]", "many[4]", "many[5]"]]
+    assert addresses == [["10.0.0.1", "10.0.1.254", "10.0.1.255"], ["10.0.2.0", "10.0.2.1", "10.0.2.2"]]
+    assert [[f"{unit}={host}:{port}" for unit, (host, port) in part.doors] for part in parts] == [
+        ["10.0.1.254:502=127.0.1.1:5020", "10.0.1.255:502=127.0.1.2:5020", "10.0.0.1:502=127.0.0.1:6020"],
+        ["10.0.2.0:502=127.0.1.3:5020", "10.0.2.1:502=127.0.1.4:5020", "10.0.2.2:502=127.0.1.5:5020"]]
+    assert [len(shards_of(project_of(), count)) for count in (1, 5, 9)] == [1, 5, 6]
+
+
+def test_parts_on_real_connections_reach_the_doors_of_the_others() -> None:
+    _, second = shards_of(project_of('[run]\nnet = "tcp"\n' + PROJECT), 2)
+    assert (Peer("10.0.0.1", 502), ("127.0.0.1", 6020)) in second.servers
+    assert len(second.servers) == 3
+
+
+@pytest.mark.parametrize(("more", "said"), [
+    ('counts = "port"', [("127.0.1.1", 5020), ("127.0.1.1", 5021)]), ("", [("127.0.1.1", 5020), ("127.0.1.2", 5020)])])
+def test_doors_count_up_by_address_or_by_port(more: str, said: object) -> None:
+    text = PROJECT.replace('"127.0.1.1:5020"\ncount = 5', f'"127.0.1.1:5020"\ncount = 2\n{more}')
+    assert [real for _, real in project_of(text).doors[:2]] == said
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (("127.0.1.1:5020", "here:5020"), "door 1: here is no address that counts up; write counts = \"port\""),
+    (('"127.0.1.1:5020"', '"127.0.1.1:65533"\ncounts = "port"'), "door 1: there are no 5 ports from 65533 on"),
+    (("10.0.0.1:502", "10.0.2.1:502"), "door 2 has the address of door 1")])
+def test_doors_that_cannot_count_up_are_refused(change: tuple[str, str], said: str) -> None:
+    head, mark, doors = PROJECT.partition("[[door]]")
+    found = read_project(Path("fbvm.toml"), text=head + mark + doors.replace(*change))
+    assert isinstance(found, list) and all(isinstance(each, Diagnostic) for each in found)
+    assert [each.message for each in found] == [said]
+
+
+class Line:
+    """The line of a part: what it is told, and what it tells."""
+
+    def __init__(self, *told: object) -> None:
+        self.told, self.said = list(told), list[Figures]()
+
+    def poll(self, wait_s: float = 0.0) -> bool:
+        return bool(self.told)
+
+    def recv(self) -> object:
+        return self.told.pop(0)
+
+    def send(self, figures: Figures) -> None:
+        self.said.append(figures)
+
+
+def test_a_part_tells_its_figures_and_waits_for_the_stop(folder: Path) -> None:
+    [part] = shards_of(project_of(), 1)
+    images, _ = images_of(part)
+    line = Line(GO_ON, STOP)
+    run_shard(Shard(0, part, packed(images), VERSION, 1_000_000_000), line)
+    last = line.said[-1]
+    assert (last.state, last.plcs, last.scans, dict(last.ended)) == (OVER, 6, 600, {"time": 6})
+    run_shard(Shard(1, part, packed(images), "0.0.1", 1), line)
+    assert line.said[-1].state == "failed" and "not 0.0.1" in line.said[-1].message
+
+
+@pytest.mark.slow
+def test_a_fleet_in_two_processes_does_all_scans_of_the_project(folder: Path) -> None:
+    result = CliRunner().invoke(main, ["fleet", "--for", "2s", "--jobs", "2", "--json-lines"])
+    last = json.loads(result.stdout.splitlines()[-1])
+    assert (result.exit_code, last["plcs"], last["scans"], [each["plcs"] for each in last["shards"]]) == (0, 6, 1200, [3, 3])
+    refused = CliRunner().invoke(main, ["fleet"])
+    assert refused.exit_code == status.USAGE and "say when to end" in refused.stderr
