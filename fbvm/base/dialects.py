@@ -77,6 +77,7 @@ class Dialect:
     generic_functions: bool = False
     own_in_outs: bool = False
     wrong_bcd_is_zero: bool = False
+    negative_is_zero: bool = False
     steps_apart: bool = False
     times_are_numbers: bool = False
     short_names: bool = False
@@ -185,6 +186,8 @@ QUESTIONS = {
     "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another "
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
+    "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
+                         "0"),
     "wrong_bcd_is_zero": ("BCD_TO_UINT(16#9A): a digit above 9", "stops the program (R0105)", "0"),
     "steps_apart": ("a step and a variable of one name: Init", "an error",
                     "Init is the variable, Init.X and Init.T are the flags of the step, with a warning (S0193)"),
@@ -217,7 +220,7 @@ _ROWS = (
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
-            wrong_bcd_is_zero=True),
+            wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,

@@ -171,6 +171,9 @@ def _real_to_integer(emitter: Emitter, rounding: str, node: Node, form: str, sit
     saturates or wraps."""
     if emitter.dialect.reals_saturate:
         return saturated(emitter, rounding, node, form)
+    if emitter.dialect.negative_is_zero and form[0] == "u":
+        real, nought = emitter.to_temporary(node), ("const", node[1], 0.0)
+        node = ("select", node[1], ("lt", "b", node[1], real, nought), real, nought)
     return _wrapped(emitter, rounding, node, form) if emitter.dialect.reals_wrap else (rounding, form, node[1], node, site)
 
 
