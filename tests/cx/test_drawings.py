@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -62,3 +63,15 @@ def test_executed_rungs_are_drawn_with_their_sections_and_right_rails_in_one_col
     assert shown.startswith("SECTION Pumping\nRUNG 0 self hold\n")
     rungs = [line for line in shown.partition("scan 1, Dbl1")[0].splitlines() if line[:1] in "┃┣┠"]
     assert {len(line) for line in rungs if line} == {len(rungs[0])}
+
+
+@pytest.mark.slow
+def test_a_picture_has_its_right_rails_in_one_column(tmp_path: Path) -> None:
+    file, picture = tmp_path / "line.cxt", tmp_path / "line.svg"
+    file.write_bytes(SAMPLE.bytes())
+    done = CliRunner().invoke(main, ["ladder", str(file), "--svg", str(picture)])
+    assert done.exit_code == 0, done.output
+    wires = re.findall(r'<path d="([^"]+)"', picture.read_text(encoding="utf-8"))
+    rails = [max(float(x) for x in re.findall(r"[ML]([\d.]+) ", wire)) for wire in wires]
+    assert len(rails) >= 3
+    assert len(set(rails)) == 1

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.files import write_file
-from fbvm.cli.shared.drawings import SVG_WIDTH, comment_lines, print_lines, rung_lines, say_section, symbol_addresses
+from fbvm.cli.shared.drawings import SVG_WIDTH, comment_lines, print_lines, rail_column, rung_lines, say_section, symbol_addresses
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.given_sources import sources_of
 from fbvm.cli.shared.run_result import chart_width
@@ -32,8 +32,10 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if not image.rungs:
         raise click.UsageError("there is nothing to draw in these files")
     if svg:
-        drawn = [ladder_surface(rung, width or SVG_WIDTH, Annotations(None, known, others=known))
-                 for rung in image.rungs for known in (symbol_addresses(image, rung.body),)]
+        names = {body: symbol_addresses(image, body) for body in {rung.body for rung in image.rungs}}
+        rungs = [(rung, Annotations(None, names[rung.body], others=names[rung.body])) for rung in image.rungs]
+        widest = rail_column(rungs, width or SVG_WIDTH)
+        drawn = [ladder_surface(rung, width or SVG_WIDTH, annotations, widest) for rung, annotations in rungs]
         with writing(svg):
             write_file(svg, ladder_svg(drawn))
         return

@@ -84,9 +84,14 @@ def rung_lines(image: Image, rungs: Sequence[RungPicture], width: int) -> list[l
 
 def _aligned(rungs: Sequence[tuple[RungPicture, Annotations]], width: int) -> list[list[str]]:
     """The lines of rungs, all right rails in one column."""
-    drawn = [ladder_text(rung, width, annotations) for rung, annotations in rungs]
-    widest = max(columns(row) for lines in drawn for row in ("", *lines[1:]) if row[:1] != " ")
+    widest = rail_column(rungs, width)
     return [ladder_text(rung, width, annotations, widest) for rung, annotations in rungs]
+
+
+def rail_column(rungs: Sequence[tuple[RungPicture, Annotations]], width: int) -> int:
+    """The column in which the right rails of all these rungs can stand: that of the widest."""
+    drawn = [ladder_text(rung, width, annotations) for rung, annotations in rungs]
+    return max(columns(row) for lines in drawn for row in ("", *lines[1:]) if row[:1] != " ")
 
 
 def comment_lines(rung: RungPicture, pou: str, address: Callable[[str], str], known: Contents) -> list[str]:
