@@ -52,6 +52,18 @@ def test_a_changed_rung_is_drawn_beside_the_one_before() -> None:
     ]
 
 
+BRANCHES = "LD a\nOUT TR0\nAND b\nOUT 1.00\nLD TR0\nANDNOT b\nOUT 1.01\n"
+
+
+@pytest.mark.parametrize(("old", "new", "same"), [
+    (BRANCHES, BRANCHES.replace("TR0", "TR3"), True), (BRANCHES, BRANCHES.replace("LD TR0\nANDNOT", "LD TR0\nAND"), False),
+    ("LD a\nLD b\nORLD\nOUT 1.00\n", "LD a\nOR b\nOUT 1.00\n", True),
+    ("LD a\nOR b\nOUT 1.00\n", "LD b\nOR a\nOUT 1.00\n", False),
+])  # fmt: skip
+def test_rungs_that_are_drawn_alike_do_not_differ(old: str, new: str, same: bool) -> None:
+    assert (shown(OLD.replace("LD b\nOUT 1.00\n", old), OLD.replace("LD b\nOUT 1.00\n", new)) == []) is same
+
+
 @pytest.mark.slow
 def test_added_and_removed_rungs_stand_on_their_side() -> None:
     more = OLD.replace("END_LADDER", "RUNG 2\nLD P_On\nOUT 1.01\nEND_LADDER")

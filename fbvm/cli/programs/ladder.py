@@ -33,9 +33,9 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         raise click.UsageError("there is nothing to draw in these files")
     if svg:
         names = {body: symbol_addresses(image, body) for body in {rung.body for rung in image.rungs}}
-        rungs = [(rung, Annotations(None, names[rung.body], others=names[rung.body])) for rung in image.rungs]
-        widest = rail_column(rungs, width or SVG_WIDTH)
-        drawn = [ladder_surface(rung, width or SVG_WIDTH, annotations, widest) for rung, annotations in rungs]
+        annotated = [(rung, Annotations(None, names[rung.body], others=names[rung.body])) for rung in image.rungs]
+        widest = rail_column(annotated, width or SVG_WIDTH)
+        drawn = [ladder_surface(rung, width or SVG_WIDTH, annotations, widest) for rung, annotations in annotated]
         with writing(svg):
             write_file(svg, ladder_svg(drawn))
         return

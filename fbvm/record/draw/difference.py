@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import SequenceMatcher, unified_diff
 
 from fbvm.interchange.contents import Contents, Declared, Program, WrittenRung
 from fbvm.syntax.ladder.drawing.cells import cells, columns, padded, text_of
+from fbvm.syntax.ladder.drawing.diagram import StepText, Undrawable, diagram
 from fbvm.syntax.ladder.drawing.drawing import rung_text
+from fbvm.syntax.ladder.drawing.steps import steps
 
 GAP = "   "
 LEAST = 40
@@ -70,7 +73,8 @@ def _program(name: str, old: Program | None, new: Program | None, width: int) ->
         left, right = before.get(section, []), after.get(section, [])
         lines: list[str] = []
         counts = [0, 0, 0]
-        for how, i, j, k, m in SequenceMatcher(None, left, right, autojunk=False).get_opcodes():
+        said = [_said(rung) for rung in left], [_said(rung) for rung in right]
+        for how, i, j, k, m in SequenceMatcher(None, *said, autojunk=False).get_opcodes():
             if how == "equal":
                 continue
             both = min(j - i, m - k)
@@ -83,6 +87,16 @@ def _program(name: str, old: Program | None, new: Program | None, width: int) ->
         if lines:
             where = f"{name}, section {section}" if section else name
             yield Difference(where, _counted("rung", *counts), tuple(lines[:-1]))
+
+
+def _said(rung: WrittenRung) -> object:
+    """What a rung says: its comments, and the instructions that its drawing has.  How blocks were joined, and the numbers of
+    temporary relays, which CX-Programmer gives by itself and does not show, are no difference."""
+    written: list[StepText] = [(step.prefix, step.mnemonic, step.operands) for step in rung.steps]
+    remarks = tuple((step.text, step.operands, step.remark) for step in rung.steps if step.remark)
+    with suppress(Undrawable):
+        written = [(step.prefix, step.mnemonic, step.operands) for step in steps(diagram(written))]
+    return rung.comment, tuple(written), remarks
 
 
 def _pair(old: tuple[int, WrittenRung] | None, new: tuple[int, WrittenRung] | None, width: int) -> list[str]:
