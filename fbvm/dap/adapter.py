@@ -15,6 +15,7 @@ from fbvm.dap.framing import Message
 from fbvm.dap.memory import read_memory, write_memory
 from fbvm.dap.moves import Moves
 from fbvm.dap.session import Arguments, Body, Container, DebugSession, Refusal, StackFrame
+from fbvm.dap.shapes import check_shapes
 from fbvm.dap.sources import Sources
 from fbvm.dap.stack import scan_text, stack_trace, threads
 from fbvm.dap.target import LaunchError, Opener
@@ -102,8 +103,9 @@ class Adapter:
                 raise Refusal(f"there is no request {command!r}")
             if command in ("launch", "attach"):
                 self._waiting = message
+            check_shapes(given)
             body = self._done(command, request, given)
-        except (Refusal, LaunchError, ReadOnlyPast, ValueError, TypeError, LookupError) as error:
+        except (Refusal, LaunchError, ReadOnlyPast, ValueError, TypeError, LookupError, OverflowError) as error:
             if command in ("launch", "attach"):
                 self._waiting = None
             said = f"the argument {error} is missing" if isinstance(error, KeyError) else str(error)

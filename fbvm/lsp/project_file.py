@@ -17,7 +17,7 @@ _KEY = re.compile(r"[ \t]*([\w-]+)")
 
 def is_dialect(name: object) -> bool:
     """True for the name of a dialect."""
-    return name in DIALECTS
+    return isinstance(name, str) and name in DIALECTS
 
 
 def diagnostics(path: Path, text: str | None) -> list[Diagnostic]:

@@ -6,10 +6,13 @@ requests are answered.  A change of what others see begins with everything."""
 from __future__ import annotations
 
 import asyncio
+import logging
 from pathlib import Path
 
 from lsprotocol import types
+from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
+from pygls.protocol import JsonRPCProtocol
 
 from fbvm.analysis.garbage import Garbage
 from fbvm.analysis.parts import File
@@ -34,6 +37,11 @@ UNUSED = ("S0290", "S0291", "S0293")
 _SEVERITY = {"error": types.DiagnosticSeverity.Error, "warning": types.DiagnosticSeverity.Warning}
 
 
+def _is_fault(record: logging.LogRecord) -> bool:
+    """False for a refusal, which the editor gets as an answer: nobody has to look for its place in this program."""
+    return not (record.exc_info and isinstance(record.exc_info[1], JsonRpcException))
+
+
 class Server(LanguageServer):
     """One client's server.  The features are in `navigation`, `editing` and `appearance`."""
 
@@ -45,6 +53,7 @@ class Server(LanguageServer):
         self.told: dict[str, list[types.Diagnostic]] = {}
         """The diagnostics that the editor has of each URI, where there are any."""
         self._garbage = Garbage()
+        logging.getLogger(JsonRPCProtocol.__module__).addFilter(_is_fault)
         self._collection: asyncio.TimerHandle | None = None
 
     # --- texts ------------------------------------------------------------------------------------------------------

@@ -31,5 +31,8 @@ def command(stdio: bool) -> None:
         raise click.UsageError("pygls is missing: pip install 'fbvm[editor]'") from None
     gc.set_threshold(*COLLECTED)
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as output:  # the server closes it at its end
-        server(fbvm.__version__).start_io(stdout=output)
+        try:
+            server(fbvm.__version__).start_io(stdout=output)
+        except (OverflowError, MemoryError):
+            raise click.ClickException("the editor has begun a message that is longer than any memory") from None
     sys.exit(status.GOOD)

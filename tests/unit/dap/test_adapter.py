@@ -128,6 +128,19 @@ def test_two_launches_and_unknown_requests_are_refused(file: Path) -> None:
         client.ask("next", threadId=9)
 
 
+@pytest.mark.slow
+def test_arguments_of_any_type_are_answered(file: Path) -> None:
+    client = Client()
+    client.begin(program=str(file), stopOnEntry=True)
+    ends = {"initialize", "launch", "attach", "restart", "continue", "reverseContinue", "disconnect", "terminate"}
+    for command in sorted(set(client.adapter._requests) - ends):
+        for name in ("source", "format", "breakpoints", "filters", "filterOptions", "expression", "count", "frameId"):
+            for wrong in (5, "x", [1], ["x"], {"a": 1}, [{"line": "x", "name": 5, "dataId": 5}], float("inf"), {"path": 5}):
+                client.send(command, {"threadId": 1, name: wrong})
+    with pytest.raises(RefusedError, match="the argument breakpoints has to be a list of objects"):
+        client.ask("setBreakpoints", source={"path": str(file)}, breakpoints=[3])
+
+
 def test_requests_before_launch_are_refused_in_words() -> None:
     client = Client()
     client.ask("initialize", adapterID="fbvm")

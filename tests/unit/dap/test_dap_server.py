@@ -149,7 +149,7 @@ def test_a_client_that_goes_in_the_middle_of_a_message_is_told_of() -> None:
 
 
 @pytest.mark.parametrize("data", [b"x" * 5000, b"Content-Length: 99999999999\r\n\r\n", b"A: b\r\n\r\n", b"\r\n\r\n",
-                                  b"Content-Length: 2\r\n\r\n[]"])  # fmt: skip
+                                  b"Content-Length: 2\r\n\r\n[]", b"Content-Length: 5000\r\n\r\n" + b"9" * 5000])  # fmt: skip
 def test_bytes_that_are_no_messages_are_refused(data: bytes) -> None:
     with pytest.raises(FramingError):
         list(Framer().feed(data))

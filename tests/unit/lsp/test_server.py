@@ -78,6 +78,18 @@ class Editor(LanguageClient):
         return {"text_document": types.TextDocumentIdentifier(self.uri(name)), "position": types.Position(line, character)}
 
 
+BEGIN: dict[str, Any] = {"id": 1, "method": "initialize", "params": {"capabilities": {}, "processId": None, "rootUri": None}}
+
+
+def told(*messages: dict[str, Any], after: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+    """What a server does that is told all this at once."""
+    said = b""
+    for message in messages:
+        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
+        said += b"Content-Length: %d\r\n\r\n" % len(body) + body
+    return subprocess.run([sys.executable, "-m", "fbvm", "lsp"], input=said + after, capture_output=True, check=False, timeout=60)
+
+
 def conversation(folder: Path, talk: Callable[[Editor], Awaitable[None]], *names: str) -> None:
     """Start a server, open files, talk, and end it as an editor does."""
     async def all_of_it() -> None:
@@ -268,10 +280,23 @@ def test_keys_that_come_faster_than_checks_end_in_the_right_diagnostics(folder: 
 
 
 def test_the_end_of_a_conversation_is_the_end_of_the_process_without_a_word() -> None:
-    said = b""
-    for message in ({"id": 1, "method": "initialize", "params": {"capabilities": {}, "processId": None, "rootUri": None}},
-                    {"method": "initialized", "params": {}}, {"id": 2, "method": "shutdown"}, {"method": "exit"}):  # fmt: skip
-        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
-        said += b"Content-Length: %d\r\n\r\n" % len(body) + body
-    done = subprocess.run([sys.executable, "-m", "fbvm", "lsp"], input=said, capture_output=True, check=False, timeout=60)
+    done = told(BEGIN, {"method": "initialized", "params": {}}, {"id": 2, "method": "shutdown"}, {"method": "exit"})
     assert (done.returncode, done.stderr) == (0, b"") and b'"id": 2' in done.stdout
+
+
+def test_what_is_refused_is_an_answer_and_no_fault_of_the_server() -> None:
+    settings: dict[str, Any] = {"dialect": {"a": 1}, "libraries": 5}
+    document = {"uri": "file:///nowhere/a.st"}
+    done = told(BEGIN | {"params": {**BEGIN["params"], "initializationOptions": settings}},
+                {"method": "textDocument/didOpen", "params": {"textDocument": document | {
+                    "languageId": "iecst", "version": 1, "text": "PROGRAM M VAR n : INT; END_VAR n := 1; END_PROGRAM"}}},
+                {"id": 3, "method": "textDocument/rename", "params": {
+                    "textDocument": document, "position": {"line": 0, "character": 14}, "newName": ""}},
+                {"id": 2, "method": "shutdown"}, {"method": "exit"})  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"is no name" in done.stdout
+
+
+def test_a_message_longer_than_any_memory_ends_the_server_with_a_sentence() -> None:
+    done = told(BEGIN, after=b"Content-Length: 99999999999999999999\r\n\r\n{}")
+    assert done.returncode == 1 and done.stderr == b"Error: the editor has begun a message that is longer than any memory\n"
