@@ -61,7 +61,8 @@ class Goal(Generic[P]):
         self._plc = plc
         self._last_scan = NEVER if scans is None else plc.scans + scans
         self._for_ns = NEVER if for_ns is None else plc.elapsed_ns + for_ns
-        self._end_ns = self._for_ns if max_ns is None else min(self._for_ns, plc.elapsed_ns + max_ns)
+        self.end_ns = self._for_ns if max_ns is None else min(self._for_ns, plc.elapsed_ns + max_ns)
+        """The time of the PLC at which the run ends at the latest: no scan begins then."""
         self._until = self._condition(until)
         self.calls_out = callable(until)
         """True if a function is called after each scan, which may do anything."""
@@ -86,7 +87,7 @@ class Goal(Generic[P]):
     def cycles_left(self) -> int:
         """How many scans, each `cycle_ns` long, may follow before `reached` has to be asked; 1 with `until`."""
         plc = self._plc
-        return min(self.scans_left, -((plc.elapsed_ns - self._end_ns) // plc.cycle_ns))
+        return min(self.scans_left, -((plc.elapsed_ns - self.end_ns) // plc.cycle_ns))
 
     def reached(self) -> str:
         """What ended the run: "break" (a breakpoint), "trap", "until", "scans", "time" (`for_ns`) or "max" (`max_ns`);
@@ -101,6 +102,6 @@ class Goal(Generic[P]):
         if plc.scans >= self._last_scan:
             return "scans"
         elapsed_ns = plc.elapsed_ns
-        if elapsed_ns < self._end_ns:
+        if elapsed_ns < self.end_ns:
             return ""
         return "time" if elapsed_ns >= self._for_ns else "max"

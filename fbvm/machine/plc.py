@@ -93,8 +93,7 @@ class Plc(NamedValues):
         self.lateness = Lateness()
         """How late they began, where time is real."""
         self.trap: Trap | None = None
-        self._mode = RUN
-        self._first = True
+        self._mode, self._first = RUN, True
         self._due: deque[int] = deque()
         self.breakpoints = Breakpoints(self)
         self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
@@ -122,13 +121,8 @@ class Plc(NamedValues):
             now_ns = self._time(now_ns)
             if self._recorder:
                 self._recorder.before(now_ns)
-            if path := self._fast_path():
-                self.now_ns = now_ns
-                self.trap = self.watch_cycle.judged(path.once(now_ns, self.budget))
-                self._serve_peripherals()
-                self.scans += 1
-                self._tell()
-                return self.trap
+            if path := self.fast_path():
+                return self.end_fast_scan(now_ns, path.once(now_ns, self.budget))
             self._begin(now_ns)
         elif self._recorder:
             self._recorder.changed()
@@ -143,6 +137,14 @@ class Plc(NamedValues):
         self._end()
         return self.trap
 
+    def end_fast_scan(self, now_ns: int, trap: Trap | None) -> Trap | None:
+        """The part of a scan behind its fast path; `trap` is what has ended it, if anything."""
+        self.now_ns, self.trap = now_ns, self.watch_cycle.judged(trap)
+        self._serve_peripherals()
+        self.scans += 1
+        self._tell()
+        return self.trap
+
     @property
     def input_recorder(self) -> InputRecorder | None:
         """Who is told the inputs, if anybody."""
@@ -152,7 +154,7 @@ class Plc(NamedValues):
         """Tells `recorder` every input from now on, None ends that.  Fast paths stay possible but for bursts."""
         self._recorder = self._io.recorder = recorder
 
-    def _fast_path(self) -> FastPath | None:
+    def fast_path(self) -> FastPath | None:
         """The fast path of the next scan; None if the scan has to be a plain one because somebody has a part in it."""
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
@@ -296,7 +298,7 @@ class Plc(NamedValues):
             return False
         if self.breakpoints.armed:
             done, self.trap = self._many_stoppable(most)
-        elif all(attached.network.virtual_time for attached in self.units) and (path := self._fast_path()):
+        elif all(attached.network.virtual_time for attached in self.units) and (path := self.fast_path()):
             done, self.trap = path.many(most, self.now_ns, self.cycle_ns, self.budget, STEP_BUDGET)
         else:
             return False
@@ -313,7 +315,7 @@ class Plc(NamedValues):
         `clock` is read before each scan; `now_ns` is what it told last.  Returns the times of the scans.  Returns [] without a
         scan if somebody has a part in them or has to be told between them: use `scan`."""
         times: list[int] = []
-        if self.watchers or self._recorder or self.trap or self.servicing.is_needed or not (path := self._fast_path()):
+        if self.watchers or self._recorder or self.trap or self.servicing.is_needed or not (path := self.fast_path()):
             return times
         try:
             self.trap = self.watch_cycle.judged(path.burst(times, most, now_ns, clock, self.budget))
@@ -332,8 +334,7 @@ class Plc(NamedValues):
         self._system[BUDGET // 8] = self.budget
         if self._recorder:
             self._recorder.before(self.now_ns + self.cycle_ns)
-        stoppable = self.breakpoints.stoppable(self.engine)
-        return stoppable.run_many(tasks, most, self.cycle_ns, CLOCK_WORDS, spend=STEP_BUDGET)
+        return self.breakpoints.stoppable(self.engine).run_many(tasks, most, self.cycle_ns, CLOCK_WORDS, spend=STEP_BUDGET)
 
     # --- units --------------------------------------------------------------------------------------------------------
 

@@ -123,10 +123,10 @@ class Times:
                 return min(SIZES_NS[size] - 1, self._longest_ns)
         return self._longest_ns
 
-    def add(self, other: Times) -> None:
-        """Adds all of another PLC's times; the number of the longest scan may then be one of that PLC."""
+    def add(self, other: Times, first_scan: int = 0) -> None:
+        """Adds all of others; the number of the longest scan may then be one of theirs, which count from `first_scan`."""
         if other.longest_ns > self.longest_ns:
-            self._longest_ns, self._longest_scan = other._longest_ns, other._longest_scan
+            self._longest_ns, self._longest_scan = other._longest_ns, other._longest_scan + first_scan
         self._count += other._count
         self._beyond += other._beyond
         self._total_ns += other._total_ns
@@ -169,8 +169,8 @@ class Lateness(Times):
         self.missed = 0
         """Periods in which no scan began, because the one before took too long or the host was busy."""
 
-    def add(self, other: Times) -> None:
-        super().add(other)
+    def add(self, other: Times, first_scan: int = 0) -> None:
+        super().add(other, first_scan)
         if isinstance(other, Lateness):
             self.missed += other.missed
 

@@ -15,6 +15,7 @@ from fbvm.base.host import monotonic_clock
 from fbvm.engine.clock import Clock
 from fbvm.machine.plc import Plc
 from fbvm.machine.scan.inputs import InputRecorder
+from fbvm.run.batches import Batch, Batches
 from fbvm.run.host_clock import function_at
 from fbvm.run.host_date import local_date_ns
 from fbvm.run.interrupts import Interrupts
@@ -26,6 +27,8 @@ RunNumbers = dict[int, None]
 """An ordered set of run numbers."""
 PROGRESS_NS = 100_000_000
 """The shortest time between two calls of `progress`."""
+PLC_PROGRESS_NS = 100_000
+"""As much for each PLC, if that is more: all are brought up to date before it is called."""
 PAUSE_NS = 1_000_000
 """How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
@@ -73,6 +76,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
     else:
         _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
+    batches = Batches() if len(watchdogs) > 1 and until is None and not any(run.calls_out for run in runs) else None
     told_ns = time.monotonic_ns()
     recorders = _recorders(runs)
     try:
@@ -80,20 +84,22 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
         with interrupts:
             while (due_ns := queue.next_ns()) is not None:
                 now_ns, woken = clock.reach(due_ns)
-                _scan_all(queue, now_ns, woken, watchdogs)
+                _scan_all(queue, now_ns, woken, watchdogs, batches)
                 interrupts.check()
                 if until and until():
                     break
-                if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
+                if progress and time.monotonic_ns() - told_ns >= max(PROGRESS_NS, PLC_PROGRESS_NS * len(runs)):
                     told_ns = time.monotonic_ns()
-                    _end(recorders)
+                    _end(recorders, batches)
                     progress()
                     _begin(recorders)
+                    for number in batches.check() if batches else ():
+                        queue.put(number, runs[number])
     except KeyboardInterrupt:
         for run in runs:
             run.reason = run.reason or "interrupted"
     finally:
-        _end(recorders)
+        _end(recorders, batches)
         clock.stop()
         for watchdog in watchdogs:
             watchdog.stop()
@@ -111,8 +117,10 @@ def _begin(recorders: Sequence[InputRecorder]) -> None:
         recorder.run_begins()
 
 
-def _end(recorders: Sequence[InputRecorder]) -> None:
+def _end(recorders: Sequence[InputRecorder], batches: Batches | None) -> None:
     """Up to here nobody outside had a turn."""
+    if batches:
+        batches.settle()
     for recorder in recorders:
         recorder.run_ends()
 
@@ -148,12 +156,22 @@ def _latest_ns(runs: Sequence[Running]) -> int:
     return max((run.plc.elapsed_ns for run in runs), default=0)
 
 
-def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog]) -> None:
+def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog],
+              batches: Batches | None) -> None:  # fmt: skip
     """Scans all runs that are woken or due, with the same time for all.  In real time each run has a watchdog."""
     first_ns = began_ns = time.monotonic_ns()
     for number in queue.take(now_ns, woken):
         run = queue.runs[number]
         if run.reason:  # it has ended, and is woken nevertheless
+            continue
+        if isinstance(run, Batch):
+            assert batches
+            left = batches.scan(run, now_ns)
+            queue.put(number, run)  # in front of those that have left, so that they find it at its next time
+            for one in left:
+                watchdogs[one].end()
+                queue.put(one, queue.runs[one])
+            began_ns = time.monotonic_ns()
             continue
         plc, due_ns = run.plc, run.due_ns
         scan = plc.scans
@@ -170,7 +188,12 @@ def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchd
             if watchdogs and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
         began_ns = ended_ns
-        queue.put(number, run)
+        batch = batches.enter(number, run) if batches else None
+        if batch:
+            watchdogs[number].begin_batch()
+            queue.put_batch(batch)
+        else:
+            queue.put(number, run)
 
 
 class _Queue:
@@ -180,7 +203,9 @@ class _Queue:
     is moved only when its row comes first; to move it each time would cost more than its scan."""
 
     def __init__(self, runs: Sequence[Running]) -> None:
-        self.runs = runs
+        self.runs: list[Running | Batch] = list(runs)
+        """The runs, and behind them batches."""
+        self._numbers: dict[Batch, int] = {}
         self._times: list[int] = []
         """The times of the rows, as a heap."""
         self._rows: dict[int, list[int]] = {}
@@ -190,7 +215,15 @@ class _Queue:
         for number, run in enumerate(runs):
             self.put(number, run)
 
-    def put(self, number: int, run: Running) -> None:
+    def put_batch(self, batch: Batch) -> None:
+        """Puts a batch into the row of its time."""
+        number = self._numbers.setdefault(batch, len(self.runs))
+        if number == len(self.runs):
+            self.runs.append(batch)
+            self._stands_ns.append(NEVER)
+        self.put(number, batch)
+
+    def put(self, number: int, run: Running | Batch) -> None:
         """Puts a run into the row of its time, unless it has ended or is in an earlier row."""
         due_ns = run.due_ns
         if run.reason:
@@ -241,9 +274,12 @@ class _SingleRun:
     """In place of a queue, for one run."""
 
     def __init__(self, runs: Sequence[Running]) -> None:
-        self.runs = runs
+        self.runs: Sequence[Running | Batch] = runs
 
-    def put(self, number: int, run: Running) -> None:
+    def put_batch(self, batch: Batch) -> None:
+        """A single run is in no batch."""
+
+    def put(self, number: int, run: Running | Batch) -> None:
         """Nothing to do: the run itself says when it is due."""
 
     def next_ns(self) -> int | None:

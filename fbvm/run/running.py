@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from fbvm.engine.clock import Clock
+from fbvm.machine.batch import BatchPlace, place_of
 from fbvm.machine.goal import Goal
 from fbvm.machine.plc import Plc
 from fbvm.watch.paths import Place, Span
@@ -29,6 +30,18 @@ class TimedWrite:
     """The Python value that `Plc.write` takes for it; for a span of places a list."""
     at_ns: int = 0
     """The time of the PLC in nanoseconds, as `Plc.now_ns`."""
+
+
+@dataclass(frozen=True)
+class Batched:
+    """A run in a batch."""
+
+    run: Running
+    place: BatchPlace
+    behind_ns: int
+    """How far the time of the PLC is behind that of the loop."""
+    until_ns: int
+    """The time of the loop at which the run has to scan by itself again."""
 
 
 class Running:
@@ -87,6 +100,25 @@ class Running:
         """Called when somebody else has executed scans of the PLC, with what was to be written in them."""
         if self.plc.scans:
             self._writes = [write for write in self._writes if write.at_ns > self.plc.now_ns]
+        self.reason = self._goal.reached()
+
+    def enter_batch(self) -> Batched | None:
+        """Prepares the next scans for a batch (`machine/batch.py`); None if this run needs its PLC behind each of them."""
+        goal, plc = self._goal, self.plc
+        if self.pace != CYCLIC or self.reason or self._writes or goal.scans_left < 2 or not (place := place_of(plc)):
+            return None
+        until_ns = min(place.until_ns, goal.end_ns - plc.cycle_ns) + self._behind_ns
+        return Batched(self, place, self._behind_ns, until_ns)
+
+    @property
+    def scans_left(self) -> int:
+        """How many scans may follow before `reason` has to be looked at, however long they take."""
+        return self._goal.scans_left
+
+    def leave_batch(self, due_ns: int, missed: int) -> None:
+        """Called when the PLC was brought up to date: the next scan is due at `due_ns`, so many periods were missed."""
+        self.due_ns = due_ns
+        self.plc.lateness.missed += missed
         self.reason = self._goal.reached()
 
     def scan(self, now_ns: int) -> list[int]:

@@ -33,12 +33,14 @@ class Watchdog:
         self._scan_ns = 0
         """The time of the scan that has asked, as its program knows it: by it scans of a burst are told from each other."""
         self._failure: BaseException | None = None
+        self._is_in_batch = False
+        """True if nobody calls `begin` before each scan."""
 
     def begin(self, now_ns: int) -> None:
         """A scan begins at `now_ns` of the host's monotonic clock.
 
         Where breakpoints are set, a person looks at the scan and it is not ended."""
-        self._began_ns = now_ns
+        self._began_ns, self._is_in_batch = now_ns, False
         plc = self._plc
         if plc.budget != self._budget:
             self._budget = plc.budget
@@ -58,6 +60,10 @@ class Watchdog:
             if failure:
                 raise failure
 
+    def begin_batch(self) -> None:
+        """From now on nobody calls `begin` before a scan, which then begins when it asks for the first time."""
+        self._is_in_batch = True
+
     def stop(self) -> None:
         """Nobody watches the PLC any more."""
         self._plc.engine.allowance = WHOLE_BUDGET
@@ -76,7 +82,9 @@ class Watchdog:
         now_ns, scan_ns = time.monotonic_ns(), self._system[NOW // 8]
         if not self._asks:
             self._asks, self._scan_ns = True, scan_ns
-        elif scan_ns != self._scan_ns:  # a later scan of the burst
+            if self._is_in_batch:
+                self._began_ns = now_ns
+        elif scan_ns != self._scan_ns:  # a later scan of the burst, or of the batch
             self._scan_ns, self._began_ns = scan_ns, now_ns
         taken_ns, watch_ns = now_ns - self._began_ns, self._plc.watch_cycle.time_ns
         if taken_ns >= watch_ns:

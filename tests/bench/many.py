@@ -75,7 +75,7 @@ def measure(name: str, count: int, pace: str, cycle_ms: int) -> None:
     made_us = (time.perf_counter() - began) / count * 1e6
     used, began = time.process_time(), time.perf_counter()
     step_ns = cycle_ms * MS / count
-    run_all([Running(plc, until=lambda plc: plc.now_ns >= RUN_MS * MS, pace=pace, phase_ns=int(number * step_ns) // MS * MS)
+    run_all([Running(plc, for_ns=RUN_MS * MS, pace=pace, phase_ns=int(number * step_ns) // MS * MS)
              for number, plc in enumerate(plcs)])  # fmt: skip
     used, passed = time.process_time() - used, time.perf_counter() - began
     scans, kib = sum(plc.scans for plc in plcs), (resident_kib() - before_kib) / count

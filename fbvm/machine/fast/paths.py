@@ -8,7 +8,7 @@ from __future__ import annotations
 from fbvm.base.areas import NEVER
 from fbvm.engine.clock import Clock
 from fbvm.engine.native.engine import NativeEngine
-from fbvm.engine.native.scans.scans import ScheduledTask
+from fbvm.engine.native.scans.scans import NativeScans, ScheduledTask
 from fbvm.engine.trap import Trap
 from fbvm.machine.fast.units_in_code import WithUnits, can_run_in_code, units_in_code
 from fbvm.machine.scan.clock_words import CLOCK_WORDS
@@ -89,8 +89,11 @@ class ProgramAlone:
 
     def once(self, now_ns: int, budget: int) -> Trap | None:
         """One scan at `now_ns` in which the program may execute `budget` statements.  Returns the trap that ended it."""
+        return self.finish(now_ns, self._scans.once(now_ns, budget))
+
+    def finish(self, now_ns: int, point: int) -> Trap | None:
+        """The part of a scan at `now_ns` behind machine code, which has returned `point`.  Returns the trap that ended it."""
         scans, io = self._scans, self._io
-        point = scans.once(now_ns, budget)
         if point:
             return self._machine.trap_at(point)
         if self._idle and not scans.changed and io.is_idle(now_ns):
@@ -131,6 +134,21 @@ class ProgramAlone:
         if self._scans.changed:
             self.refresh(now_ns + done * step_ns)
         return done, None
+
+
+    def enter_batch(self, now_ns: int, budget: int) -> tuple[NativeScans, int] | None:
+        """Prepares scans of several PLCs at once, see `WithUnits.enter_batch`."""
+        if not self._idle or not self._io.is_idle(now_ns):
+            return None
+        self._scans.parameters.scan_budget = budget
+        self._scans.load_times()
+        return self._scans, self._io.unit_ns(NEVER)
+
+    def leave_batch(self, scans: int) -> None:
+        """Called when machine code has done so many scans in which nobody wanted anything."""
+        self._scans.store_times()
+        self._io.skipped += scans
+        self._io.changed_words = False
 
 
 FastPath = ProgramAlone | WithUnits

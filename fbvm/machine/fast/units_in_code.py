@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
+from fbvm.base.areas import NEVER
 from fbvm.base.memory import STRUCTS
 from fbvm.engine.clock import Clock
 from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.native.scans.code import ASKED, ASKED_BEFORE, OVER, SCANNED
-from fbvm.engine.native.scans.scans import ScheduledTask
+from fbvm.engine.native.scans.scans import NativeScans, ScheduledTask
 from fbvm.engine.native.scans.units import CHANGED_WORDS, FieldAt, MovesAt, MoveShape, UnitExchange, UnitInCode
 from fbvm.engine.trap import Trap
 from fbvm.machine.scan.clock_words import CLOCK_WORDS
@@ -98,12 +99,32 @@ class WithUnits:
         self._parameters.events_collected = pending
         if pending:
             self._collect_events(now_ns)
-        point = self._scans.once(now_ns, budget)
+        return self.finish(now_ns, self._scans.once(now_ns, budget))
+
+    def finish(self, now_ns: int, point: int) -> Trap | None:
+        """The part of a scan at `now_ns` behind machine code, which has returned `point`.  Returns the trap that ended it."""
         if point > 0:
             return self._machine.trap_at(point)
         self._count_refresh()
         self._end(now_ns)
         return None
+
+    def enter_batch(self, now_ns: int, budget: int) -> tuple[NativeScans, int] | None:
+        """Prepares scans of several PLCs by one call of machine code, each of `budget` statements at most.
+
+        Returns the machine code, and the time in ns from which on the PLC has to scan by itself again; None if a link has
+        events, or could have some."""
+        if self._has_pending_events() or self._parameters.unfinished:
+            return None
+        self._parameters.scan_budget, self._parameters.events_collected = budget, 0
+        self._scans.load_times()
+        return self._scans, NEVER
+
+    def leave_batch(self, scans: int) -> None:
+        """Called when machine code has done so many scans in which nobody wanted anything."""
+        self._scans.store_times()
+        self._io.skipped += scans
+        self._io.changed_words = False
 
     def burst(self, times: list[int], most: int, now_ns: int, clock: Clock, budget: int) -> Trap | None:
         """Runs up to `most` scans back to back while units have changed words.

@@ -118,7 +118,7 @@ def four(code: Image, *operands: Any) -> list[Rig]:
 
 
 def way(rig: Rig) -> FastPath | None:
-    return rig.plc._fast_path()
+    return rig.plc.fast_path()
 
 
 def agree(rigs: list[Rig], do: Callable[[Plc], object]) -> None:

@@ -84,7 +84,7 @@ def test_received_bytes_are_where_they_belong(switch: int, area: str, odd_filler
         if scan % 10 == 0:
             assert bytes(inside.memory.words("D")) == bytes(python.memory.words("D"))
             assert bytes(inside.memory.words("W")) == bytes(python.memory.words("W"))
-    assert isinstance(inside._fast_path(), WithUnits)
+    assert isinstance(inside.fast_path(), WithUnits)
     assert inside.read("Main.Exchanges") == python.read("Main.Exchanges")
     assert int(str(inside.read("Main.Exchanges"))) > 150
     assert bytes(inside.memory.words("CIO")) == bytes(python.memory.words("CIO"))

@@ -53,6 +53,11 @@ WATCHED_ROW = 2
 """Numbers of 64 bits in the row of watched words: their offset in the memory, and the eight bytes that are expected there."""
 WATCHED_BYTES = 8
 """How many bytes one row watches."""
+PLC_ROW = 2
+"""Numbers of 64 bits in the row of a PLC for `@all`: the address of its parameters, how much its time is behind the time told."""
+ALL_OVER = -1
+"""What `@all` returns when the last PLC has scanned.  Else the number of a PLC that wants something behind its scan, in the upper
+32 bits, and what `@scans` has returned for it."""
 MOST_CYCLE = 0xFFFF_FFFF
 """The longest cycle time that its words can say."""
 SECOND_NS = 1_000_000_000
@@ -110,6 +115,39 @@ ret i32 %point
 end:
 store i64 %i, ptr %done_at
 ret i32 0
+}}
+define i64 @all(ptr %rows, i64 %first, i64 %count, i64 %now) {{
+entry:
+br label %test
+test:
+%i = phi i64 [ %first, %entry ], [ %i1, %next ]
+%more = icmp slt i64 %i, %count
+br i1 %more, label %one, label %over
+one:
+%number = mul i64 %i, {PLC_ROW}
+%row = getelementptr inbounds i64, ptr %rows, i64 %number
+%p = load ptr, ptr %row
+%behind_at = getelementptr inbounds i64, ptr %row, i64 1
+%behind = load i64, ptr %behind_at
+$addresses_of_one
+%own = sub i64 %now, %behind
+store i64 %own, ptr %time_ns_at
+%point = call i32 @scans(ptr %p)
+%changed = load i64, ptr %changed_at
+%quiet = icmp eq i64 %changed, 0
+%good = icmp eq i32 %point, 0
+%nothing = and i1 %quiet, %good
+br i1 %nothing, label %next, label %wants
+next:
+%i1 = add i64 %i, 1
+br label %test
+wants:
+%low = zext i32 %point to i64
+%high = shl i64 %i, 32
+%answer = or i64 %high, %low
+ret i64 %answer
+over:
+ret i64 {ALL_OVER}
 }}
 $burst
 declare i32 @llvm.umax.i32(i32, i32)
@@ -214,9 +252,10 @@ ret i32 %point
 
 def text(intervals: Sequence[bool], clock_words: ClockWordTable, watched: int, shapes: Sequence[Shape]) -> str:
     """The functions @scans and, where there are units, @burst: both take the address of the parameters, and return
-    a trap's point, ASKED, 0, or what else there is for a burst."""
+    a trap's point, ASKED, 0, or what else there is for a burst.  @all is a scan of each of several PLCs, from one on up to the
+    first that wants something: watched words have changed, the program of a unit has run, or a trap."""
     first = COUNT + TASK_ROW * len(intervals)
-    parts = {"addresses": _lines(_addresses()), "rows": _lines(_rows(len(intervals))),
+    parts = {"addresses": _lines(_addresses()), "addresses_of_one": _lines(addresses()), "rows": _lines(_rows(len(intervals))),
              "clock_words": _lines(_clock_words(clock_words)), "tasks": _lines(_tasks(intervals)),
              "points": ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))}  # fmt: skip
     if shapes:

@@ -87,9 +87,10 @@ class NativeScans:
         self.times = array("q")
         """The times of the last burst's scans."""
         self.times_at = 0
-        self.call, self.call_burst = _functions(tuple(task.interval_ns > 0 for task in tasks), clock_words, len(offsets),
-                                                tuple(unit.shape for unit in units))  # fmt: skip
-        """Machine code of scans, and of a burst, which there is only with `units`."""
+        shapes = tuple(unit.shape for unit in units)
+        made = _functions(tuple(task.interval_ns > 0 for task in tasks), clock_words, len(offsets), shapes)
+        self.call, self.call_burst, self.call_all = made
+        """Machine code of scans, of a burst, which there is only with `units`, and of scans of several PLCs of one shape."""
 
     @property
     def changed(self) -> bool:
@@ -150,21 +151,27 @@ Call = Callable[[int], int]
 """A function of machine code: takes the address of the parameters, returns a point or one of the answers of `scans.code`."""
 
 
+CallAll = Callable[[int, int, int, int], int]
+"""`@all` of `scans.code`: takes the address of the rows, the first one, how many there are, and the time."""
+
+
 @cache
 def _functions(intervals: tuple[bool, ...], clock_words: ClockWordTable, watched: int,
-               shapes: tuple[Shape, ...]) -> tuple[Call, Call]:  # fmt: skip
-    """The functions @scans and @burst for a shape; where there are no units, @scans twice."""
+               shapes: tuple[Shape, ...]) -> tuple[Call, Call, CallAll]:  # fmt: skip
+    """The functions @scans, @burst and @all for a shape; where there are no units, @scans in place of @burst."""
     text = native_scan_code.text(intervals, clock_words, watched, shapes)
     name = name_of("scans", text)
     stored = native_cache.read(name)
     if stored is None:
         stored = Stored({}, compile_text(text, 1))
         native_cache.write(name, stored)
-    names = ["scans", "burst"] if shapes else ["scans"]
+    names = ["scans", "burst" if shapes else "scans", "all"]
     linked = Linked(stored.compiled, names)
     _LOADED.append(linked)
     of_address = ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
-    return of_address(linked.address(names[0])), of_address(linked.address(names[-1]))
+    of_rows = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+    scans, burst, every = map(linked.address, names)
+    return of_address(scans), of_address(burst), of_rows(every)
 
 
 _LOADED: list[Linked] = []
