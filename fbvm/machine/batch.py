@@ -32,6 +32,7 @@ class BatchPlace:
 
     def finish(self, plc: Plc, now_ns: int, point: int) -> Trap | None:
         """Ends a scan at `now_ns` behind which somebody wants something: machine code has returned `point`."""
+        self.scans.store_times()
         return plc.end_fast_scan(now_ns, self.path.finish(now_ns, point))
 
     def leave(self, plc: Plc, scans: int, now_ns: int) -> None:

@@ -16,6 +16,8 @@ MOST = 32
 """So many PLCs one batch has at most: whenever one comes or leaves, all of them are brought up to date."""
 TRY_AGAIN = 8
 """A run that could not enter a batch is asked again after so many scans."""
+FIRST_SCANS = 4
+"""After the first ones, in which its fast path is made, again at once."""
 
 
 Key = tuple[int, int, int]
@@ -163,7 +165,7 @@ class Batches:
             return None
         batched = run.enter_batch()
         if batched is None:
-            self._again[number] = scans + TRY_AGAIN
+            self._again[number] = scans + (TRY_AGAIN if scans >= FIRST_SCANS else 1)
             return None
         key = run.due_ns, run.plc.cycle_ns, id(batched.place.call)
         batch = self._open.get(key)

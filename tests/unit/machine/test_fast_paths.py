@@ -34,7 +34,7 @@ def test_the_program_alone_scan_by_scan(cycle_ns: int) -> None:
     for _ in range(300):
         assert fast.scan() == slow.scan()
         assert bytes(fast.memory.u8) == bytes(slow.memory.u8) and fast.due_ns == slow.due_ns
-    assert isinstance(fast.fast_path(), ProgramAlone) and slow._fast_path() is None
+    assert isinstance(fast.fast_path(), ProgramAlone) and slow.fast_path() is None
 
 
 CASES = [((0,), 0, True), ((0,), 0, False), ((MS, 0), 300_000, True), ((7000, 0), 10_000, False), ((MS,), 5000, False)]
