@@ -143,9 +143,10 @@ class Batch:
 
 
 class Batches:
-    """All batches of a loop, by when they are due, their period and their machine code."""
+    """All batches of a loop, by when they are due, their period and their machine code.  None unless they are `allowed`."""
 
-    def __init__(self) -> None:
+    def __init__(self, allowed: bool) -> None:
+        self._allowed = allowed
         self._batches: list[Batch] = []
         self._open: dict[Key, Batch] = {}
         """Those that take more runs."""
@@ -161,7 +162,7 @@ class Batches:
     def enter(self, number: int, run: Running) -> Batch | None:
         """The batch into which the run has been put; None if it has to scan by itself."""
         scans = run.plc.scans
-        if scans < self._again.get(number, 0):
+        if not self._allowed or scans < self._again.get(number, 0):
             return None
         batched = run.enter_batch()
         if batched is None:

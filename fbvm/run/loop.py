@@ -76,8 +76,8 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
     else:
         _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
-    batches = Batches() if len(watchdogs) > 1 and until is None and not any(run.calls_out for run in runs) else None
-    told_ns = time.monotonic_ns()
+    batches = Batches(len(watchdogs) > 1 and until is None and _are_alone(runs))
+    told_ns, pause_ns = time.monotonic_ns(), max(PROGRESS_NS, PLC_PROGRESS_NS * len(runs))
     recorders = _recorders(runs)
     try:
         _begin(recorders)
@@ -88,12 +88,12 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
                 interrupts.check()
                 if until and until():
                     break
-                if progress and time.monotonic_ns() - told_ns >= max(PROGRESS_NS, PLC_PROGRESS_NS * len(runs)):
+                if progress and time.monotonic_ns() - told_ns >= pause_ns:
                     told_ns = time.monotonic_ns()
                     _end(recorders, batches)
                     progress()
                     _begin(recorders)
-                    for number in batches.check() if batches else ():
+                    for number in batches.check():
                         queue.put(number, runs[number])
     except KeyboardInterrupt:
         for run in runs:
@@ -108,7 +108,12 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
 def _recorders(runs: Sequence[Running]) -> list[InputRecorder]:
     """The recorders of the PLCs, if nobody outside has a turn between two scans of any of them."""
     recorders = [run.plc.input_recorder for run in runs]
-    return [] if any(run.calls_out for run in runs) else [recorder for recorder in recorders if recorder]
+    return [recorder for recorder in recorders if recorder] if _are_alone(runs) else []
+
+
+def _are_alone(runs: Sequence[Running]) -> bool:
+    """True if nobody outside has a turn between two scans of any of them, but for `progress` and `until` of the loop."""
+    return not any(run.calls_out for run in runs)
 
 
 def _begin(recorders: Sequence[InputRecorder]) -> None:
@@ -117,10 +122,9 @@ def _begin(recorders: Sequence[InputRecorder]) -> None:
         recorder.run_begins()
 
 
-def _end(recorders: Sequence[InputRecorder], batches: Batches | None) -> None:
+def _end(recorders: Sequence[InputRecorder], batches: Batches) -> None:
     """Up to here nobody outside had a turn."""
-    if batches:
-        batches.settle()
+    batches.settle()
     for recorder in recorders:
         recorder.run_ends()
 
@@ -157,7 +161,7 @@ def _latest_ns(runs: Sequence[Running]) -> int:
 
 
 def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog],
-              batches: Batches | None) -> None:  # fmt: skip
+              batches: Batches) -> None:  # fmt: skip
     """Scans all runs that are woken or due, with the same time for all.  In real time each run has a watchdog."""
     first_ns = began_ns = time.monotonic_ns()
     for number in queue.take(now_ns, woken):
@@ -165,7 +169,6 @@ def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchd
         if run.reason:  # it has ended, and is woken nevertheless
             continue
         if isinstance(run, Batch):
-            assert batches
             left = batches.scan(run, now_ns)
             queue.put(number, run)  # in front of those that have left, so that they find it at its next time
             for one in left:
@@ -188,7 +191,7 @@ def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchd
             if watchdogs and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
         began_ns = ended_ns
-        batch = batches.enter(number, run) if batches else None
+        batch = batches.enter(number, run)
         if batch:
             watchdogs[number].begin_batch()
             queue.put_batch(batch)
