@@ -78,6 +78,7 @@ class Dialect:
     own_in_outs: bool = False
     wrong_bcd_is_zero: bool = False
     negative_is_zero: bool = False
+    any_width_at: bool = False
     steps_apart: bool = False
     times_are_numbers: bool = False
     short_names: bool = False
@@ -186,6 +187,8 @@ QUESTIONS = {
     "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another "
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
+    "any_width_at": ("x AT %IW4 : DINT, x AT %ML2 : DWORD: an address of another size than the type", "an error",
+                     "x begins there, with a warning (S0193)"),
     "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
                          "0"),
     "wrong_bcd_is_zero": ("BCD_TO_UINT(16#9A): a digit above 9", "stops the program (R0105)", "0"),
@@ -208,7 +211,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
-                   padding_is_written=True, steps_apart=True, locals_hide_results=True)
+                   padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

@@ -6,6 +6,7 @@ import re
 
 from fbvm.base.areas import E_NAMES, FLAG_AREAS, PORTABLE_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Variable, holds_block, is_open
@@ -114,8 +115,11 @@ def _fits(context: Context, address: Address, kind: Type, source: Source, node: 
     size = context.areas[address.area].size_bytes
     if address.size_bits and not isinstance(kind, ArrayType | StructType | StringType) \
             and kind.size * 8 != max(8, address.size_bits):
-        context.report.add("S0602", source, node, f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}")
-        return False
+        said, taken = f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}", context.project.dialect.any_width_at
+        context.report.add("S0193" if taken else "S0602", source, node, said,
+                           "" if taken else f"write an address of that size, or take {takers('any_width_at')}")
+        if not taken:
+            return False
     if address.byte_offset() + kind.size > size:
         context.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
         return False
