@@ -35,11 +35,11 @@ class LiveLesson:
 
     def take_prediction(self, names: Sequence[str], values: Sequence[str]) -> dict[str, Any]:
         """Keeps answers and says whether they are right; what is empty is not wrong, and no try."""
-        known = {name: question for name, question, _ in self.questions()}
-        if len(names) != len(values) or not set(names) <= set(known):
+        known = {name for name, _, _ in self.questions()}
+        if len(names) != len(values) or not set(names) <= known:
             raise MessageError(f"a prediction has one value for each of {', '.join(sorted(known))}")
-        if empty := [known[name] or name for name, value in zip(names, values, strict=True) if not value.strip()]:
-            return {"mistake": f"This is still empty; predict first: {empty[0]}", "tries_left": max(0, TRIES - self.tries)}
+        if empty := [name for name, value in zip(names, values, strict=True) if not value.strip()]:
+            return {"mistake": f"{empty[0]} is still empty; predict first", "tries_left": max(0, TRIES - self.tries)}
         mistake = self.predict(dict(zip(names, values, strict=True)))
         self.is_predicted = not mistake
         self.tries += bool(mistake)

@@ -188,7 +188,7 @@ def test_no_panel_is_wider_than_the_window(live: Any, width: int, scheme: str) -
 def test_every_control_has_a_name_for_screen_readers(live: Any) -> None:
     page = live().window()
     watch(page, "Main.Level")
-    for panel in ("units", "network", "memory"):
+    for panel in ("units", "network", "memory", "plant", "times"):
         page.click(f"[data-panel={panel}]")
     nameless = page.evaluate("""[...document.querySelectorAll('button, input, select')]
         .filter((one) => !(one.textContent.trim() || one.getAttribute('aria-label') || one.title || one.labels?.length))

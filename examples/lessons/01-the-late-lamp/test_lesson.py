@@ -14,5 +14,5 @@ def test_prediction(fb):
 
 def test_program(fb):
     main = pressed(fb, "program.st")
-    assert main.scans - 1 == 3 and main.Lamp
-    assert not main.scan(Button=False).Lamp
+    assert main.scans - 1 == 3, f"the button is ON from scan 3 on; Lamp is ON at the end of scan {main.scans - 1}, not of scan 3"
+    assert not main.scan(Button=False).Lamp, "the button is OFF in the next scan, and Lamp is still ON at its end"

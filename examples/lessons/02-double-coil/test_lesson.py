@@ -18,4 +18,6 @@ def test_program(fb):
     main = fb("program.st::Main")
     for automatic, sensor, manual, button in product((False, True), repeat=4):
         main.scan(Automatic=automatic, Sensor=sensor, Manual=manual, Button=button)
-        assert main.Lamp == (automatic and sensor or manual and button)
+        lit = automatic and sensor or manual and button
+        assert main.Lamp == lit, (f"with Automatic {automatic}, Sensor {sensor}, Manual {manual}, Button {button} "
+                                  f"Lamp is {main.Lamp}, not {lit}")

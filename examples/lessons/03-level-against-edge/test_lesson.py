@@ -18,4 +18,4 @@ def test_prediction(fb):
 @pytest.mark.parametrize("scans, presses", [((5, 3, 2), 2), ((1, 1, 1, 1, 1), 3), ((20,), 1)])
 def test_program(fb, scans, presses):
     main = pressed(fb("program.st::Main"), *scans)
-    assert main.Count == presses
+    assert main.Count == presses, f"the button was pressed {presses} times, for more than one scan each; Count is {main.Count}"

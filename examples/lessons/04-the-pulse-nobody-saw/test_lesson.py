@@ -26,5 +26,5 @@ def test_program(fb, scans):
     main = fb("program.st::Main")
     terminal = seen(main, *scans)
     presses = len(scans) // 2
-    assert main.Asked == presses
-    assert sum(terminal) == presses
+    assert main.Asked == presses, f"of {presses} presses the program saw {main.Asked}"
+    assert sum(terminal) == presses, f"in {presses} presses the terminal is ON for {sum(terminal)} scans, not one for each"

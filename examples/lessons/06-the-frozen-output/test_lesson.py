@@ -9,9 +9,7 @@ def test_prediction(fb):
 
 
 def test_program(fb):
-    main = fb("program.st::Main").run(scans=3, Enable=True, Wanted=50)
-    assert main.Output == 500
-    assert main.scan(Enable=False).Output == 0
-    assert main.scan(Wanted=20).Output == 0
-    assert main.scan(Enable=True).Output == 200
-    assert main.scan(Enable=False).Output == 0
+    main = fb("program.st::Main").run(scans=2, Enable=True, Wanted=50)
+    for enable, wanted, output in ((True, 50, 500), (False, 50, 0), (False, 20, 0), (True, 20, 200), (False, 20, 0)):
+        main.scan(Enable=enable, Wanted=wanted)
+        assert main.Output == output, f"with Enable {enable} and Wanted {wanted} Output is {main.Output}, not {output}"

@@ -21,5 +21,6 @@ def test_prediction(fb):
 @pytest.mark.parametrize("before", range(1, 21, 3))
 def test_program(fb, before):
     main = fb("program.st::Main")
-    assert ns("1.5s") <= waited_ns(main, before) < ns("1.7s")
-    assert main.Wait_2.Q
+    waited = waited_ns(main, before)
+    assert ns("1.5s") <= waited < ns("1.7s"), f"Start in scan {before}: Lamp is ON after {waited / ns('1s'):g} s, not after 1.5 s"
+    assert main.Wait_2.Q, "Lamp is ON, and Wait_2.Q is not: the timer has to give it"

@@ -32,5 +32,6 @@ def test_prediction():
 
 def test_program(fb, network):
     main, question = asked(fb, network)
-    assert str(modbus.decode_request(question[7:])) == "03 read holding registers, address 258, quantity 3"
-    assert main["D300..D302"] == [1258, 1259, 1260]
+    said = str(modbus.decode_request(question[7:]))
+    assert said == "03 read holding registers, address 258, quantity 3", f"the first frame asks: {said}"
+    assert main["D300..D302"] == [1258, 1259, 1260], f"D300 to D302 hold {main['D300..D302']}, not 1258, 1259, 1260"

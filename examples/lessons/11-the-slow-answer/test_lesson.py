@@ -27,11 +27,11 @@ def test_prediction(fb, network):
 @pytest.mark.parametrize("latency", ["0ms", "40ms", "90ms", "300ms", "2s"])
 def test_program(fb, network, latency):
     main = plc(fb, network, "program.st", latency).until("Valid", max="10s")
-    assert main.Level == 42
+    assert main.Level == 42, f"the answer comes after {latency}: Valid is ON, and Level is {main.Level}, not 42"
 
 
 def test_without_an_answer(fb, network):
     main = plc(fb, network, "program.st", "0ms")
     network.faults[:] = [Fault(silent=True)]
     main.run("3s")
-    assert not main.Valid
+    assert not main.Valid, "nobody has answered for 3 s, and Valid is ON"

@@ -18,15 +18,15 @@ def test_prediction(fb):
 
 def test_a_pulse_of_start_starts_the_motor_and_it_goes_on(fb):
     main = fb("program.st::Main")
-    assert after(main, (True, False), *[(False, False)] * 3)
+    assert after(main, (True, False), *[(False, False)] * 3), "Start was ON in scan 0; at the end of scan 3 Motor is OFF"
 
 
 def test_stop_stops_the_motor(fb):
     main = fb("program.st::Main")
-    assert not after(main, (True, False), (False, True))
-    assert not after(main, (False, False))
+    assert not after(main, (True, False), (False, True)), "Stop is ON in scan 1, and Motor is ON at its end"
+    assert not after(main, (False, False)), "Stop is let go in scan 2, and Motor is ON by itself"
 
 
 def test_stop_wins_while_start_is_pressed(fb):
     main = fb("program.st::Main")
-    assert not after(main, (True, False), (True, True))
+    assert not after(main, (True, False), (True, True)), "Start and Stop are ON in scan 1, and Motor is ON at its end"

@@ -36,6 +36,8 @@ export function drawing(text, label) {
   return svg;
 }
 
+export const cut = (text, most) => (text.length > most ? `${text.slice(0, most)}…` : text);
+
 // An integer in another radix; every other value as it is.
 export function inRadix(text, radix, bytes) {
   if (radix === 10 || !/^-?\d+$/.test(text)) return text;

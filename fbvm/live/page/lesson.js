@@ -18,7 +18,7 @@ export class LessonPanel {
     if (!lesson) return;
     at("lessonText").replaceChildren(...blocks(lesson.text));
     at("questions").replaceChildren(...lesson.questions.map(([name, question, answer]) => make("label", {},
-      `${question || name} `, make("input", { name, value: answer, autocomplete: "off" }))));
+      question ? `${question} ` : "", make("b", {}, `${name} `), make("input", { name, value: answer, autocomplete: "off" }))));
     at("check").disabled = !lesson.predicted;
     this.tries(lesson.tries_left);
   }

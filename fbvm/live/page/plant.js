@@ -1,12 +1,13 @@
 // The plant panel: the PLCs of the run beside each other with what is watched of each, and a picture of who talks to whom.
 
-import { at, inSvg, make, remembered } from "/dom.js";
+import { at, cut, inSvg, make, remembered } from "/dom.js";
 import { NAMES } from "/scan.js";
 
 const BOX = 150;
 const GAP = 70;
 const HIGH = 58;
 const MOST_BESIDE = 8;
+const MOST_SHOWN = 60; // characters of a value
 
 export class PlantPanel {
   constructor(page) {
@@ -49,10 +50,10 @@ export class PlantPanel {
     const own = plc.name === this.page.plc;
     const watch = this.page.panels.watch;
     const rows = this.watched(plc.name).map((name) => make("tr", {}, make("td", { class: "mono" }, name),
-      make("td", { class: "value" }, watch.values.get(own ? name : `${plc.name}/${name}`) ?? "")));
+      make("td", { class: "value" }, cut(watch.values.get(own ? name : `${plc.name}/${name}`) ?? "", MOST_SHOWN))));
     const button = make("button", { "aria-pressed": String(own), title: "Look at this PLC", on: { click: () => this.look(plc.name) } }, plc.name);
     return make("div", { class: "card" }, make("h3", {}, button, " ", make("span", { class: "state", "data-state": plc.state }, NAMES[plc.state] ?? plc.state)),
-      make("p", { class: "dim" }, `scan ${plc.scan}, mode ${plc.mode}`), plc.trap ? make("p", { class: "mistake" }, plc.trap) : "",
+      make("p", { class: "dim" }, `${plc.scan < 0 ? "before the first scan" : `scan ${plc.scan}`}, mode ${plc.mode}`), plc.trap ? make("p", { class: "mistake" }, plc.trap) : "",
       make("table", { "aria-label": `What is watched of ${plc.name}` }, make("tbody", {}, ...rows)),
       rows.length ? "" : make("p", { class: "dim" }, "nothing is watched of it"));
   }

@@ -1,13 +1,11 @@
 // The watch panel: search over everything, values, writing once, forces, trees, groups, radix, and the cause of a value.
 
-import { at, inRadix, make, options, remember, remembered } from "/dom.js";
+import { at, cut, inRadix, make, options, remember, remembered } from "/dom.js";
 
 const NO_GROUP = "";
 const MOST_ROWS = 1000;
 const MOST_SHOWN = 60; // characters of what can be opened
 const MOST_OF_TYPE = 24;
-
-const cut = (text, most) => (text.length > most ? `${text.slice(0, most)}…` : text);
 
 export class WatchPanel {
   constructor(page) {

@@ -14,11 +14,13 @@ from fbvm.testing.course.lessons import OF_THE_LEARNER, Lesson, Result
 from fbvm.testing.pages import page_path
 
 _STYLE = """
-:root { color-scheme: light dark; --good: light-dark(#1b7f4d, #4cc38a); --bad: light-dark(#c92a2a, #ff8787) }
+:root { color-scheme: light dark; --good: light-dark(#1b7f4d, #4cc38a); --bad: light-dark(#c92a2a, #ff8787);
+  --link: light-dark(#1a4fa0, #9ec1ff) }
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 90rem; padding: 0 1rem; overflow-wrap: break-word }
 table { border-collapse: collapse } th, td { padding: .25rem .7rem; border-bottom: 1px solid #8884; text-align: left }
 tbody td { white-space: nowrap } .words td { white-space: normal; overflow-wrap: anywhere; min-width: 6rem; max-width: 30rem }
-.good { color: var(--good) } .bad { color: var(--bad) } td a { color: inherit } .none { opacity: .65 } .wide { overflow-x: auto }
+.good { color: var(--good) } .bad { color: var(--bad) } .none { opacity: .75 }
+a { color: var(--link) } td a { color: inherit } .wide { overflow-x: auto }
 """
 _STYLE_HASH = b64encode(sha256(_STYLE.encode()).digest()).decode()
 _POLICY = f"default-src 'none'; style-src 'sha256-{_STYLE_HASH}'; base-uri 'none'; form-action 'none'"
@@ -26,7 +28,7 @@ _POLICY = f"default-src 'none'; style-src 'sha256-{_STYLE_HASH}'; base-uri 'none
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="{policy}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title><style>{style}</style></head><body><h1>{title}</h1>
+<title>{title}</title><style>{style}</style></head><body><main><h1>{title}</h1>
 <p>A cell is the prediction, right or wrong, and how many checks of the program passed.</p>
 <div class="wide" tabindex="0" role="region" aria-label="Who did what"><table><thead><tr><th>{heads}</thead><tbody>
 {rows}
@@ -38,7 +40,7 @@ _PAGE = """<!doctype html>
 {wrong}
 </tbody></table></div>
 {details}
-</body></html>
+</main></body></html>
 """
 
 
@@ -99,7 +101,8 @@ def _details(name: str, lesson: Lesson, result: Result, out: Path) -> str:
     for test, why in result.failed:
         page = page_path(out, f"{name}/{lesson.slug}/test_lesson.py::{test}")
         link = f' <a href="{quote(page.relative_to(out).as_posix())}">every scan</a>' if page.exists() else ""
-        items.append(f"<li><b>{escape(test)}</b>: {escape(why)}{link}")
+        said = why.removeprefix("AssertionError: ")
+        items.append(f"<li><b>{escape(test)}</b>: {escape(said)}{link}")
     files = " and ".join(f'<a href="{quote(f"{name}/{lesson.slug}/{file}")}">{file}</a>' for file in OF_THE_LEARNER)
     return (f'<h2 id="{_anchor(name, lesson)}">{escape(name)}: {lesson.number}. {escape(lesson.title)}</h2>'
             f"<p>{files}</p><ul>{''.join(items)}</ul>")  # fmt: skip

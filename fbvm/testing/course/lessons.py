@@ -116,8 +116,8 @@ def check(lesson: Lesson, folder: Path) -> int:
 
 
 def program_mistakes(lesson: Lesson, folder: Path) -> list[str]:
-    """What a learner's program does not do yet: the names of the tests that fail, as sentences; marks the lesson as done if none
-    does."""
+    """What a learner's program does not do yet, a sentence for each test that fails: which scan, which value, which rule.  Marks
+    the lesson as done if none does."""
     target = folder / lesson.slug
     with tempfile.TemporaryDirectory() as temporary:
         listing = Path(temporary) / "results.xml"
@@ -129,14 +129,19 @@ def program_mistakes(lesson: Lesson, folder: Path) -> list[str]:
         cases = list(ElementTree.parse(listing).iter("testcase")) if listing.is_file() else []
     wrong = [(case.get("name", ""), found) for case in cases
              for found in [case.find("failure") if case.find("failure") is not None else case.find("error")] if found is not None]
-    return [_mistake(name, found.get("message") or "") for name, found in wrong] or [f"{PROGRAM} could not be checked"]
+    said: dict[str, str] = {}
+    for name, found in wrong:  # of a test with several examples the first that fails
+        said.setdefault(name.partition("[")[0], _mistake(name, found.get("message") or ""))
+    return list(said.values()) or [f"{PROGRAM} could not be checked"]
 
 
 def _mistake(name: str, said: str) -> str:
     """A failed test in a sentence, with what it said if that is one."""
     sentence = name.partition("[")[0].removeprefix("test_").replace("_", " ")
     first = said.split("\n", 1)[0].removeprefix("AssertionError: ")
-    return sentence if not first or first.startswith("assert ") else f"{sentence}: {first}"
+    if not first or first.startswith("assert "):
+        return sentence
+    return first if sentence == "program" else f"{sentence}: {first}"
 
 
 def questions(lesson: Lesson, folder: Path) -> list[tuple[str, str, str]]:

@@ -29,7 +29,7 @@ def test_a_page_is_told_its_lesson(taught: Page) -> None:
 def test_the_program_is_checked_when_the_prediction_is_right(taught: Page) -> None:
     assert "predict first" in taught.ask("check")["error"]
     assert taught.done("predict", names=["lamp"], values=[" "]) == {
-        "mistake": "This is still empty; predict first: Which scan?", "tries_left": TRIES}, "empty is not wrong, and no try"
+        "mistake": "lamp is still empty; predict first", "tries_left": TRIES}, "empty is not wrong, and no try"
     assert taught.done("predict", names=["lamp"], values=["3"]) == {
         "mistake": "this is not what the program does", "tries_left": TRIES - 1}
     assert taught.done("predict", names=["lamp"], values=["4"])["mistake"] == ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 from base64 import b64encode
@@ -61,6 +62,16 @@ def test_a_lesson_is_one_screen_and_complete(lesson: Lesson) -> None:
     assert asked == re.findall(r"^(\w+) = ", (lesson.folder / "solution" / ANSWERS).read_text(encoding="utf-8"), re.M)
     tests = (lesson.folder / "test_lesson.py").read_text(encoding="utf-8")
     assert sorted(asked) == sorted(re.findall(r'predicted\(__file__, "(\w+)"\)', tests))
+
+
+@every_lesson
+def test_every_check_of_a_program_says_in_words_what_is_wrong(lesson: Lesson) -> None:
+    tree = ast.parse((lesson.folder / "test_lesson.py").read_text(encoding="utf-8"))
+    checks = [one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name.startswith("test_")
+              and one.name != "test_prediction"]  # fmt: skip
+    silent = [f"{one.name}:{found.lineno}" for one in checks for found in ast.walk(one)
+              if isinstance(found, ast.Assert) and found.msg is None]  # fmt: skip
+    assert checks and silent == []
 
 
 @every_lesson
@@ -204,7 +215,9 @@ def test_a_wrong_program_is_told_in_sentences_and_a_right_one_ends_the_lesson(tm
     for path in (lesson.folder / "solution").iterdir():
         if path.name != PROGRAM:
             (target / path.name).write_bytes(path.read_bytes())
-    assert program_mistakes(lesson, tmp_path) == ["stop stops the motor", "stop wins while start is pressed"]
+    assert program_mistakes(lesson, tmp_path) == [
+        "stop stops the motor: Stop is ON in scan 1, and Motor is ON at its end",
+        "stop wins while start is pressed: Start and Stop are ON in scan 1, and Motor is ON at its end"]  # fmt: skip
     (target / PROGRAM).write_bytes((lesson.folder / "solution" / PROGRAM).read_bytes())
     assert program_mistakes(lesson, tmp_path) == [] and is_done(lesson, tmp_path)
 
