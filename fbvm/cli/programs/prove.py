@@ -16,10 +16,11 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.given_sources import inputs, sources_of
 from fbvm.cli.shared.options import CYCLE_NS, time_ns
 from fbvm.cli.shared.progress import show_progress
-from fbvm.cli.shared.run_recording import described, program_text, record_run
+from fbvm.cli.shared.run_recording import described, program_text, record_run, write_page
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, report_diagnostics, source_arguments
 from fbvm.cli.shared.terminal import say, say_json
+from fbvm.cli.shared.traces import statement_lines
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
@@ -28,7 +29,8 @@ from fbvm.prove.cycle import cycle_bounds, show_cycle
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, SpuriousRun, prove
 from fbvm.prove.pytest_text import pytest_text
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Question, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
+from fbvm.prove.ready import at_most_one, handshake
 from fbvm.prove.report import details, headline
 from fbvm.prove.runs import repeated
 from fbvm.prove.solver import SolverMissing
@@ -55,6 +57,9 @@ def _cycle(value: str) -> tuple[int, int]:
 @click.option("--never", multiple=True, metavar="EXPRESSION", help="It never holds behind a scan: 'Main.Up AND Main.Down'.")
 @click.option("--always", multiple=True, metavar="EXPRESSION", help="It holds behind every scan.")
 @click.option("--reach", multiple=True, metavar="EXPRESSION", help="Find the shortest run to a scan behind which it holds.")
+@click.option("--at-most-one", multiple=True, metavar="EXPRESSION,EXPRESSION...", help="Never two of them hold behind a scan.")
+@click.option("--handshake", multiple=True, metavar="INSTANCE",
+              help="Of its outputs Done, Busy, Error never two are TRUE, nor ENO and Error.")
 @click.option("--no-trap", is_flag=True, help="No scan ends in a trap.")
 @click.option("--within", nargs=3, multiple=True, metavar="TRIGGER EXPRESSION TIME",
               help="When TRIGGER becomes true, EXPRESSION holds behind a scan that begins TIME later at most.")
@@ -71,6 +76,7 @@ def _cycle(value: str) -> tuple[int, int]:
               help="Give up a property after this time on the clock of the wall.")
 @click.option("--seed", type=int, default=0, metavar="N", help="What random runs begin with.")
 @click.option("--trace", type=_FILE, metavar="FILE", help="Record the first run that is found for `fbvm chart`, `table`, `why`.")
+@click.option("--html", type=_FILE, metavar="FILE", help="Write the first run that is found as a page for a browser.")
 @click.option("--test", "test_file", type=_FILE, metavar="FILE", help="Write each run that is found as a test of pytest.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], never: tuple[str, ...],
@@ -88,11 +94,16 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     questions += [Question(WITHIN, text, options["assume"], options["free"], trigger=trigger, within_ns=time_ns(limit))
                   for trigger, text, limit in options["within"]]  # fmt: skip
     questions += [Question(NO_TRAP, "", options["assume"], options["free"])] * no_trap
-    if not questions and not pairs:
-        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within or --equal")
+    questions += _ready(lambda: [at_most_one([each.strip() for each in text.split(",")], options["assume"], options["free"])
+                                 for text in options["at_most_one"]])  # fmt: skip
+    if not questions and not pairs and not options["handshake"]:
+        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within, --at-most-one, --handshake "
+                               "or --equal")  # fmt: skip
     asked = [_equality(pair, files, libraries, options["assume"]) for pair in pairs]
-    if questions:
+    if questions or options["handshake"]:
         image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
+        questions += _ready(lambda: [handshake(Names(image), path, options["assume"], options["free"])
+                                     for path in options["handshake"]])  # fmt: skip
         asked += [(image, question) for question in questions]
     verdicts = []
     for image, question in asked:
@@ -107,6 +118,14 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if found := [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]:
         _keep(asked[-1][0], found, options, files, libraries, program)
     sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
+
+
+def _ready(make: Callable[[], list[Question]]) -> list[Question]:
+    """Properties in words.  Raises UsageError for names and numbers that do not fit."""
+    try:
+        return make()
+    except (UnknownPlace, ValueError) as error:
+        raise click.UsageError(str(error)) from None
 
 
 def _equality(pair: tuple[str, str], files: Sequence[Path], libraries: Sequence[Path],
@@ -174,24 +193,27 @@ def _as_dict(verdict: Verdict) -> dict[str, object]:
 
 def _keep(image: Image, found: Sequence[Verdict], options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],
           program: str | None) -> None:  # fmt: skip
-    """Writes the runs that were found into the files that --test and --trace name."""
+    """Writes the runs that were found into the files that --test, --trace and --html name."""
     if options["test_file"]:
         chosen = ({"program": program} if program else {}) | compile_options(files)
         with writing(options["test_file"]):
             write_file(options["test_file"], pytest_text(found, files, chosen))
-    if options["trace"]:
+    if options["trace"] or options["html"]:
         _record(image, found[0], options, files, libraries, program)
 
 
 def _record(image: Image, verdict: Verdict, options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],
             program: str | None) -> None:  # fmt: skip
-    """Writes the run of a verdict as a recording."""
+    """Writes the run of a verdict as a recording, and as a page."""
     assert verdict.run is not None
     about = {"journal": None, "trace": options["trace"], "selected": (), "verify": False, "depth": "scans"}
     plc = Plc(image, verdict.run.cycle_ns)
-    with record_run(about, {"proof": str(verdict.question), "cycle": show_cycle(*options["cycle"])}) as recorded:
+    with record_run(about, {"proof": str(verdict.question), "cycle": show_cycle(*options["cycle"])},
+                    in_memory=bool(options["html"])) as recorded:  # fmt: skip
         text = program_text(files, libraries, program=program, drawn=False, e_banks=(), **compile_options(files))
         recorded.add(files[0].stem, plc, described(plc, text, about, files, libraries))
         repeated(plc, verdict.run)
+        if options["html"]:
+            write_page(recorded, options["html"], statement_lines(image, files, libraries))
 
 

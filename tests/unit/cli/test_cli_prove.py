@@ -125,3 +125,34 @@ def test_without_the_solver_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
     result = CliRunner().invoke(command, [INTERLOCK, "--never", "Main.Left"])
     assert result.exit_code == 2
     assert "pip install 'fbvm[prove]'" in result.stderr
+
+
+BLOCK = """FUNCTION_BLOCK Job
+VAR_INPUT Execute, Fails : BOOL; END_VAR
+VAR_OUTPUT Done, Busy, Error : BOOL; END_VAR
+    Busy := Execute AND NOT Fails;
+    Error := Execute AND Fails;
+    Done := {};
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR_INPUT Execute, Fails : BOOL; END_VAR
+VAR job : Job; t : TON; END_VAR
+    job(Execute := Execute, Fails := Fails);
+END_PROGRAM
+"""
+
+
+def test_the_handshake_of_a_block_and_at_most_one(tmp_path: Path) -> None:
+    program, page = tmp_path / "job.st", tmp_path / "job.html"
+    program.write_text(BLOCK.format("FALSE"), encoding="utf-8")
+    result = proved(str(program), "--handshake", "Main.job", "--at-most-one", "Main.job.Busy, Main.job.Error", "--html", str(page))
+    assert (result.exit_code, [line.split(": ")[1] for line in result.stdout.splitlines()]) == (
+        0, ["PROVED by induction over 1 scan"] * 2)
+    assert not page.exists()  # there is no run to show
+    program.write_text(BLOCK.format("Execute"), encoding="utf-8")
+    broken = proved(str(program), "--handshake", "Main.job", "--html", str(page))
+    assert (broken.exit_code, broken.stdout.splitlines()[0]) == (
+        1, "handshake of Main.job (Busy, Done, Error): BROKEN after 1 scan, by the shortest run")
+    assert "Main.Execute" in page.read_text(encoding="utf-8")
+    assert "no two of the outputs" in proved(str(program), "--handshake", "Main.t").stderr
+    assert "name two or more" in proved(str(program), "--at-most-one", "Main.t.Q").stderr
