@@ -270,7 +270,7 @@ class Prover:
             if induction.step() == UNSAT:
                 how = f"by induction over {induction.depth + 1} scan{'s' * (induction.depth > 0)}"
                 if found:
-                    how += f" with {len(found)} invariants"
+                    how += f" with {len(found)} invariant{'s' * (len(found) > 1)}"
                 return self._verdict(UNREACHABLE if self.question.is_reach else PROVED, how)
         return None
 

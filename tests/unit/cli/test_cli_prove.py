@@ -145,9 +145,9 @@ END_PROGRAM
 def test_the_handshake_of_a_block_and_at_most_one(tmp_path: Path) -> None:
     program, page = tmp_path / "job.st", tmp_path / "job.html"
     program.write_text(BLOCK.format("FALSE"), encoding="utf-8")
-    result = proved(str(program), "--handshake", "Main.job", "--at-most-one", "Main.job.Busy, Main.job.Error", "--html", str(page))
-    assert (result.exit_code, [line.split(": ")[1] for line in result.stdout.splitlines()]) == (
-        0, ["PROVED by induction over 1 scan"] * 2)
+    two = ("--handshake", "Main.job", "--at-most-one", "Main.job.Busy, Main.job.Error")
+    result = proved(str(program), *two, "--html", str(page))
+    assert (result.exit_code, result.stdout.count(": PROVED by induction over 1 scan\n")) == (0, 2)
     assert not page.exists()  # there is no run to show
     program.write_text(BLOCK.format("Execute"), encoding="utf-8")
     broken = proved(str(program), "--handshake", "Main.job", "--html", str(page))
