@@ -79,9 +79,7 @@ def _cycle(value: str) -> tuple[int, int]:
 @click.option("--html", type=_FILE, metavar="FILE", help="Write the first run that is found as a page for a browser.")
 @click.option("--test", "test_file", type=_FILE, metavar="FILE", help="Write each run that is found as a test of pytest.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], never: tuple[str, ...],
-            always: tuple[str, ...], reach: tuple[str, ...], no_trap: bool, pairs: tuple[tuple[str, str], ...], as_json: bool,
-            **options: Any) -> None:  # fmt: skip
+def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     """Prove properties of a program for all inputs and all scans, or draw the shortest run that breaks one.
 
     Conditions are written as for `fbvm run --until`.  Inputs are free in each scan: %I, CIO that the program reads and never
@@ -89,13 +87,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
 
     Status 0 if all is proved or reached, 1 if a property is broken or undecided, 3 if the program has errors or cannot be
     followed."""
-    kinds = [(NEVER, never), (ALWAYS, always), (REACH, reach)]
-    questions = [Question(kind, text, options["assume"], options["free"]) for kind, texts in kinds for text in texts]
-    questions += [Question(WITHIN, text, options["assume"], options["free"], trigger=trigger, within_ns=time_ns(limit))
-                  for trigger, text, limit in options["within"]]  # fmt: skip
-    questions += [Question(NO_TRAP, "", options["assume"], options["free"])] * no_trap
-    questions += _ready(lambda: [at_most_one([each.strip() for each in text.split(",")], options["assume"], options["free"])
-                                 for text in options["at_most_one"]])  # fmt: skip
+    questions = _questions(options)
+    pairs = options["pairs"]
     if not questions and not pairs and not options["handshake"]:
         raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within, --at-most-one, --handshake "
                                "or --equal")  # fmt: skip
@@ -118,6 +111,18 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if found := [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]:
         _keep(asked[-1][0], found, options, files, libraries, program)
     sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
+
+
+def _questions(options: dict[str, Any]) -> list[Question]:
+    """What the options ask that needs no program to be written down."""
+    assumed, free = options["assume"], options["free"]
+    kinds = [(NEVER, options["never"]), (ALWAYS, options["always"]), (REACH, options["reach"])]
+    found = [Question(kind, text, assumed, free) for kind, texts in kinds for text in texts]
+    found += [Question(WITHIN, text, assumed, free, trigger=trigger, within_ns=time_ns(limit))
+              for trigger, text, limit in options["within"]]  # fmt: skip
+    found += [Question(NO_TRAP, "", assumed, free)] * options["no_trap"]
+    return found + _ready(lambda: [at_most_one([each.strip() for each in text.split(",")], assumed, free)
+                                   for text in options["at_most_one"]])  # fmt: skip
 
 
 def _ready(make: Callable[[], list[Question]]) -> list[Question]:
