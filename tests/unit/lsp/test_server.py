@@ -79,15 +79,13 @@ class Editor(LanguageClient):
 
 
 BEGIN: dict[str, Any] = {"id": 1, "method": "initialize", "params": {"capabilities": {}, "processId": None, "rootUri": None}}
+END: tuple[dict[str, Any], ...] = ({"id": 2, "method": "shutdown"}, {"method": "exit"})
+LSP = [sys.executable, "-m", "fbvm", "lsp"]
 
 
-def told(*messages: dict[str, Any], after: bytes = b"") -> subprocess.CompletedProcess[bytes]:
-    """What a server does that is told all this at once."""
-    said = b""
-    for message in messages:
-        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
-        said += b"Content-Length: %d\r\n\r\n" % len(body) + body
-    return subprocess.run([sys.executable, "-m", "fbvm", "lsp"], input=said + after, capture_output=True, check=False, timeout=60)
+def encoded(*messages: dict[str, Any]) -> bytes:
+    bodies = [json.dumps({"jsonrpc": "2.0", **message}).encode() for message in messages]
+    return b"".join(b"Content-Length: %d\r\n\r\n" % len(body) + body for body in bodies)
 
 
 def conversation(folder: Path, talk: Callable[[Editor], Awaitable[None]], *names: str) -> None:
@@ -280,23 +278,33 @@ def test_keys_that_come_faster_than_checks_end_in_the_right_diagnostics(folder: 
 
 
 def test_the_end_of_a_conversation_is_the_end_of_the_process_without_a_word() -> None:
-    done = told(BEGIN, {"method": "initialized", "params": {}}, {"id": 2, "method": "shutdown"}, {"method": "exit"})
+    said = encoded(BEGIN, {"method": "initialized", "params": {}}, *END)
+    done = subprocess.run(LSP, input=said, capture_output=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, b"") and b'"id": 2' in done.stdout
 
 
 def test_what_is_refused_is_an_answer_and_no_fault_of_the_server() -> None:
-    settings: dict[str, Any] = {"dialect": {"a": 1}, "libraries": 5}
+    settings = {"initializationOptions": {"dialect": {"a": 1}, "libraries": 5}}
     document = {"uri": "file:///nowhere/a.st"}
-    done = told(BEGIN | {"params": {**BEGIN["params"], "initializationOptions": settings}},
-                {"method": "textDocument/didOpen", "params": {"textDocument": document | {
-                    "languageId": "iecst", "version": 1, "text": "PROGRAM M VAR n : INT; END_VAR n := 1; END_PROGRAM"}}},
-                {"id": 3, "method": "textDocument/rename", "params": {
-                    "textDocument": document, "position": {"line": 0, "character": 14}, "newName": ""}},
-                {"id": 2, "method": "shutdown"}, {"method": "exit"})  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, b"")
-    assert b"is no name" in done.stdout
+    text = "PROGRAM M VAR n : INT; END_VAR n := 1; END_PROGRAM"
+    with subprocess.Popen(LSP, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0) as process:
+        assert process.stdin is not None and process.stdout is not None
+        process.stdin.write(encoded(
+            BEGIN | {"params": BEGIN["params"] | settings},
+            {"method": "textDocument/didOpen", "params": {
+                "textDocument": document | {"languageId": "iecst", "version": 1, "text": text}}},
+            {"id": 3, "method": "textDocument/rename", "params": {
+                "textDocument": document, "position": {"line": 0, "character": 14}, "newName": ""}}))  # fmt: skip
+        said = b""
+        while b'"id": 3' not in said:
+            said += (more := process.stdout.read(1 << 16))
+            assert more, said
+        assert b"is no name" in said
+        rest, wrong = process.communicate(encoded(*END), timeout=60)
+    assert (process.returncode, wrong) == (0, b"") and b'"id": 2' in rest
 
 
 def test_a_message_longer_than_any_memory_ends_the_server_with_a_sentence() -> None:
-    done = told(BEGIN, after=b"Content-Length: 99999999999999999999\r\n\r\n{}")
+    said = encoded(BEGIN) + b"Content-Length: 99999999999999999999\r\n\r\n{}"
+    done = subprocess.run(LSP, input=said, capture_output=True, check=False, timeout=60)
     assert done.returncode == 1 and done.stderr == b"Error: the editor has begun a message that is longer than any memory\n"
