@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, EnumType, RefType, StringType, Type, derives, fold, followed
 from fbvm.check.calls.arguments import MIXED, MIXED_HINT, mixed, output
-from fbvm.check.expressions import references
+from fbvm.check.expressions import aggregates, references
 from fbvm.check.expressions.assignability import same
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
@@ -174,6 +174,10 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
         scope.error("S0405", value, f"{variable.name} is {variable.type}, and {kind} is or holds an instance",
                     "pass a variable of it")
         return False
+    if isinstance(variable.type, AnyType) and variable.by_reference and scope.pou is not None and \
+            (member := scope.facts.fields.get(value)) is not None and member.bit is not None:
+        scope.facts.copies[value] = aggregates.in_frame(scope, value, BOOL, "copy of a bit")
+        return True
     numbers = scope.dialect.numbers_of_enumerations
     if not same(kind.base if numbers and isinstance(kind, EnumType) else kind, variable.type) and \
             not _long_enough(kind, variable) and not (is_block(variable.type) and derives(kind, variable.type)):

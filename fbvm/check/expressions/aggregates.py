@@ -36,8 +36,7 @@ def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
     values = list(_values(scope, want, expr, (0,)))
     content = bytearray(_initial_bytes(scope.project, want))
     parts = [part for part in (_part(scope, value, content) for value in values) if part is not None]
-    scope.project.dependencies.repeatable = False  # the frame becomes larger
-    scope.facts.aggregates[expr] = Aggregate(_place(scope, expr, want), bytes(content), tuple(parts))
+    scope.facts.aggregates[expr] = Aggregate(in_frame(scope, expr, want, _form(expr)), bytes(content), tuple(parts))
     return want
 
 
@@ -57,13 +56,14 @@ def _form(expr: Written) -> str:
     return "an array [...]" if isinstance(expr, tree.ArrayInit) else "a structure (name := value)"
 
 
-def _place(scope: Scope, expr: Written, kind: Type) -> Variable:
-    """A new variable for the whole in the frame of the POU that is executed."""
+def in_frame(scope: Scope, expr: tree.Expr, kind: Type, what: str) -> Variable:
+    """A new variable for a value in the frame of the POU that is executed."""
     pou = scope.pou
     assert pou is not None
+    scope.project.dependencies.repeatable = False  # the frame becomes larger
     owner = pou.owner
     owner.frame_size += -owner.frame_size % 8
-    made = Variable(f"{_form(expr)} at {expr.start}", kind, "VAR_TEMP", pou.source, expr, owner, place="frame",
+    made = Variable(f"{what} at {expr.start}", kind, "VAR_TEMP", pou.source, expr, owner, place="frame",
                     offset=owner.frame_size)
     owner.frame_size += kind.size
     return made

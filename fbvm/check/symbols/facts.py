@@ -372,6 +372,8 @@ class Facts:
     """Calls whose result is the whole value of an assignment."""
     reversed_bytes: set[tree.Call] = field(default_factory=set)
     """Calls whose result is the argument with its bytes in another order."""
+    copies: dict[tree.Expr, Variable] = field(default_factory=dict)
+    """Arguments on single bits for an ANY input, which reads a copy that fills a byte: the variable with the copy."""
     aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
     """Statements that name an ACTION without (), with the calls that they mean."""

@@ -43,7 +43,8 @@ def _extent(body: BodyContext, expr: tree.Expr, kind: Type) -> tuple[Node, Node,
         whole = kind.count // 8 if not body.place(expr).bit else 0
         return ("const", "i64", whole), ("const", "i64", kind.count), ("const", "i64", 1)
     if base(kind) == BOOL:
-        return _fills_byte(body.place(expr)), ("const", "i64", 1), ("const", "i64", 8)
+        filled: Node = ("const", "i64", 1) if expr in body.facts.copies else _fills_byte(body.place(expr))
+        return filled, ("const", "i64", 1), ("const", "i64", 8)
     if _element(kind) == BOOL:
         return size, size, ("const", "i64", 8)
     return size, ("mul", "i64", size, ("const", "i64", 8)), ("const", "i64", 1)

@@ -215,6 +215,10 @@ def _inputs(callee: Callee, site: int) -> None:
 
 
 def _argument(body: BodyContext, variable: Variable, expr: tree.Expr) -> Node:
+    if (copy := body.facts.copies.get(expr)) is not None:
+        held = body.to_temporary(body.value(expr, BOOL))
+        body.emit(body.slot(copy).store(held, body.site(expr)))
+        return body.slot(copy).reference()
     if variable.kind == "VAR_IN_OUT":
         return body.place(expr).reference()
     if isinstance(variable.type, RefType) and variable.type.follows:
