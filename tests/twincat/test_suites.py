@@ -9,6 +9,7 @@ import pytest
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_text
+from fbvm.testing.suites import results
 from fbvm.testing.suites.program import find_suites
 from fbvm.testing.suites.results import SuiteRun, run_suites
 from fbvm.testing.suites.xunit import write_xunit
@@ -55,6 +56,29 @@ def test_suites_and_the_names_of_their_tests_are_found_without_running() -> None
     assert [(test.name, test.skipped) for test in found[0].tests] == [
         ("one", False), ("two", False), ("first", False), ("second", False), ("three", True)]
     assert find_suites([Source("a.st", SUITE + "PROGRAM P VAR a : FB_A_Test; END_VAR a(); END_PROGRAM")]) == []
+
+
+def test_the_line_of_a_failure_is_that_of_the_assertion_with_its_message() -> None:
+    [suite] = find_suites([Source("a.st", SUITE + PROGRAM.format("a : FB_A_Test;"))])
+    one = suite.tests[0]
+    assert one.asserts == (("five", 5), ("four", 6))
+    assert one.line_of("EXP: 5, ACT: 4, MSG: four") == 6
+    assert one.line_of("EXP: 5, ACT: 4, MSG: six") is None
+
+
+@pytest.mark.slow
+def test_runs_that_are_not_recorded_are_done_again_up_to_their_failures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(results, "OWN", "a function that TcUnit has not")
+    run = ran("a : FB_A_Test;", "PRG_TEST.a")
+    assert run.recorded is None
+    failed = {name: result for (_, name), result in run.results.items() if result.failed}
+    assert set(failed) == {"one", "first"}
+    lines = []
+    for result in failed.values():
+        [failure] = result.failures
+        assert result.recorded is not None and result.recorded.scans.stop == failure.scan + 1
+        lines.append(failure.site.line if failure.site is not None else None)
+    assert lines == [6, 16]
 
 
 @pytest.mark.slow

@@ -174,10 +174,21 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
         scope.error("S0405", value, f"{variable.name} is {variable.type}, and {kind} is or holds an instance",
                     "pass a variable of it")
         return False
-    if isinstance(variable.type, AnyType) and variable.by_reference and scope.pou is not None and \
-            (member := scope.facts.fields.get(value)) is not None and member.bit is not None:
+    if isinstance(variable.type, AnyType) and _is_read_bit(scope, value, variable):
         scope.facts.copies[value] = aggregates.in_frame(scope, value, BOOL, "copy of a bit")
         return True
+    return _has_its_type(scope, value, kind, variable)
+
+
+def _is_read_bit(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
+    """True for a member on a single bit that an ANY input reads."""
+    member = scope.facts.fields.get(value)
+    return variable.by_reference and scope.pou is not None and member is not None and member.bit is not None
+
+
+def _has_its_type(scope: Scope, value: tree.Expr, kind: Type, variable: Variable) -> bool:
+    """True if an argument has the type of its in-out; else a diagnostic."""
+    role = variable.role_of_parameter
     numbers = scope.dialect.numbers_of_enumerations
     if not same(kind.base if numbers and isinstance(kind, EnumType) else kind, variable.type) and \
             not _long_enough(kind, variable) and not (is_block(variable.type) and derives(kind, variable.type)):

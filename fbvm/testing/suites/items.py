@@ -15,8 +15,10 @@ import pytest
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import dialect as named_dialect
 from fbvm.code.compiler import compile_sources
+from fbvm.code.image import Site
 from fbvm.interchange.twincat import PROJECT_SUFFIX
 from fbvm.interchange.twincat.project import read_project
+from fbvm.record.recording.recording import PlcRecording
 from fbvm.testing.pages import write_page
 from fbvm.testing.session import failure_page
 from fbvm.testing.subject import Subject, SubjectError
@@ -111,9 +113,9 @@ class SuiteItem(pytest.Item):
         for name, result in self._results(run):
             self.user_properties += [("plc_seconds", result.duration_s), ("assertions", result.asserts)]
             if result.failed:
-                raise self._failed(run, name, result.failures, "an assertion failed")
+                raise self._failed(name, result.recorded, result.failures, "an assertion failed")
             if not result.finished and not result.skipped:
-                raise self._failed(run, name, [], self._unfinished(run))
+                raise self._failed(name, run.recorded, [], self._unfinished(run))
 
     def _results(self, run: SuiteRun) -> list[tuple[str, SuiteTestResult]]:
         """The results that this test is about, by name."""
@@ -122,8 +124,8 @@ class SuiteItem(pytest.Item):
             named = {item.test.name for item in self.session.items if isinstance(item, SuiteItem) and item.suite == self.suite}
             return [(name, result) for name, result in own.items() if name not in named]
         if self.test.name not in own:
-            raise self._failed(run, self.test.name, [], run.plc.trap and f"not executed: the program stopped: {run.plc.trap}"
-                               or "the suite never executed it")
+            stopped = f"not executed: the program stopped: {run.plc.trap}" if run.plc.trap else "the suite never executed it"
+            raise self._failed(self.test.name, run.recorded, [], stopped)
         return [(self.test.name, own[self.test.name])]
 
     def _unfinished(self, run: SuiteRun) -> str:
@@ -131,12 +133,12 @@ class SuiteItem(pytest.Item):
             return f"not finished: the program stopped: {run.plc.trap}"
         return f"TEST_FINISHED was never reached within {show_time(run.plc.elapsed_ns)[2:]} of the PLC's time"
 
-    def _failed(self, run: SuiteRun, name: str, failures: list[Failure], said: str) -> SuiteTestFailed:
+    def _failed(self, name: str, recorded: PlcRecording | None, failures: list[Failure], said: str) -> SuiteTestFailed:
         made = SuiteTestFailed(self.suite, name, failures, said)
         subject = self.parent.subject
         assert subject is not None
         said = self._said(made)
-        if (recorded := run.recorded) is not None:
+        if recorded is not None:
             made.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, recorded, subject, [], said))
         return made
 
@@ -154,6 +156,8 @@ class SuiteItem(pytest.Item):
         lines = []
         for failure in error.failures:
             when = f"scan {failure.scan} ({show_time(failure.now_ns)[2:]})"
+            if failure.site is None and (at := self.test.line_of(failure.text)) is not None:
+                failure.site = Site(self.test.file, "", at, 1)
             if failure.site is None:
                 lines += [f"{head}, {when}", f"E   {failure.text}"]
                 continue

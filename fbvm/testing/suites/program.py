@@ -29,6 +29,14 @@ class FoundTest:
     file: str
     line: int
     skipped: bool = False
+    asserts: tuple[tuple[str, int], ...] = ()
+    """The messages of its assertions, as far as they are literals, and their lines."""
+
+    def line_of(self, failure: str) -> int | None:
+        """The line of the assertion that has told of a failure; None if its message tells it not from others."""
+        said = failure.rpartition(", MSG: ")[2] if ", MSG: " in failure else ""
+        lines = [line for message, line in self.asserts if message.strip() == said.strip()]
+        return lines[0] if len(lines) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -80,17 +88,30 @@ def _suite(path: str, block: str, pous: Pous) -> FoundSuite | None:
     tests: dict[str, FoundTest] = {}
     others = False
     for node, source in lineage:
-        for call in sorted(_calls(node), key=lambda each: each.start):
+        calls = sorted(_calls(node), key=lambda each: each.start)
+        for position, call in enumerate(calls):
             if _called(call) not in BEGINS or not call.arguments:
                 continue
             value = call.arguments[0].value
             if isinstance(value, tree.Literal) and isinstance(value.value, str):
                 name, skipped = value.value.strip(), value.value.strip().lower().startswith(DISABLED)
                 name = name[len(DISABLED):] if skipped else name
-                tests.setdefault(name, FoundTest(name, source.name, source.place(call.start)[0], skipped))
+                tests.setdefault(name, FoundTest(name, source.name, source.place(call.start)[0], skipped,
+                                                 tuple(_asserts(calls[position + 1:], source))))
             else:
                 others = True
     return FoundSuite(path, tuple(tests.values()), others)
+
+
+def _asserts(calls: Sequence[tree.Call], source: Source) -> Iterator[tuple[str, int]]:
+    """Message and line of each assertion up to the next test."""
+    for call in calls:
+        if _called(call) in BEGINS:
+            return
+        if _called(call).startswith("ASSERT"):
+            given = [each.value for each in call.arguments if each.name is None or fold(each.name.text) == "MESSAGE"]
+            texts = [value.value for value in given if isinstance(value, tree.Literal) and isinstance(value.value, str)]
+            yield texts[-1] if texts else "", source.place(call.start)[0]
 
 
 def _calls(node: tree.Node) -> Iterator[tree.Call]:

@@ -13,6 +13,7 @@ from fbvm.code.image import Image, Site
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.recording.recording import PlcRecording, Recording
 from fbvm.record.trace.events import Call, Event
+from fbvm.watch.paths import Place, UnknownPlace, find
 
 LIMIT_NS = 60_000_000_000
 """Virtual time after which suites that are not finished count as never finishing."""
@@ -23,6 +24,10 @@ ERROR = 4
 """The kind of message that a failed assertion writes."""
 LAST = "| ====================================="
 LOG, COUNT, KEPT = "TwinCAT_Log", "TwinCAT_LogCount", 256
+MOST_TESTS = 100
+"""Tests of a suite that are looked at while TcUnit runs it."""
+MOST_AGAIN, MOST_TOGETHER, BEFORE = 10, 5, 20
+"""With TcUnit's own sources: scans that are done again to be shown, tests that may fail in one of them, scans in front of it."""
 OWN = "TcUnit_Execute"
 """A function that only fbvm's own library of suites has."""
 _FAILED = re.compile(r"FAILED TEST '(.+)@(.*?)', (EXP: .*)", re.S)
@@ -49,6 +54,8 @@ class SuiteTestResult:
     asserts: int
     duration_s: float
     failures: list[Failure] = field(default_factory=list)
+    recorded: PlcRecording | None = None
+    """The scans to show of it if it failed: all of the run, with TcUnit's own sources those up to the one in which it failed."""
 
 
 @dataclass
@@ -57,8 +64,7 @@ class SuiteRun:
 
     plc: Plc
     recorded: PlcRecording | None
-    """Its scans.  None where TcUnit itself runs the suites: that executes some hundred thousand statements for each failed
-    assertion, and tells of it some cycles later, so that nothing of its run is executed again to be shown."""
+    """Its scans.  None where TcUnit itself runs the suites, whose memory of a hundred megabytes takes long to keep."""
     results: dict[tuple[str, str], SuiteTestResult]
     is_over: bool
     """False if the run was ended by a trap or by the limit."""
@@ -68,27 +74,104 @@ def run_suites(image: Image, suites: Sequence[str], limit_ns: int = LIMIT_NS) ->
     """Runs a program until its suites have reported, or the limit is reached.
 
     image: a program that runs suites.  suites: their paths.  limit_ns: virtual time."""
-    intervals = [task.interval_ns for task in image.tasks if task.interval_ns]
-    plc = Plc(image, min(intervals, default=CYCLE_NS), budget=BUDGET)
+    plc = _plc(image)
     is_light = any(body.name == OWN for body in image.bodies)
     recorded = Recording().add("suites", plc) if is_light else None
-    failures: list[tuple[str, str, Failure]] = []
-    seen, is_over = 0, False
-    while not is_over and plc.elapsed_ns < limit_ns and plc.scan() is None:
-        count = _number(plc, COUNT)
-        for number in range(max(seen, count - KEPT), count):
-            text = str(plc.read(f"{LOG}[{number % KEPT}].Text"))
-            is_over = is_over or text.startswith(LAST)
-            if (match := _FAILED.match(text)) and plc.read(f"{LOG}[{number % KEPT}].Mask") == ERROR:
-                failures.append((match[1], match[2], Failure(match[3], plc.scans - 1, plc.now_ns)))
-        seen = count
+    log, failed_in = _Log(plc), _FailedIn(plc, () if is_light else suites)
+    while not log.is_over and plc.elapsed_ns < limit_ns and plc.scan() is None:
+        failed_in.look()
+        log.look()
     if recorded is not None:
-        _place(recorded, [each for _, _, each in failures])
-    results = {(path, name): result for path in suites for name, result in _results(plc, path)}
-    for path, name, failure in failures:
+        _place(recorded, [each for _, _, each in log.failures])
+    tests = {(path, number): (name, result) for path in suites for number, (name, result) in enumerate(_results(plc, path), 1)}
+    results = {(path, name): result for (path, _), (name, result) in tests.items()}
+    for result in results.values():
+        result.recorded = recorded
+    for path, name, failure in log.failures:
         if (path, name) in results:
             results[path, name].failures.append(failure)
-    return SuiteRun(plc, recorded, results, is_over)
+    _show_again(image, [(scan, tests[key][1]) for key, scan in failed_in.scans.items() if key in tests])
+    return SuiteRun(plc, recorded, results, log.is_over)
+
+
+class _Log:
+    """What suites write into the log: failures, and the line that ends the report."""
+
+    def __init__(self, plc: Plc) -> None:
+        self.plc = plc
+        self.is_over = False
+        self.failures: list[tuple[str, str, Failure]] = []
+        """Path of the suite, name of the test, and the failure."""
+        self._seen = 0
+
+    def look(self) -> None:
+        """Read what was written in the last scan."""
+        plc = self.plc
+        count = _number(plc, COUNT)
+        for number in range(max(self._seen, count - KEPT), count):
+            text = str(plc.read(f"{LOG}[{number % KEPT}].Text"))
+            self.is_over = self.is_over or text.startswith(LAST)
+            if (match := _FAILED.match(text)) and plc.read(f"{LOG}[{number % KEPT}].Mask") == ERROR:
+                self.failures.append((match[1], match[2], Failure(match[3], plc.scans - 1, plc.now_ns)))
+        self._seen = count
+
+
+class _FailedIn:
+    """Notes the scan in which each test has failed, by the path of its suite and its number."""
+
+    def __init__(self, plc: Plc, suites: Sequence[str]) -> None:
+        self.plc = plc
+        self.scans: dict[tuple[str, int], int] = {}
+        self._flags = _flags(plc, suites)
+
+    def look(self) -> None:
+        """Look at the flags of all tests."""
+        memory, scan = self.plc.memory.u8, self.plc.scans - 1
+        failed = [key for key, at in self._flags.items() if memory[at]]
+        for key in failed:
+            self.scans[key] = scan
+            del self._flags[key]
+
+
+def _plc(image: Image) -> Plc:
+    """A PLC at the cycle of its quickest task."""
+    intervals = [task.interval_ns for task in image.tasks if task.interval_ns]
+    return Plc(image, min(intervals, default=CYCLE_NS), budget=BUDGET)
+
+
+def _flags(plc: Plc, suites: Sequence[str]) -> dict[tuple[str, int], int]:
+    """Where in the memory it stands whether a test has failed, by the path of its suite and its number."""
+    found = {}
+    for suite in suites:
+        for number in range(1, MOST_TESTS + 1):
+            try:
+                place = find(plc.image.symbols, plc.memory.areas, f"{suite}.Tests[{number}].TestIsFailed")
+            except UnknownPlace:
+                break
+            if isinstance(place, Place) and place.bit is None and not place.hops:
+                found[suite, number] = place.offset
+    return found
+
+
+def _show_again(image: Image, failed: list[tuple[int, SuiteTestResult]]) -> None:
+    """Does the run again up to the first scans in which tests failed, which are recorded, and finds their places in them.
+
+    failed: scans and the tests that failed in them.  TcUnit tells of a failure some cycles later, and executes some hundred
+    thousand statements for it: scans in which many assertions fail are left out."""
+    for scan in sorted({scan for scan, _ in failed})[:MOST_AGAIN]:
+        here = [test for each, test in failed if each == scan]
+        failures = [failure for test in here for failure in test.failures]
+        if len(failures) > MOST_TOGETHER:
+            continue
+        plc = _plc(image)
+        plc.run(scans=max(scan - BEFORE, 0))
+        recorded = Recording().add("suites", plc)
+        plc.run(scans=scan + 1 - plc.scans)
+        for failure in failures:
+            failure.scan, failure.now_ns = scan, plc.now_ns
+        _place(recorded, failures)
+        for test in here:
+            test.recorded = recorded
 
 
 def _results(plc: Plc, suite: str) -> Iterator[tuple[str, SuiteTestResult]]:
