@@ -11,14 +11,23 @@ from pathlib import Path
 
 import pytest
 
+from fbvm.testing.session import UNEXPLAINED
+
 PLUGIN = "fbvm.testing.plugin"
 QUIET = ("-q", "--no-header", "-p", "no:cacheprovider", "-p", "no:unraisableexception", "--fbvm-pages", "0", "--capture=sys")
 """Options of pytest: it writes no files, and does not look through all objects at its end, which takes as long as quick tests."""
 SETTINGS = ("pytest.ini", ".pytest.ini", "pyproject.toml", "tox.ini", "setup.cfg")
 
 
-def run_pytest(arguments: Sequence[str], plugins: Sequence[object]) -> int:
-    """Runs pytest: its exit status.
+class _Unexplained:
+    """A plugin of pytest: fbvm does not explain why tests fail."""
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        config.stash[UNEXPLAINED] = True
+
+
+def run_pytest(arguments: Sequence[str], plugins: Sequence[object], explained: bool = False) -> int:
+    """Runs pytest: its exit status.  Failures are `explained` if somebody reads them.
 
     The folder is the root of the tests if no settings of pytest say another one, also where a test below it is named.  Modules
     of the folder are forgotten afterwards, since they may hold programs that were compiled from what it held."""
@@ -28,7 +37,7 @@ def run_pytest(arguments: Sequence[str], plugins: Sequence[object]) -> int:
     options = [*QUIET, *([] if has_settings else ["--rootdir", str(here)]), *([] if installed else ["-p", PLUGIN]),
                *(["-n", "0"] if find_spec("xdist") else [])]  # fmt: skip
     try:
-        return int(pytest.main([*options, *arguments], plugins))
+        return int(pytest.main([*options, *arguments], [*plugins, *([] if explained else [_Unexplained()])]))
     finally:
         sys.path[:] = path
         for name, module in list(sys.modules.items()):

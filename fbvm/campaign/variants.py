@@ -41,8 +41,8 @@ class Cut:
     is_cold: bool = False
 
     def __str__(self) -> str:
-        cold = " cold" * self.is_cold
-        return f"power{cold} {self.plc} {show_time(self.at_ns)[2:]}..{show_time(self.at_ns + self.off_ns)[2:]}"
+        which = " cold" * self.is_cold + f" {self.plc}" * bool(self.plc)
+        return f"power{which} {show_time(self.at_ns)[2:]}..{show_time(self.at_ns + self.off_ns)[2:]}"
 
 
 @dataclass(frozen=True)

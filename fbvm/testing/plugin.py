@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pytest
 
 from fbvm.base.data import PACKAGE
-from fbvm.testing.session import MOST_PAGES, count_coverage, failure_page, library_folders, search_folders, varied_run
+from fbvm.testing.session import MOST_PAGES, count_coverage, explains, failure_page, library_folders, search_folders, varied_run
 from fbvm.testing.warning_plugin import NAME as WARNINGS
 from fbvm.testing.warning_plugin import WarningPlugin, add_options, warning_plugin
 
@@ -218,7 +218,7 @@ def pytest_runtest_makereport(
     if call.excinfo is not None and RIGS in item.stash and not item.config.option.fulltrace:
         _shorten(call.excinfo.value)
     report = yield
-    if report.failed and call.when == "call" and call.excinfo is not None:
+    if report.failed and call.when == "call" and call.excinfo is not None and explains(item.config):
         failure = _assertion(call.excinfo, item)
         for rig, lines in _rigs_read(call.excinfo, _rigs(item)):
             text = "\n\n".join(part for part in (rig.explain(lines), _page(item, rig, lines, failure)) if part)

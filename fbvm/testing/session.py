@@ -21,10 +21,17 @@ PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
 """The pages that the session has written for failed tests."""
 VARIED: pytest.StashKey[VariedRun] = pytest.StashKey()
 """In the stash of the configuration: what the campaign that executes the session varies in the test that runs now."""
+UNEXPLAINED: pytest.StashKey[bool] = pytest.StashKey()
+"""In the stash of the configuration: that nobody reads why tests fail, which takes longer to find out than to execute them."""
 MOST_PAGES = 20
 """Pages that one session writes unless --fbvm-pages says another number."""
 SOURCE_FOLDER = "src"
 """The folder of a project's blocks, beside its pytest.ini or pyproject.toml."""
+
+
+def explains(config: pytest.Config) -> bool:
+    """True if somebody reads why tests of the session fail."""
+    return not config.stash.get(UNEXPLAINED, False)
 
 
 def varied_run(config: pytest.Config) -> VariedRun | None:

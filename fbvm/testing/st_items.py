@@ -31,7 +31,7 @@ from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
 from fbvm.testing.rig import Trapped
-from fbvm.testing.session import add_coverage, covered, failure_page, library_folders, varied_run
+from fbvm.testing.session import add_coverage, covered, explains, failure_page, library_folders, varied_run
 from fbvm.testing.subject import LIBRARY, Subject, SubjectError, subject
 from fbvm.testing.warning_plugin import warning_plugin
 from fbvm.watch.names import Names, is_single
@@ -102,6 +102,8 @@ class StItem(pytest.Item):
                 finally:
                     add_coverage(self.config, made, counts)
         except AssertFailed as failed:
+            if not explains(self.config):
+                raise
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
             recorded.follow(table, range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1))
             failed.table = table.draw([band for band in table.bands if band.has_changes][-BANDS:]) if failed.values else ""

@@ -73,11 +73,11 @@ class ItemsExecution:
         return self.results([variant])[0]
 
     def within(self, body: Callable[[ItemsSession], Made], *options: str) -> Made:
-        """What `body` makes of a session of pytest, which gets further `options`.  Raises NoTests."""
+        """What `body` makes of a session of pytest, which with further `options` explains failures, too.  Raises NoTests."""
         made: list[Made] = []
         session, said = _Session(self.plan, lambda session: made.append(body(session))), io.StringIO()
         with chdir(self.folder), redirect_stdout(said), redirect_stderr(said):
-            status = run_pytest([*options, *self.plan.tests], [session])
+            status = run_pytest([*options, *self.plan.tests], [session], explained=bool(options))
         self.report = said.getvalue().strip()
         if session.error:
             raise session.error

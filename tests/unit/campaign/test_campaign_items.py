@@ -142,3 +142,18 @@ def test_plcs_of_a_plant_are_varied_by_their_names(project: Path) -> None:
     found = [(rig["kept"], rig["limit"], rig.plc.cycle_ns) for rig in plant.rigs.values()]
     assert found == [(6, 3, 10_000_000), (5, 5, 20_000_000)]
     assert plant.network.faults == [fault("silent")]
+
+
+@pytest.mark.slow
+def test_failures_are_explained_where_somebody_reads_them_only(project: Path) -> None:
+    """To find out why a variable has its value takes many times as long as the run."""
+    from fbvm.campaign.items.bench import plan_of_tests
+    from fbvm.campaign.plan_file import Written as InFile
+
+    (project / "tests" / "test_counter.py").write_text(TESTS.replace("< 15", "< 5"))
+    bench = ItemsBench.of(plan_of_tests(InFile(), ["tests/test_counter.py"]), project)
+    execution, because = bench.execution(), "Total is 5 since scan 4 (40ms), by src/Counter.st:6"
+    result = execution.result(bench.variant(0))
+    assert result.failure and because not in execution.report
+    again, _ = execution.recorded(bench.variant(0), project / "run.fbtrace")
+    assert again == result and because in execution.report
