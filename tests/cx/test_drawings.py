@@ -75,3 +75,15 @@ def test_a_picture_has_its_right_rails_in_one_column(tmp_path: Path) -> None:
     rails = [max(float(x) for x in re.findall(r"[ML]([\d.]+) ", wire)) for wire in wires]
     assert len(rails) >= 3
     assert len(set(rails)) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("step", "shown"), [("TIM 0001 #0030", "0001 = #0027"), ("TIMX(550) 0001 &30", "0001 = 27")])
+def test_executed_rungs_show_present_values_and_what_blocks_gave(tmp_path: Path, step: str, shown: str) -> None:
+    file = tmp_path / "line.cxt"
+    file.write_bytes(SAMPLE.bytes().replace(b"OUT Pump\n", f"OUT Pump\n{step}\n".encode()))
+    done = CliRunner().invoke(main, ["run", str(file), "--set", "Start_PB=TRUE", "--set", "D100=21", "--scans", "32",
+                                     "--ladder", "31"])  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert f"│ {shown} " in done.output
+    assert "├─D101 = 42" in done.output

@@ -12,6 +12,7 @@ from fbvm.record.draw.table import ScanState
 from fbvm.record.trace.events import Read, Write
 from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.ladder.drawing.diagram import joined
+from fbvm.syntax.ladder.instructions.instruction_set import is_bcd_number, number_area
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, UnknownPlace, find_place
 
@@ -24,22 +25,49 @@ class RungValues:
         self._names = Names.of(image, areas)
 
     def keep(self, plc: ScanState, made: RungExecution, event: Read | Write) -> None:
-        """Keeps the value of a read or write in an execution of a rung; a `Keep` for `PowerFlow`."""
+        """Keeps the value of a read or write in an execution of a rung; the `keep` of a `Keeper`."""
         bit = event.bit if event.bit != WHOLE_BYTES else None
         place = self._names.at(event.offset, bit)
         if place is not None and len(event.value) <= 8:
             text = Signal(place, place.name).text(self._names.read(plc.read, place))
             made.values[event.site, event.offset, bit] = text.replace(" ", "")
 
+    def finish(self, plc: ScanState, made: RungExecution) -> None:
+        """Keeps, for operands of boxes that the rung itself has not read or written, what they are when the program is over: the
+        present values of timers and counters, and what blocks give; the `finish` of a `Keeper`."""
+        instance = self._names.instance(made.base)
+        for site, _, mnemonic, operands in made.picture.steps:
+            if joined(mnemonic) is None:
+                for operand in operands:
+                    self._finish(plc, made, site, mnemonic, operand.partition("=>")[2] or operand, instance)
+
+    def _finish(self, plc: ScanState, made: RungExecution, site: int, mnemonic: str, operand: str, instance: str) -> None:
+        place = self._place(mnemonic, operand, instance)
+        if place is None or place.type.size > 8:
+            return
+        where = place.offset, place.bit
+        if (site, *where) not in made.values and (made.picture.site, *where) not in made.values:
+            value = self._names.read(plc.read, place)
+            is_decimal = is_bcd_number(mnemonic) and isinstance(value, int)
+            made.values[site, place.offset, place.bit] = f"#{value:04X}" if is_decimal else (
+                Signal(place, place.name).text(value).replace(" ", ""))  # fmt: skip
+
+    def _place(self, mnemonic: str, operand: str, instance: str) -> Place | None:
+        """Where an operand lies; of a timer or counter its present value."""
+        area = number_area(mnemonic)
+        if area and (number := operand.upper().removeprefix(area)).isdecimal():
+            return self._find(f"{area}{int(number)}")
+        return self._find(f"{instance}.{operand}") or self._find(operand.lstrip("%"))
+
     def of(self, made: RungExecution) -> Callable[[int, str], str]:
         """A function from step and operand to the value in an execution of a rung, "" for an operand without one."""
         instance = self._names.instance(made.base)
 
         def value(step: int, operand: str) -> str:
-            place = self._find(f"{instance}.{operand}") or self._find(operand.lstrip("%"))
+            site, _, mnemonic, _ = made.picture.steps[step]
+            place = self._place(mnemonic, operand, instance)
             if place is None:
                 return ""
-            site, _, mnemonic, _ = made.picture.steps[step]
             if joined(mnemonic) is None:
                 sites = site, made.picture.site
                 return next((text for one in sites if (text := made.values.get((one, place.offset, place.bit)))), "")

@@ -131,3 +131,18 @@ def meant(name: str) -> list[str]:
 def spelling(text: str) -> str:
     """A mnemonic as the table has it."""
     return text.replace(" ", "").upper()
+
+
+_AREAS = {"t": "T", "c": "C"}
+
+
+def number_area(mnemonic: str) -> str:
+    """T or C if the first operand of an instruction is the number of a timer or of a counter, else ""."""
+    row = instruction_set().rows.get(mnemonic)
+    return _AREAS.get(row.operands[:1], "") if row else ""
+
+
+def is_bcd_number(mnemonic: str) -> bool:
+    """Whether the present value of the timer or counter of an instruction is BCD."""
+    row = instruction_set().rows.get(mnemonic)
+    return row is not None and row.operands[:2] in ("tz", "cz")
