@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import signal
 import sys
 from collections.abc import Generator
@@ -49,6 +50,16 @@ def pytest_configure(config: pytest.Config) -> None:
 TOP = len(Path(__file__).parts)
 """Parts of the path of a test file that stands in no folder of the tests."""
 gc.set_threshold(100_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
+
+
+ALL_SLOW = re.compile(r"^pytestmark = \[?pytest\.mark\.slow\b", re.M)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """The inner loop does not import modules in which everything is slow, nor what only these import."""
+    if config.option.markexpr != "not slow" or not collection_path.name.startswith("test_"):
+        return None
+    return True if ALL_SLOW.search(collection_path.read_text(encoding="utf-8")) else None
 
 
 @pytest.hookimpl(wrapper=True)

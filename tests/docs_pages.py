@@ -47,7 +47,7 @@ FENCE = re.compile(r"^(?P<fence>`{3,})(?P<language>[\w{}-]*)[^\n]*\n(?P<text>.*?
 FILE = re.compile(r"^(?:.*\s)?`([\w./-]+\.\w+)`:$")
 COMMAND = re.compile(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", re.M)
 INSTALLS = re.compile(r"(python3 -m venv|\. \.venv/|(\S*/)?pip install|cd |git clone|apt(-get)? install)")
-PROCESSES = ("fbvm test", "fbvm mutate", "fbvm demo", "--check", "--class", "python -m", " &")
+PROCESSES = ("fbvm test", "fbvm mutate", "fbvm campaign", "fbvm demo", "--check", "--class", "python -m", " &")
 """What commands that start other programs have in them, or take seconds."""
 
 

@@ -25,6 +25,7 @@ from fbvm.code.image import Image
 from fbvm.code.operations import Block
 from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Plc
+from fbvm.syntax.st.tables import tables as grammar
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
@@ -103,6 +104,7 @@ def _every_engine(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         monkeypatch.setattr(module, "execute", execute)
     for module in (hand_image, expressions):
         monkeypatch.setattr(module, "execute", execute_later)
+    grammar("st")  # which is kept
     cache.switch(False)  # thousands of images that nobody runs again
     yield
     cache.switch(True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from fbvm.campaign.work import Batch, Bench, Mismatch
 from fbvm.cli.main import main
 from fbvm.cli.shared import status
 
-pytest.importorskip("distributed", reason="the extra cluster is not installed")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(find_spec("distributed") is None, reason="the extra cluster is not installed")]
 
 PROGRAM = "PROGRAM Main VAR n, limit : INT; END_VAR n := n + 1; n := n / (n - limit); END_PROGRAM\n"
 
@@ -32,7 +33,6 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
     return Bench.of(plan_of(written, project, images), images)
 
 
-@pytest.mark.slow
 def test_a_cluster_gives_the_same_results_though_a_worker_is_killed(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     from fbvm.campaign import cluster
 
@@ -56,7 +56,6 @@ def test_a_cluster_gives_the_same_results_though_a_worker_is_killed(bench: Bench
             raise AssertionError("a worker of another version was accepted")
 
 
-@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_told_with_its_status(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     from fbvm.campaign import cluster
 

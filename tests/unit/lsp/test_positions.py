@@ -9,6 +9,8 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.lsp.positions import Positions
 from fbvm.lsp.server import Server
 
+pytestmark = pytest.mark.slow  # pygls and the protocol take their time to be imported
+
 LINE = "s := '\U0001f600ä'; b := 1;"
 """`b` is character 11 from 0; the first character in the text takes 2 units of UTF-16 and 4 of UTF-8, the second 1 and 2."""
 
@@ -22,7 +24,6 @@ def test_columns_count_in_the_units_that_were_agreed_upon(units: str, column: in
     assert positions.offset(types.Position(0, 5)) == 5
 
 
-@pytest.mark.slow
 def test_only_what_is_unused_is_shown_faded(monkeypatch: pytest.MonkeyPatch) -> None:
     server, source = Server("1"), Source("Main.st", "PROGRAM Main END_PROGRAM")
     monkeypatch.setattr(server, "positions", Positions)  # no editor has agreed upon units
