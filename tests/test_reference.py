@@ -141,15 +141,19 @@ def test_each_assumption_is_listed_with_its_place() -> None:
     assert text.count("\n- ") == count > 50
 
 
-def test_a_file_is_written_only_if_it_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_is_written_only_if_it_changed_and_removed_if_it_is_made_no_longer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = pages()
     product_pages = importlib.import_module("product_pages")
     monkeypatch.setattr(product_pages, "pages", lambda: made)
     product_pages.write(tmp_path)
-    path = tmp_path / "reference" / "memory.md"
+    reference = tmp_path / "reference"
+    path = reference / "memory.md"
     before = path.stat().st_mtime_ns
+    (gone := reference / "diagnostics" / "S9999.md").write_text("# S9999 A code that is gone\n", encoding="utf-8")
+    (written := reference / "index.md").write_text("# By people\n", encoding="utf-8")
     product_pages.write(tmp_path)
     assert path.stat().st_mtime_ns == before
+    assert written.is_file() and not gone.exists()
 
 
 def test_docstrings_become_what_sphinx_reads() -> None:

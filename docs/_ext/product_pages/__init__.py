@@ -45,9 +45,15 @@ def pages() -> Pages:
 
 
 def write(folder: Path) -> None:
-    """Write all pages below `folder`; a file that has the same text already stays untouched."""
-    for name, text in pages().items():
-        path = folder / f"{name}.md"
+    """Write all pages below `folder`; a file that has the same text already stays untouched.
+
+    Below `reference/` every page in a folder is made: one that is made no longer, such as that of a code which is gone, is
+    removed."""
+    made = {folder / f"{name}.md": text for name, text in pages().items()}
+    for path in folder.glob("reference/*/**/*.md"):
+        if path not in made:
+            path.unlink()
+    for path, text in made.items():
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
