@@ -141,7 +141,7 @@ def test_each_assumption_is_listed_with_its_place() -> None:
     assert text.count("\n- ") == count > 50
 
 
-def test_a_page_is_written_only_if_it_changed_and_removed_if_it_is_made_no_longer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pages_are_written_if_they_changed_and_removed_if_they_are_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = pages()
     product_pages = importlib.import_module("product_pages")
     monkeypatch.setattr(product_pages, "pages", lambda: made)
