@@ -5,9 +5,11 @@ Time is real as soon as one attached network is real.  One thread, one selector,
 
 from __future__ import annotations
 
+import gc
 import heapq
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from typing import Protocol, cast
 
 from fbvm.base.areas import NEVER
@@ -21,7 +23,7 @@ from fbvm.run.host_date import local_date_ns
 from fbvm.run.interrupts import Interrupts
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.run.watchdog import Watchdog
-from fbvm.wire.link import RealNetwork
+from fbvm.wire.link import Network, RealNetwork
 
 RunNumbers = dict[int, None]
 """An ordered set of run numbers."""
@@ -29,6 +31,9 @@ PROGRESS_NS = 100_000_000
 """The shortest time between two calls of `progress`."""
 PLC_PROGRESS_NS = 100_000
 """As much for each PLC, if that is more: all are brought up to date before it is called."""
+SWITCH_ON_NS = 250_000
+"""In real time, so much later than a PLC the next is switched on, rounded down to whole periods: twice what the first scans of
+one take."""
 PAUSE_NS = 1_000_000
 """How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
@@ -66,13 +71,33 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
     at most every 100 ms.  When `until` returns True between two scans, the loop is left; the runs go on with `resumed`, after
     `Running.resume` of each."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
+    with _uncollected() if networks else nullcontext():
+        _run_all(runs, progress, until, resumed, list(networks.values()))
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Python's garbage collector leaves alone what is there already: to visit ten thousand PLCs takes several periods."""
+    is_ours = not gc.get_freeze_count()
+    if is_ours:
+        gc.freeze()
+    try:
+        yield
+    finally:
+        if is_ours:
+            gc.unfreeze()
+
+
+def _run_all(runs: Sequence[Running], progress: Callable[[], None] | None, until: Callable[[], bool] | None, resumed: bool,
+             networks: Sequence[Network]) -> None:  # fmt: skip
+    """`run_all`; `networks` are those of real time."""
     interrupts = Interrupts()
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
     if networks:
         _prepare(runs)
         watchdogs = [Watchdog(run.plc) for run in runs]
-        clock = _begin_in_real_time(runs, cast(list[RealNetwork], list(networks.values())), interrupts)
+        clock = _begin_in_real_time(runs, cast(list[RealNetwork], networks), interrupts)
     else:
         _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
@@ -137,14 +162,16 @@ def _prepare(runs: Sequence[Running]) -> None:
 
 
 def _begin_in_real_time(runs: Sequence[Running], networks: list[RealNetwork], interrupts: Interrupts) -> _RealClock:
-    """Lets PLCs begin at the same moment, but for their phases."""
+    """Lets PLCs begin at the same moment, but for their phases.  Where there are many, one after another is switched on, some
+    whole periods later, so that none misses a period because of the first scans of others, which take long."""
     start_ns = _latest_ns(runs)
     clock = _RealClock(networks, runs, start_ns, interrupts)
-    for run in runs:
-        servicing = run.plc.servicing
-        if not servicing.clock_ns:
-            servicing.clock_ns = local_date_ns() - start_ns
-        run.begin(start_ns + run.phase_ns, clock.behind)
+    for number, run in enumerate(runs):
+        plc = run.plc
+        later_ns = run.phase_ns + (0 if plc.scans else number * SWITCH_ON_NS // plc.cycle_ns * plc.cycle_ns)
+        if not plc.servicing.clock_ns:
+            plc.servicing.clock_ns = local_date_ns() - start_ns + later_ns
+        run.begin(start_ns + later_ns, clock.behind)
     return clock
 
 

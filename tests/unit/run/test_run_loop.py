@@ -278,6 +278,22 @@ def test_plcs_need_not_scan_at_the_same_moment(clock: Clock) -> None:
     assert times == [(0, 0, 0), (1, 4, 0), (0, 10, 10), (1, 14, 10)]
 
 
+def test_many_plcs_are_switched_on_one_after_another(clock: Clock) -> None:
+    """Each scans at its place in the period, some whole periods later; its date is that of all the others."""
+    first: list[int] = []
+    runs = []
+    for number in range(90):
+        plc, _ = real_plc(clock)
+        plc.watchers.append(lambda plc: plc.scans == 1 and first.append(clock.now_ns // MS % 1000))
+        runs.append(Running(plc, scans=3, phase_ns=number % 10 * MS))
+    run_all(runs)
+    wanted = [number % 10 + number * loop.SWITCH_ON_NS // (10 * MS) * 10 for number in range(90)]
+    assert sorted(first) == sorted(wanted) and max(wanted) == 29
+    dates = {run.plc.servicing.clock_ns - at * MS for run, at in zip(runs, wanted, strict=True)}
+    assert max(dates) - min(dates) < 1000 * MS
+    assert all(run.plc.lateness.missed == 0 for run in runs)
+
+
 def test_news_wake_only_whose_they_are(clock: Clock) -> None:
     scans: list[tuple[str, int]] = []
     network, runs = RealNetwork(clock, 3, 4), []
