@@ -140,6 +140,36 @@ def test_the_client_of_the_extension_speaks_with_the_server(tmp_path: Path) -> N
     assert (done.stdout, done.stderr) == (SAID, "")
 
 
+SHOWN = """\
+test_lamp.py test_it_counts line 7
+test_lamp.py test_rows line 11
+test_lamp.py TestMore.test_inside line 15
+test_level.st Wrong line 5
+test_level.st Right line 1
+failed test_lamp.py TestMore.test_inside at line 16
+failed test_lamp.py test_rows at line 12
+failed test_level.st Wrong at line 6
+passed test_lamp.py test_it_counts
+passed test_level.st Right
+"""
+
+
+@needs_node
+@pytest.mark.slow
+def test_the_view_of_tests_has_those_in_structured_text_and_those_of_pytest(tmp_path: Path) -> None:
+    (tmp_path / "test_level.st").write_text("PROGRAM Right\n    ASSERT(TRUE);\nEND_PROGRAM\n\nPROGRAM Wrong\n    ASSERT(FALSE);\n"
+                                            "END_PROGRAM\n", encoding="utf-8")
+    (tmp_path / "test_lamp.py").write_text(
+        "import pytest\n\nfrom fbvm import compile_text\n\n\n# one for all\ndef test_it_counts():\n    assert compile_text\n\n"
+        "@pytest.mark.parametrize('n', [1, 2, 3])\ndef test_rows(n):\n    assert n != 2\n\nclass TestMore:\n"
+        "    def test_inside(self):\n        assert False\n", encoding="utf-8")  # fmt: skip
+    (tmp_path / "test_other.py").write_text("def test_of_somebody_else():\n    pass\n", encoding="utf-8")
+    stub = Path(__file__).parent / "vscode_tests_stub.js"
+    done = subprocess.run(["node", stub, HERE, tmp_path, sys.executable, "-m", "fbvm"], capture_output=True, text=True,
+                          check=False, timeout=120)
+    assert sorted(done.stdout.splitlines()) == sorted(SHOWN.splitlines()) and done.stderr == ""
+
+
 @needs_node
 @pytest.mark.slow
 def test_the_scripts_are_javascript() -> None:
