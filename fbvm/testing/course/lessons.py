@@ -27,6 +27,7 @@ PROGRAM, GIVEN, TEXT, SOLUTION = "program.st", "given.st", "lesson.md", "solutio
 OF_THE_LEARNER = (PROGRAM, ANSWERS)
 DONE = ".done"
 QUIET = ("-q", "-rN", "--tb=short", "--import-mode=importlib", "-p", "no:cacheprovider", "--fbvm-no-warn", "all")
+WORDS = ("-p", "fbvm.testing.course.words")
 PREDICTION = "test_prediction"
 
 
@@ -109,7 +110,7 @@ def prediction_mistake(lesson: Lesson, folder: Path, look: str = "fbvm step show
 def check(lesson: Lesson, folder: Path) -> int:
     """Checks a learner's files of a lesson; returns pytest's status, and marks the lesson as done if the status is 0."""
     target = folder / lesson.slug
-    status = run_pytest([*QUIET, "--rootdir", str(target), "-c", str(_ini(target)), str(target)])
+    status = run_pytest([*QUIET, *WORDS, "--rootdir", str(target), "-c", str(_ini(target)), str(target)])
     if status == 0:
         (target / DONE).touch()
     return status
@@ -131,11 +132,11 @@ def program_mistakes(lesson: Lesson, folder: Path) -> list[str]:
              for found in [case.find("failure") if case.find("failure") is not None else case.find("error")] if found is not None]
     said: dict[str, str] = {}
     for name, found in wrong:  # of a test with several examples the first that fails
-        said.setdefault(name.partition("[")[0], _mistake(name, found.get("message") or ""))
+        said.setdefault(name.partition("[")[0], mistake(name, found.get("message") or ""))
     return list(said.values()) or [f"{PROGRAM} could not be checked"]
 
 
-def _mistake(name: str, said: str) -> str:
+def mistake(name: str, said: str) -> str:
     """A failed test in a sentence, with what it said if that is one."""
     sentence = name.partition("[")[0].removeprefix("test_").replace("_", " ")
     first = said.split("\n", 1)[0].removeprefix("AssertionError: ")

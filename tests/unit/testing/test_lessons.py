@@ -171,7 +171,7 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     assert called("1", "--check")[0] == 1
     answers = tmp_path / "lessons" / lessons()[0].slug / ANSWERS
@@ -181,6 +181,11 @@ def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert code == 1 and message in output and "checked when the prediction is right" in output
         assert "4" not in output and "5" not in output, "the answer is not given away"
         assert (answers.parent / KEPT).exists() == bool(written)
+    answers.write_text("lamp_on_in_scan = 4\n", encoding="utf-8")
+    capfd.readouterr()
+    assert called("1", "--check")[0] == 1
+    said = capfd.readouterr().out
+    assert "Lamp is ON at the end of scan 4, not of scan 3" in said and "assert" not in said and "scan 4   40ms" in said
     for path in (lessons()[0].folder / "solution").iterdir():
         (tmp_path / "lessons" / lessons()[0].slug / path.name).write_bytes(path.read_bytes())
     code, output = called("1", "--check")
