@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from fbvm.campaign.fleet.shard import Figures, Shard
     from fbvm.run.project import Project
 
-PAUSE_NS = 500_000_000
+PAUSE_NS = 1_000_000_000
 LAST_NS = 20_000_000_000
 """How long the last figures of parts that were told to stop are waited for."""
 OUTPUT = click.Path(dir_okay=False, path_type=Path)
@@ -152,7 +152,7 @@ def _conducted(places: AbstractContextManager[Places], options: dict[str, Any]) 
         parts.stop()
         is_late = time_limit(LAST_NS)
         while not _all(told, "over", "failed") and not is_late():
-            pause(PAUSE_NS // 10)
+            pause(PAUSE_NS // 20)
             told = parts.figures()
         if options["json_lines"]:
             say_json(_as_dict(told))
