@@ -87,3 +87,33 @@ def test_executed_rungs_show_present_values_and_what_blocks_gave(tmp_path: Path,
     assert done.exit_code == 0, done.output
     assert f"│ {shown} " in done.output
     assert "├─D101 = 42" in done.output
+
+
+DELAYS = """FUNCTION_BLOCK Delay
+VAR_INPUT Go : BOOL; END_VAR
+LADDER
+Pause,,TIMER,,,,"";
+LD Go
+TIM Pause #0005
+END_LADDER
+END_FUNCTION_BLOCK
+PROGRAM Main
+LADDER
+LD P_On
+FBCALL Delay A Go:=0.00
+LD P_On
+FBCALL Delay B Go:=0.01
+END_LADDER
+END_PROGRAM"""
+
+
+@pytest.mark.slow
+def test_a_timer_of_each_instance_shows_its_own_present_value(tmp_path: Path) -> None:
+    file = tmp_path / "delays.st"
+    file.write_text(DELAYS, encoding="utf-8")
+    done = CliRunner().invoke(main, ["run", str(file), "--set", "0.00=TRUE", "--set", "0.01=TRUE@300ms", "--scans", "36",
+                                     "--ladder", "35"])  # fmt: skip
+    assert done.exit_code == 0, done.output
+    first, _, second = done.output.partition("scan 35, Main.B\n")
+    assert "│ Pause = #0002 │" in first
+    assert "│ Pause = #0005 │" in second

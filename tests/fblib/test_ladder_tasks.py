@@ -82,3 +82,12 @@ def test_when_operation_begins_again_tasks_are_as_their_programs_say(plc: Plc) -
 def test_numbers_and_flags_that_cannot_be(step: str, message: str) -> None:
     compilation = compile_text(f"PROGRAM Main\nLADDER\n{step}\nEND_LADDER\nEND_PROGRAM")
     assert message in str([found.message for found in compilation.diagnostics])
+
+
+@pytest.mark.parametrize("step", ["MSKS 6 #0", "CLI 100 #0", "@DI"])
+def test_instructions_about_interrupts_are_taken_and_do_nothing(step: str) -> None:
+    compilation = compile_text(f"PROGRAM Main\nLADDER\nLD P_On\n{step}\nOUT 0.00\nEI\nEND_LADDER\nEND_PROGRAM")
+    assert compilation.image, [str(found) for found in compilation.diagnostics]
+    plc = Plc(compilation.image)
+    plc.scan()
+    assert plc.read("CIO 0.00") is True

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from fbvm.base.areas import Area
 from fbvm.base.memory import WHOLE_BYTES
+from fbvm.base.types import StructType, fold
 from fbvm.code.image import Image
 from fbvm.record.draw.power import RungExecution
 from fbvm.record.draw.table import ScanState
@@ -13,6 +14,7 @@ from fbvm.record.trace.events import Read, Write
 from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.ladder.drawing.diagram import joined
 from fbvm.syntax.ladder.instructions.instruction_set import is_bcd_number, number_area
+from fbvm.syntax.ladder.symbols import value_name
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, UnknownPlace, find_place
 
@@ -38,18 +40,19 @@ class RungValues:
         instance = self._names.instance(made.base)
         for site, _, mnemonic, operands in made.picture.steps:
             if joined(mnemonic) is None:
-                for operand in operands:
-                    self._finish(plc, made, site, mnemonic, operand.partition("=>")[2] or operand, instance)
+                for position, operand in enumerate(operands):
+                    bare = operand.partition("=>")[2] or operand
+                    self._finish(plc, made, (site, mnemonic, bare, instance), position == 0 and is_bcd_number(mnemonic))
 
-    def _finish(self, plc: ScanState, made: RungExecution, site: int, mnemonic: str, operand: str, instance: str) -> None:
+    def _finish(self, plc: ScanState, made: RungExecution, what: tuple[int, str, str, str], is_decimal: bool) -> None:
+        site, mnemonic, operand, instance = what
         place = self._place(mnemonic, operand, instance)
         if place is None or place.type.size > 8:
             return
         where = place.offset, place.bit
         if (site, *where) not in made.values and (made.picture.site, *where) not in made.values:
             value = self._names.read(plc.read, place)
-            is_decimal = is_bcd_number(mnemonic) and isinstance(value, int)
-            made.values[site, place.offset, place.bit] = f"#{value:04X}" if is_decimal else (
+            made.values[site, place.offset, place.bit] = f"#{value:04X}" if is_decimal and type(value) is int else (
                 Signal(place, place.name).text(value).replace(" ", ""))  # fmt: skip
 
     def _place(self, mnemonic: str, operand: str, instance: str) -> Place | None:
@@ -57,7 +60,15 @@ class RungValues:
         area = number_area(mnemonic)
         if area and (number := operand.upper().removeprefix(area)).isdecimal():
             return self._find(f"{area}{int(number)}")
+        if area and (own := self._hidden(instance, value_name(operand))):
+            return own
         return self._find(f"{instance}.{operand}") or self._find(operand.lstrip("%"))
+
+    def _hidden(self, instance: str, name: str) -> Place | None:
+        """A variable of an instance whose name nobody can write."""
+        holder = self._find(instance)
+        field = holder.type.fields.get(fold(name)) if holder and isinstance(holder.type, StructType) else None
+        return Place(name, field.type, holder.offset + field.offset, None) if holder and field else None
 
     def of(self, made: RungExecution) -> Callable[[int, str], str]:
         """A function from step and operand to the value in an execution of a rung, "" for an operand without one."""

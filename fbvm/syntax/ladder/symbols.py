@@ -47,7 +47,12 @@ def declaration(symbol: Symbol) -> VarDecl:
 def present_value(symbol: Symbol) -> VarDecl:
     """The variable with the present value of a timer or counter of each instance."""
     start, end = symbol.start, symbol.start + len(symbol.name)
-    return VarDecl(start, end, (Name(start, end, f"${symbol.name}:value"),), None, NamedType(start, end, "WORD"), None)
+    return VarDecl(start, end, (Name(start, end, value_name(symbol.name)),), None, NamedType(start, end, "WORD"), None)
+
+
+def value_name(name: str) -> str:
+    """The name of the variable with the present value of a timer or counter of this name that each instance has."""
+    return f"${name}:value"
 
 
 def _spec(kind: str, start: int, end: int) -> TypeSpec:
