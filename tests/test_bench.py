@@ -265,3 +265,36 @@ def test_the_script_llvmlite_range(load: Load) -> None:
     script = load("llvmlite_range")
     assert all(end.startswith("llvmlite==") for end in script.ends())
     assert [test for test in script.TESTS if not (HOUSE / test).is_file()] == []
+
+
+SUITE_TASK = """id: pump
+language: ST
+properties_file: props.yaml
+variants:
+  - {file: clean.st, expected_verdict: true}
+  - {file: bomb.st, expected_verdict: false}
+  - {file: clean.ld, expected_verdict: true}
+"""
+SUITE_PROPERTIES = """properties:
+  - {id: P1, kind: invariant, expression: "!(pump && full)"}
+  - {id: P2, kind: mutual_exclusion, variables: [pump, full]}
+  - {id: P3, kind: reachable, expression: "pump"}
+"""
+SUITE_PROGRAM = "PROGRAM tank\nVAR full AT %IX0.0 : BOOL; pump AT %QX0.0 : BOOL; END_VAR\n    pump := {};\nEND_PROGRAM\n"
+
+
+def test_the_script_prove_suite(load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                capsys: pytest.CaptureFixture[str]) -> None:  # fmt: skip
+    pytest.importorskip("yaml")
+    pytest.importorskip("bitwuzla")
+    task, table = tmp_path / "suite" / "pump", tmp_path / "table.md"
+    task.mkdir(parents=True)
+    for name, text in (("benchmark.yml", SUITE_TASK), ("props.yaml", SUITE_PROPERTIES), ("clean.ld", "rungs"),
+                       ("clean.st", SUITE_PROGRAM.format("NOT full")), ("bomb.st", SUITE_PROGRAM.format("TRUE"))):  # fmt: skip
+        (task / name).write_text(text, encoding="utf-8")
+    monkeypatch.setattr(sys, "argv", ["prove_suite.py", str(tmp_path / "suite"), "--table", str(table)])
+    assert load("prove_suite").main() == 0
+    rows = [line.split(" | ") for line in table.read_text(encoding="utf-8").splitlines() if "pump" in line]
+    assert [(row[1], row[4]) for row in rows] == [("clean.st", "agrees"), ("bomb.st", "agrees"), ("clean.ld", "out of scope")]
+    assert "P1 violated, after 1 scan, by the shortest run" in rows[1][5]
+    assert "3 variants: 2 agrees, 1 out of scope" in capsys.readouterr().out
