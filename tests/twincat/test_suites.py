@@ -82,6 +82,24 @@ def test_runs_that_are_not_recorded_are_done_again_up_to_their_failures(monkeypa
 
 
 @pytest.mark.slow
+def test_two_variables_of_any_type_are_compared() -> None:
+    made = compile_text("""FUNCTION_BLOCK FB_Any_Test EXTENDS TcUnit.FB_TestSuite
+VAR a, b : INT; c : DINT; s, t : STRING(20); u : STRING(30); w, x : WORD; END_VAR
+TEST('equal'); s := 'xy'; t := 'xyz'; t := 'xy'; AssertEquals(a, b, 'int'); AssertEquals(s, t, 'text'); TEST_FINISHED();
+TEST('other'); b := 4; x := 16#AB; t := 'abc';
+AssertEquals(a, b, 'int'); AssertEquals(a, c, ''); AssertEquals(s, t, ''); AssertEquals(s, u, ''); AssertEquals(w, x, '');
+TEST_FINISHED();
+END_FUNCTION_BLOCK
+""" + PROGRAM.format("a : FB_Any_Test;"), dialect="twincat")
+    assert made.image is not None, [message.render() for message in made.errors]
+    found = run_suites(made.image, ["PRG_TEST.a"]).results
+    assert not found["PRG_TEST.a", "equal"].failed and found["PRG_TEST.a", "equal"].asserts == 2
+    assert [failure.text for failure in found["PRG_TEST.a", "other"].failures] == [
+        "EXP: 0, ACT: 4, MSG: int", "EXP: (Type class = INT), ACT: (Type class = DINT)", "EXP: xy, ACT: abc",
+        "EXP: (Data size = 21), ACT: (Data size = 31)", "EXP: 0x0000, ACT: 0x00AB"]
+
+
+@pytest.mark.slow
 def test_tests_of_one_cycle_and_of_several_ordered_and_disabled_ones() -> None:
     run = ran("a : FB_A_Test;", "PRG_TEST.a")
     seen = {name: (r.finished, r.failed, r.skipped, r.asserts, r.duration_s) for (_, name), r in run.results.items()}

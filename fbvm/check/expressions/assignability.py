@@ -100,7 +100,7 @@ _BY_DIALECT = (("times_are_numbers", _holds_nanoseconds), ("narrowing", _narrows
 def as_number(kind: Type, dialect: Dialect) -> Type:
     """The type in which a dialect computes with a value: a bit string as an unsigned number, an enumeration as its base."""
     if isinstance(kind, EnumType) and dialect.numbers_of_enumerations:
-        return kind.base
+        kind = kind.base
     if dialect.arithmetic_of_bits and is_any(kind, "ANY_BIT") and kind != BOOL:
         return ELEMENTARY[UNSIGNED[kind.name]]
     return kind
