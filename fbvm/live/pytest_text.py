@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -18,15 +18,19 @@ _CALLS = {"write": "plc.write({name!r}, {value})", "keep": "plc.write({name!r}, 
 """The statement of an act by its kind, after which it takes place before the next scan."""
 
 
-def pytest_text(acts: Sequence[Act], live: LivePlc, seen: Sequence[str], files: Sequence[Path],
-                program: str | None = None) -> str:  # fmt: skip
+DOCSTRING = '"""Written from the page of a running PLC: does again what was done by hand."""'
+Seen = Sequence[tuple[LivePlc, str]]
+"""Names that the page sees, each with its PLC."""
+
+
+def pytest_text(acts: Sequence[Act], live: LivePlc, seen: Seen, files: Sequence[Path], program: str | None = None) -> str:
     """The text of a test module: compiles `files`, repeats the acts before their scans, and asserts the values of the names
     `seen` as they are now.  Of what is done inside a scan, at a breakpoint, a line says that it is not repeated."""
     plc = live.plc
+    acts = [act for act in acts if act.plc == live.name]
     sources = ", ".join(repr(str(file)) for file in files)
     chosen = f", program={program!r}" if program else ""
-    lines = ['"""Written from the page of a running PLC: does again what was done by hand."""', "",
-             *_imports(plc, acts), "", "",
+    lines = [*_head(["Plc", "compile_files", *["LoopNetwork"] * bool(plc.units)], acts, bool(plc.units)),
              "def test_what_was_done_by_hand():",
              f"    image = compile_files([{sources}]{chosen}, runnable=True).image",
              f"    plc = Plc(image, cycle_ns={plc.cycle_ns:_})"]  # fmt: skip
@@ -42,23 +46,45 @@ def pytest_text(acts: Sequence[Act], live: LivePlc, seen: Sequence[str], files: 
         lines += [f"    {line}" for line in _statements(act, plc)]
     if plc.scans > at:
         lines.append(f"    plc.run(scans={plc.scans - at})")
-    lines += [f"    assert plc.read({name!r}) == {_literal(plc.read(name))}" for name in seen]
-    if not seen:
+    lines += [f"    assert plc.read({name!r}) == {_literal(plc.read(name))}" for owner, name in seen if owner is live]
+    if not any(owner is live for owner, _ in seen):
         lines.append(f"    assert plc.scans == {plc.scans} and plc.trap is None")
     return "\n".join(lines) + "\n"
 
 
-def _imports(plc: Plc, acts: Sequence[Act]) -> list[str]:
+def plant_text(acts: Sequence[Act], live: LivePlc, seen: Seen, file: Path, plcs: Mapping[str, LivePlc]) -> str:
+    """As `pytest_text`, of all PLCs of the project `file`, by the fixture `plant`; a fault of the network is noted by each PLC,
+    and repeated as that of `live`."""
+    acts = [act for act in acts if act.plc == live.name or act.what not in ("fault", "mend")]
+    lines = [*_head([], acts, False), "def test_what_was_done_by_hand(plant):", f"    made = plant({str(file)!r})",
+             *["    network = made.network"] * any(act.what in ("fault", "mend", "cable") for act in acts)]  # fmt: skip
+    last = [Act(name, found.plc.scans, 0, "", "") for name, found in plcs.items()]
+    before = ""
+    for act in [*acts, *last]:
+        if act.plc != before:
+            lines.append(f"    plc = made[{act.plc!r}].plc")
+            before = act.plc
+        if act.scan:
+            lines += [f"    while plc.scans < {act.scan}:", "        made.scan()"]
+        lines += [f"    {line}" for line in _statements(act, plcs[act.plc].plc)] if act.what else []
+    lines += [f"    assert made[{owner.name!r}].plc.read({name!r}) == {_literal(owner.plc.read(name))}" for owner, name in seen]
+    if not seen:
+        lines.append("    assert all(rig.plc.trap is None for rig in made.rigs.values())")
+    return "\n".join(lines) + "\n"
+
+
+def _head(names: Sequence[str], acts: Sequence[Act], has_units: bool) -> list[str]:
+    """The lines before the test: what it is, and its imports."""
     done = {act.what for act in acts}
-    names = {"LoopNetwork": bool(plc.units), "Mode": "mode" in done, "Plc": True,
-             "Peer": "cable" in done or any(isinstance(act.value, Fault) and act.value.peer != ANY for act in acts),
-             "compile_files": True}  # fmt: skip
-    lines = [f"from fbvm import {', '.join(name for name, is_used in sorted(names.items()) if is_used)}"]
-    if plc.units:
+    used = {*names, *["Mode"] * ("mode" in done)}
+    if "cable" in done or any(isinstance(act.value, Fault) and act.value.peer != ANY for act in acts):
+        used.add("Peer")
+    lines = [f"from fbvm import {', '.join(sorted(used))}"] if used else []
+    if has_units:
         lines.append("from fbvm.machine.backplane import usual_units")
     if done & {"fault", "cable"}:
         lines.append("from fbvm.net.faults import Fault")
-    return lines
+    return [DOCSTRING, *(["", *lines] if lines else []), "", ""]
 
 
 def _literal(value: object) -> str:

@@ -252,10 +252,10 @@ class Session:
         """The acts so far as a pytest, with the values that the page sees now."""
         live = self._bench.plc(plc)
         if self._bench.make_test is None:
-            raise MessageError("a test repeats runs of files in virtual time; others are repeated by `fbvm replay`: --trace FILE")
-        seen = [place.name for owner, place in self._seen.names.values()
-                if owner is live and isinstance(place, Place) and is_single(place)]  # fmt: skip
-        return {"text": self._bench.make_test([act for act in self._bench.acts if act.plc == plc], live, seen)}
+            raise MessageError("a test repeats runs in virtual time; others are repeated by `fbvm replay`: --trace FILE")
+        seen = [(owner, place.name) for owner, place in self._seen.names.values()
+                if isinstance(place, Place) and is_single(place)]  # fmt: skip
+        return {"text": self._bench.make_test(self._bench.acts, live, seen)}
 
     def _quiet(self, plc: str) -> LivePlc:
         """A PLC whose past may be executed again now: with real connections that must not take time from its scans."""

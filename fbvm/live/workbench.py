@@ -66,7 +66,7 @@ class Workbench:
 
     def __init__(self, plcs: Sequence[LivePlc], control: Control, *, read_only: bool = False,
                  writable: Collection[str] | None = None,
-                 test: Callable[[Sequence[Act], LivePlc, Sequence[str]], str] | None = None,
+                 test: Callable[[Sequence[Act], LivePlc, Sequence[tuple[LivePlc, str]]], str] | None = None,
                  changes: SourceChanges | None = None, pictures: Pictures | None = None) -> None:  # fmt: skip
         self.plcs = {plc.name: plc for plc in plcs}
         self.control, self.read_only = control, read_only

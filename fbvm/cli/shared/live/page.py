@@ -190,7 +190,7 @@ class _Page:
         from fbvm.live.groups import WatchGroups
         from fbvm.live.pictures import Pictures
         from fbvm.live.plcs import LivePlc
-        from fbvm.live.pytest_text import pytest_text
+        from fbvm.live.pytest_text import plant_text, pytest_text
         from fbvm.live.workbench import Workbench
 
         lives = []
@@ -203,6 +203,8 @@ class _Page:
             files, program = self.built.repeated
             test = partial(pytest_text, files=[Path(file).resolve() for file in files], program=program)
         origin = self._origin
+        if isinstance(origin, ProjectOrigin) and not any(live.is_real for live in lives):
+            test = partial(plant_text, file=origin.file.resolve(), plcs={live.name: live for live in lives})
         changes = SourceChanges(origin.files, origin.programs, origin.mistakes, origin.matters) if origin.files else None
         pictures = Pictures(origin.file, origin.pictures, {live.name: live for live in lives}) \
             if isinstance(origin, ProjectOrigin) else None
