@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from fbvm.campaign.cluster import Cluster
 
 cluster_option = click.option(
@@ -17,8 +20,20 @@ cluster_option = click.option(
 
 def cluster_of(bench: Any, address: str, jobs: int) -> Cluster[Any, Any]:
     """The cluster at an address, for the tasks of a bench.  Raises UsageError if Dask is not installed."""
-    if find_spec("distributed") is None:
-        raise click.UsageError("--cluster needs Dask: pip install 'fbvm[cluster]'")
+    _check_dask()
     from fbvm.campaign.cluster import Cluster
 
     return Cluster(bench, address, jobs)
+
+
+def client_of(address: str, jobs: int) -> AbstractContextManager[Client]:
+    """A client of the cluster at an address.  Raises UsageError if Dask is not installed."""
+    _check_dask()
+    from fbvm.campaign.cluster import connected
+
+    return connected(address, jobs)
+
+
+def _check_dask() -> None:
+    if find_spec("distributed") is None:
+        raise click.UsageError("--cluster needs Dask: pip install 'fbvm[cluster]'")

@@ -8,13 +8,12 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from fbvm.cli.projects.cluster import cluster_option
+from fbvm.cli.projects.cluster import client_of, cluster_option
 from fbvm.cli.projects.planned_runs import processes, refuse
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
@@ -98,7 +97,7 @@ def _places(file: Path | None, options: dict[str, Any]) -> AbstractContextManage
                 for number, (part, names) in enumerate(zip(parts, rows, strict=True))]  # fmt: skip
 
     jobs = processes(options["jobs"])
-    return in_cluster(_cluster(options["cluster"], jobs), shards) if options["cluster"] else here(shards(jobs))
+    return in_cluster(client_of(options["cluster"], jobs), shards) if options["cluster"] else here(shards(jobs))
 
 
 def _project(file: Path | None, options: dict[str, Any]) -> tuple[Project, int | None]:
@@ -118,14 +117,6 @@ def _project(file: Path | None, options: dict[str, Any]) -> tuple[Project, int |
     if project.net == "loop" and not for_ns and project.scans is None and not any(row.until for row in project.plcs):
         raise click.UsageError('say when to end, by --for or by for = "10s" in [run]: in memory there is no real time')
     return project, for_ns
-
-
-def _cluster(address: str, jobs: int) -> Any:
-    if find_spec("distributed") is None:
-        raise click.UsageError("--cluster needs Dask: pip install 'fbvm[cluster]'")
-    from fbvm.campaign.cluster import connected
-
-    return connected(address, jobs)
 
 
 def _conducted(places: AbstractContextManager[Places], options: dict[str, Any]) -> Told:
