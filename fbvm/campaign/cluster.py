@@ -82,7 +82,7 @@ def _local(stack: ExitStack, jobs: int) -> Any:
     scratch = stack.enter_context(TemporaryDirectory())
     with deaf_children():  # they are ended by this process
         return LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=jobs, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, memory_limit=0,
+            n_workers=jobs, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", memory_limit=0,
             local_directory=scratch, silence_logs=logging.CRITICAL)  # fmt: skip
 
 
