@@ -131,7 +131,7 @@ class ScanView:
     def __init__(self, image: Image, areas: Any, names: Names, drawn: Drawn) -> None:
         self._image, self._names, self._drawn = image, names, Drawings(drawn)
         self._values = RungValues(image, areas)
-        self._power = PowerFlow(image.rungs, lambda scan: True, self._values)
+        self._power = PowerFlow(image.rungs, lambda scan: True, self._values.keep)
         self._charts = ChartRecorder(image.charts, lambda scan: True)
         self.scan = -1
         self._executed: dict[int, set[int]] = {}

@@ -83,7 +83,7 @@ class Player(ABC):
         self.count = 0
         """Statements of the scan that have been executed."""
         self.values = RungValues(facts.image, facts.areas)
-        self.power = PowerFlow(facts.rungs, lambda scan: True, self.values)
+        self.power = PowerFlow(facts.rungs, lambda scan: True, self.values.keep)
         """The rungs that the scan has executed, with their power."""
         self.chart_recorder = ChartRecorder(facts.charts, lambda scan: True)
         """The charts that the scan has executed."""
@@ -118,7 +118,7 @@ class Player(ABC):
 
     def _begin(self, stop: Stop, listener: MomentListener | None) -> None:
         self.statement, self.count = None, 0
-        self.power = PowerFlow(self.facts.rungs, lambda scan: True, self.values)
+        self.power = PowerFlow(self.facts.rungs, lambda scan: True, self.values.keep)
         self.chart_recorder = ChartRecorder(self.facts.charts, lambda scan: True)
         self._stop, self._listener = stop, listener
 

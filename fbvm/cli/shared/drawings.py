@@ -137,7 +137,7 @@ def draw_executed_rungs(plc: Plc, scans: str | None) -> Iterator[None]:
         yield
         return
     values = RungValues(plc.image, plc.memory.areas)
-    power = PowerFlow(plc.image.rungs, scan_filter(scans), values)
+    power = PowerFlow(plc.image.rungs, scan_filter(scans), values.keep, values.finish)
     with observing(plc, power):
         yield
     if not power.executed:

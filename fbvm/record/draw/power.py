@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from fbvm.code.image import RungPicture
 from fbvm.machine.plc import Phase
@@ -33,36 +32,33 @@ def latest_execution(picture: RungPicture, base: int, scan: int,
     return RungExecution(scan, base, picture, states) if states else None
 
 
-class Keeper(Protocol):
-    """Keeps values of executions of rungs."""
-
-    def keep(self, plc: ScanState, made: RungExecution, event: Read | Write) -> None:
-        """Called for each read and write of an execution."""
-
-    def finish(self, plc: ScanState, made: RungExecution) -> None:
-        """Called for each execution of a scan when the program has been executed."""
+Keep = Callable[[ScanState, RungExecution, Read | Write], None]
+"""Called for each read and write of an execution of a rung."""
+Finish = Callable[[ScanState, RungExecution], None]
+"""Called for each execution of a rung in a scan when the program has been executed."""
 
 
 class PowerFlow:
     """A listener that keeps the executions of `rungs` in the scans for which `wanted` returns True, in order.
 
-    `keeper` is told what they read and wrote."""
+    `keep` is called for each read and write in them, `finish` for each of them when the program is over."""
 
-    def __init__(self, rungs: Sequence[RungPicture], wanted: Callable[[int], bool], keeper: Keeper | None = None) -> None:
+    def __init__(self, rungs: Sequence[RungPicture], wanted: Callable[[int], bool], keep: Keep | None = None,
+                 finish: Finish | None = None) -> None:  # fmt: skip
         self.executed: list[RungExecution] = []
-        self._wanted, self._keeper = wanted, keeper
+        self._wanted, self._keep, self._finish = wanted, keep, finish
         self._rungs = {rung.site: rung for rung in rungs}
         self._owners = {place: rung.site for rung in rungs for place, _, _, _ in rung.steps} | {
             rung.site: rung.site for rung in rungs}  # fmt: skip
         self._latest: dict[tuple[int, int], RungExecution] = {}
 
     def phase(self, plc: ScanState, phase: Phase) -> None:
-        """Forgets the executions of the scan before; tells the keeper when the program is over."""
+        """Forgets the executions of the scan before; calls `finish` when the program is over."""
         if phase is Phase.INPUTS:
             self._latest.clear()
-        elif phase is Phase.PROGRAM and self._keeper:
+        elif phase is Phase.PROGRAM and self._finish:
             for made in self._latest.values():
-                self._keeper.finish(plc, made)
+                self._finish(plc, made)
 
     def event(self, plc: ScanState, event: Event) -> None:
         """Records the execution of a rung, and the state of a contact."""
@@ -75,8 +71,8 @@ class PowerFlow:
         elif isinstance(event, Contact) and isinstance(event.element, int):
             if here := self._rung(event):
                 here.states.setdefault(event.element, []).append(event.value)
-        elif self._keeper and isinstance(event, Read | Write) and (here := self._rung(event)):
-            self._keeper.keep(plc, here, event)
+        elif self._keep and isinstance(event, Read | Write) and (here := self._rung(event)):
+            self._keep(plc, here, event)
 
     def _rung(self, event: Contact | Read | Write) -> RungExecution | None:
         """The latest execution of the rung that an event belongs to."""

@@ -27,7 +27,7 @@ class RungValues:
         self._names = Names.of(image, areas)
 
     def keep(self, plc: ScanState, made: RungExecution, event: Read | Write) -> None:
-        """Keeps the value of a read or write in an execution of a rung; the `keep` of a `Keeper`."""
+        """Keeps the value of a read or write in an execution of a rung; a `Keep` for `PowerFlow`."""
         bit = event.bit if event.bit != WHOLE_BYTES else None
         place = self._names.at(event.offset, bit)
         if place is not None and len(event.value) <= 8:
@@ -36,7 +36,7 @@ class RungValues:
 
     def finish(self, plc: ScanState, made: RungExecution) -> None:
         """Keeps, for operands of boxes that the rung itself has not read or written, what they are when the program is over: the
-        present values of timers and counters, and what blocks give; the `finish` of a `Keeper`."""
+        present values of timers and counters, and what blocks give; a `Finish` for `PowerFlow`."""
         instance = self._names.instance(made.base)
         for site, _, mnemonic, operands in made.picture.steps:
             if joined(mnemonic) is None:

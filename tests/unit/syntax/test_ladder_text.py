@@ -201,7 +201,7 @@ def test_values_are_those_that_the_rung_read() -> None:
     declared = "n : INT; d : WORD := 7; b : BOOL; t : CTU;"
     plc = Plc(image("LD> d &5\nFBCALL CTU t PV:=n\nOUT b\nLD P_On\n++ d", declared))
     values = RungValues(plc.image, plc.memory.areas)
-    power = PowerFlow(plc.image.rungs, lambda scan: scan == 0, values)
+    power = PowerFlow(plc.image.rungs, lambda scan: scan == 0, values.keep)
     plc.write("Main.n", 3)
     with observing(plc, power):
         plc.scan()
