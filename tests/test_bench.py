@@ -166,6 +166,25 @@ def test_the_script_native(load: Load, small: Path, monkeypatch: pytest.MonkeyPa
     script.start()
 
 
+@needs_machine_code
+@needs_c
+def test_the_script_limits(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    script = load("limits")
+    monkeypatch.setattr(script, "BENCH", small)
+    monkeypatch.setattr(script.native, "shortest_ns", lambda work, rounds=0: [work(2), 1.0][1])
+    monkeypatch.setattr(script.native, "PROGRAMS", {"crc": 1_000_000})
+    monkeypatch.setattr(script.run, "work_ms", lambda folder, *words: 1.0)
+    monkeypatch.setattr(script.run, "STARTS", 1)
+    many = "logic   cyclic 10,000 345 48.9 10.3 100,005 1.0 0.2 0.4 0"
+    monkeypatch.setattr(script, "subprocess", SimpleNamespace(
+        run=script.subprocess.run, check_output=lambda words, **options: many if "cyclic" in words else "700"))
+    monkeypatch.setattr(sys, "argv", ["limits.py", "starting", "compiling", "many", "programs"])
+    script.main()
+    said = capsys.readouterr().out
+    assert "10,000 PLCs at 100 ms, logic: of a core, missed, each" in said and "10.3 %, 0, 48.9 KiB   <= 25 %, 0, 50 KiB" in said
+    assert "from start to first native scan" in said and "crc: python engine, times C by hand" in said
+
+
 def test_the_script_debugger(load: Load, capsys: pytest.CaptureFixture[str]) -> None:
     script = load("debugger")
     script.LINES = 3

@@ -1,13 +1,12 @@
 """Prints what many virtual PLCs cost: python tests/bench/many.py [COUNT...].  Gates nothing.
 
 Each PLC runs the hundred rungs of `logic`, or a few lines with a timer that waits, at a cycle of 100 ms in real time, with an
-ETN21 that has nothing to do, as `fbvm run` does it: spread over the cycle in steps of 1 ms.  What it costs is the machine
-around the program: the loop, its queue and measurements, and one call of machine code for times, clock pulses, program and the
-unit's switches.  One PLC alone takes 4 us a scan that way, half of it in the loop; among thousands a scan takes several times
-that, since whatever it touches (a dozen Python objects, five pages of the PLC's own) has left the processor's caches since the
-scan before.  The limit is the program alone, called from Python (the column `alone`, some hundred times less), and a core: when
-COUNT scans take 100 ms it is full, and scans begin late: at 10 to 20 us a scan with 5,000 to 10,000 PLCs.  A busy host makes
-scans late before that.
+ETN21 that has nothing to do, as `fbvm run` does it: spread over the cycle in steps of 1 ms.  One call of machine code scans all
+that are due together (`run/batches.py`): 1 us a scan, most of it waiting for five pages of the PLC's own, which have left the
+processor's caches since the scan before; the program alone, called from Python, is the column `alone`.  `polling` reads ten
+registers of a server in another process once a second by MTCP_ETN_Fn03: a PLC with an open connection scans by itself, which
+takes some 20 us among thousands, since a dozen Python objects have left the caches, too.  A busy host makes scans late before a
+core is full.  To make a PLC and to switch it on takes 0.3 ms; they are switched on one after another, which is in the figures.
 In `event` pace a PLC that has nothing to do is not scanned before its period ends, here after 10 s; its timer wakes it once a
 second.  Memory has the interpreter's and LLVM's share in it, divided by COUNT."""
 
@@ -17,12 +16,14 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 
-from fbvm import Etn21, Plc, TcpNetwork, compile_files, compile_text  # noqa: E402
+from fbvm import Etn21, Peer, Plc, TcpNetwork, compile_files, compile_text  # noqa: E402
+from fbvm.cli.running.demo import modbus_server  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
 from fbvm.machine.scan_times import Lateness  # noqa: E402
 from fbvm.run import Running, run_all  # noqa: E402
@@ -31,6 +32,9 @@ BENCH = Path(__file__).resolve().parent
 MS = 1_000_000
 COUNTS = (1_000, 10_000)
 RUN_MS = 5_000
+MOST_POLLING = 1_000
+"""As many connections, at either end, as one process usually may have."""
+SERVER = Peer("192.168.250.1", 502)
 TIMER = """
 PROGRAM Main
 VAR t : TON; n : UDINT; END_VAR
@@ -44,6 +48,21 @@ END_PROGRAM
 """
 
 
+POLLING = """
+PROGRAM Main
+VAR Connection : MTCP_ETN_Connect; Read : MTCP_ETN_Fn03; Second : TON; Seen : UINT; Exchanges : UDINT; END_VAR
+    Connection(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := TRUE);
+    Second(IN := NOT Second.Q, PT := T#900ms);
+    Read(EN := Connection.ENO, Register_Address := 0, Register_Qty := 10, RespData_DM := 200, Cmd_Read := Second.Q, SlaveID := 1);
+    IF Read.Rcv_Counter <> Seen THEN
+        Seen := Read.Rcv_Counter;
+        Exchanges := Exchanges + 1;
+    END_IF;
+END_PROGRAM
+"""
+TEXTS = {"timer": TIMER, "polling": POLLING}
+
+
 def resident_kib() -> int:
     """Memory of the process; 0 where the host has no /proc."""
     statm = Path("/proc/self/statm")
@@ -51,7 +70,8 @@ def resident_kib() -> int:
 
 
 def image_of(name: str) -> Image:
-    compilation = compile_text(TIMER) if name == "timer" else compile_files([BENCH / "programs" / "logic.st"])
+    text = TEXTS.get(name)
+    compilation = compile_text(text) if text else compile_files([BENCH / "programs" / f"{name}.st"])
     assert compilation.image, [diagnostic.render() for diagnostic in compilation.diagnostics]
     return compilation.image
 
@@ -67,7 +87,13 @@ def alone_us(plc: Plc) -> float:
 
 
 def measure(name: str, count: int, pace: str, cycle_ms: int) -> None:
-    image, network, before_kib = image_of(name), TcpNetwork(), resident_kib()
+    with ExitStack() as stack:
+        reached = {SERVER: ("127.0.0.1", stack.enter_context(modbus_server()))} if name == "polling" else {}
+        run_many(name, count, pace, cycle_ms, TcpNetwork(reached))
+
+
+def run_many(name: str, count: int, pace: str, cycle_ms: int, network: TcpNetwork) -> None:
+    image, before_kib = image_of(name), resident_kib()
     began = time.perf_counter()
     plcs = [Plc(image, cycle_ms * MS, engine="native") for _ in range(count)]
     for number, plc in enumerate(plcs):
@@ -83,10 +109,13 @@ def measure(name: str, count: int, pace: str, cycle_ms: int) -> None:
     for plc in plcs:
         late.add(plc.lateness)
     each = used / scans * 1e6 if scans else 0.0
-    print(f"{name:<7}{pace:<8}{count:>7,}{made_us:>9,.0f}{kib:>8,.1f}{used / passed * 100:>8.1f}{scans / passed:>11,.0f}"
+    print(f"{name:<8}{pace:<8}{count:>7,}{made_us:>9,.0f}{kib:>8,.1f}{used / passed * 100:>8.1f}{scans / passed:>11,.0f}"
           f"{each:>9,.1f}{alone_us(plcs[0]):>8.2f}"
-          f"{late.within_ns(0.99) / 1e6:>10,.1f}{late.missed:>9,}",
-          flush=True)  # fmt: skip
+          f"{late.within_ns(0.99) / 1e6:>10,.1f}{late.missed:>9,}", end="")  # fmt: skip
+    if name == "polling":
+        asked = sum(int(str(plc.read("Main.Exchanges"))) for plc in plcs)
+        print(f"   {asked / passed:,.0f} exchanges/s", end="")
+    print(flush=True)
     network.close()
 
 
@@ -96,12 +125,13 @@ def main() -> None:
         return
     counts = [int(word) for word in sys.argv[1:]] or COUNTS
     print(f"Python {sys.version.split()[0]} on {sys.platform}; {RUN_MS // 1000} s of real time")
-    print(f"{'':<15}{'PLCs':>7}{'us to':>9}{'KiB':>8}{'% of a':>8}{'scans':>11}{'us a':>9}{'alone':>8}{'99 % late':>10}"
+    print(f"{'':<16}{'PLCs':>7}{'us to':>9}{'KiB':>8}{'% of a':>8}{'scans':>11}{'us a':>9}{'alone':>8}{'99 % late':>10}"
           f"{'periods':>9}")
-    print(f"{'':<15}{'':>7}{'make':>9}{'each':>8}{'core':>8}{'a second':>11}{'scan':>9}{'us':>8}{'ms':>10}{'missed':>9}",
+    print(f"{'':<16}{'':>7}{'make':>9}{'each':>8}{'core':>8}{'a second':>11}{'scan':>9}{'us':>8}{'ms':>10}{'missed':>9}",
           flush=True)
     for count in counts:
-        for row in (("timer", count, "cyclic", 100), ("logic", count, "cyclic", 100), ("timer", count, "event", 10_000)):
+        for row in (("timer", count, "cyclic", 100), ("logic", count, "cyclic", 100), ("timer", count, "event", 10_000),
+                    *([("polling", count, "cyclic", 100)] if count <= MOST_POLLING else [])):  # fmt: skip
             subprocess.run([sys.executable, __file__, *map(str, row)], check=True)  # with a heap of its own
 
 

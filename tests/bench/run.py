@@ -123,32 +123,43 @@ STARTS = 5
 """New processes of each kind, of which the one that worked least counts."""
 
 
+def clean_environment(folder: str) -> dict[str, str]:
+    """The environment of a process that has its bytecode and fbvm's cache in a folder."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return kept | {"FBVM_CACHE": folder, "PYTHONPYCACHEPREFIX": folder, "PYTHONPATH": str(HOUSE),
+                   "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # fmt: skip
+
+
+def work_ms(folder: str, *words: str) -> float:
+    """The least work of a new process of Python with a `clean_environment`, after one that fills its caches."""
+    environment, taken = clean_environment(folder), []
+    for _ in range(1 + STARTS):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *words], env=environment, cwd=folder, capture_output=True, check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(taken[1:]) * 1e3
+
+
+def plugin_ms(folder: str) -> tuple[float, float]:
+    """The work of a session of pytest with a test that does nothing, and what the plugin adds."""
+    (Path(folder) / "test_nothing.py").write_text("def test_nothing() -> None:\n    pass\n", encoding="utf-8")
+    (Path(folder) / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+    plain = work_ms(folder, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+    return plain, work_ms(folder, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "fbvm.testing.plugin") - plain
+
+
 def loading() -> None:
     """What a verb works on a program that has not changed, and what the plugin adds to a session of pytest without PLC code.
 
     Both are imports, nearly all: what is not loaded costs nothing."""
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "test_nothing.py").write_text("def test_nothing() -> None:\n    pass\n", encoding="utf-8")
-        (Path(folder) / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
-        environment = os.environ | {"FBVM_CACHE": folder, "PYTHONPATH": str(HOUSE), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-
-        def work_ms(*words: str) -> float:
-            """The least work of a process, after one that fills the cache."""
-            taken = []
-            for _ in range(1 + STARTS):
-                before = resource.getrusage(resource.RUSAGE_CHILDREN)
-                subprocess.run([sys.executable, *words], env=environment, cwd=folder, capture_output=True, check=True)
-                after = resource.getrusage(resource.RUSAGE_CHILDREN)
-                taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-            return min(taken[1:]) * 1e3
-
-        show("Python alone, work of the processor", work_ms("-c", "pass"), "ms")
-        show("  fbvm check demo.st, unchanged (wanted: 150)", work_ms("-m", "fbvm", "check", str(DEMO)), "ms")
-        show("  fbvm run demo.st --scans 3, unchanged", work_ms("-m", "fbvm", "run", str(DEMO), "--scans", "3"), "ms")
-        plain = work_ms("-m", "pytest", "-q", "-p", "no:cacheprovider")
+        show("Python alone, work of the processor", work_ms(folder, "-c", "pass"), "ms")
+        show("  fbvm check demo.st, unchanged (wanted: 150)", work_ms(folder, "-m", "fbvm", "check", str(DEMO)), "ms")
+        show("  fbvm run demo.st --scans 3, unchanged", work_ms(folder, "-m", "fbvm", "run", str(DEMO), "--scans", "3"), "ms")
+        plain, more = plugin_ms(folder)
         show("  pytest, a test that does nothing", plain, "ms")
-        with_plugin = work_ms("-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "fbvm.testing.plugin")
-        show("  what the plugin adds (wanted: 50)", with_plugin - plain, "ms")
+        show("  what the plugin adds (wanted: 50)", more, "ms")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,136 @@
+"""All that is promised of speed in one run, with limits and peers: python tests/bench/limits.py [WORD...].  Gates nothing.
+
+With words only the rows that have one of them.  Start-up and compilation are processor time, which others on the machine disturb
+least; rates are ratios to a peer that takes turns with us.  What needs a compiler of C is left out where there is none.  What a
+recording costs is in recorder.py and recorded_day.py, what an editor waits for in editing.py."""
+
+from __future__ import annotations
+
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+BENCH = Path(__file__).resolve().parent
+sys.path[:0] = [str(BENCH.parents[1]), str(BENCH)]
+
+import exchanges  # noqa: E402
+import native  # noqa: E402
+import run  # noqa: E402
+import servers  # noqa: E402
+
+from fbvm import compile_files  # noqa: E402
+
+Row = tuple[str, str, str]
+"""What was measured, the figure, its limit."""
+PYTHON = {"logic": 130, "pid": 400, "crc": 220, "mtcp": 760}
+MACHINE = {"logic": 0.8, "pid": 1.5, "crc": 1.4, "mtcp": 2.5}
+"""The limits of a scan of the four programs, as multiples of C by hand."""
+MANY = (("logic", 1_000), ("logic", 10_000), ("polling", 1_000))
+AT_ONCE = 8
+
+
+def starting() -> Iterator[Row]:
+    with tempfile.TemporaryDirectory() as folder:
+        check_ms = run.work_ms(folder, "-m", "fbvm", "check", str(run.DEMO))
+        yield "fbvm check examples/demo.st, unchanged", f"{check_ms:.0f} ms", "<= 150 ms"
+        yield "an empty session of pytest: what the plugin adds", f"{run.plugin_ms(folder)[1]:.0f} ms", "<= 50 ms"
+
+
+def compiling() -> Iterator[Row]:
+    more = "VAR_GLOBAL NOW : TIME; D : ARRAY [0..1023] OF WORD; END_VAR\n"
+    text = (BENCH / "lines5000.st").read_text(encoding="utf-8") + more
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "lines5000.st"
+        path.write_text(text, encoding="utf-8")
+        taken = []
+        for _ in range(3):
+            began = time.process_time()
+            compile_files([path], cache=False)
+            taken.append(time.process_time() - began)
+        lines = len(text.splitlines())
+        yield f"{lines:,} lines, text to image", f"{lines / min(taken):,.0f} lines/s", ">= 15,000 lines/s"
+        took = [cold_ms(folder, number, path) for number in range(1 + run.STARTS)]  # the first one makes bytecode
+        yield "  the same, cold, from start to first native scan", f"{min(took[1:]):,.0f} ms", "<= 1,000 ms"
+
+
+def cold_ms(folder: str, number: int, path: Path) -> float:
+    """The work of a new process from its start to the first scan; of the helper that optimises meanwhile nothing is in it."""
+    environment = run.clean_environment(folder) | {"FBVM_CACHE": str(Path(folder) / f"cold{number}")}
+    return float(subprocess.check_output([sys.executable, "-c", COLD, str(path)], env=environment, text=True))
+
+
+COLD = """
+import sys, time
+from fbvm import Plc, compile_files
+assert Plc(compile_files([sys.argv[1]], runnable=True).image, engine="native").scan() is None
+print(time.process_time() * 1e3)
+"""
+
+
+def many() -> Iterator[Row]:
+    for name, count in MANY:
+        told = subprocess.check_output([sys.executable, str(BENCH / "many.py"), name, str(count), "cyclic", "100"], text=True)
+        _, _, _, _, kib, core, _, each, _, _, missed, *_ = told.split()
+        limits = "<= 25 %, 0, 50 KiB" if name == "logic" else "<= 100 %, 0"
+        yield f"{count:,} PLCs at 100 ms, {name}: of a core, missed, each", f"{core} %, {missed}, {kib} KiB", limits
+        yield "  a scan of one, with the start", f"{each} us", ""
+
+
+def programs() -> Iterator[Row]:
+    with tempfile.TemporaryDirectory() as folder:
+        for name, step_ns in native.PROGRAMS.items():
+            image = native.compiled(BENCH / "programs" / f"{name}.st")
+            hand = native.shortest_ns(native.by_hand(name, Path(folder), step_ns))
+            machine = native.shortest_ns(native.natively(image, 2, step_ns)) / hand
+            python = native.shortest_ns(native.in_python(image, step_ns), 5) / hand
+            yield f"{name}: machine code, times C by hand", f"{machine:.2f}", f"<= {MACHINE[name]}"
+            yield f"{name}: python engine, times C by hand", f"{python:.0f}", f"<= {PYTHON[name]}"
+
+
+def peers() -> Iterator[Row]:
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        binary = Path(folder) / "modbus"
+        subprocess.run(["cc", "-O2", "-o", str(binary), str(BENCH / "programs" / "modbus.c"), "-ldl"], check=True)
+        port = stack.enter_context(exchanges.server(binary))
+        ours = "blocks, native, event"
+        rates, used = exchanges.measure({
+            exchanges.BEST: exchanges.in_c(binary, "plain", port), exchanges.PLAIN: exchanges.pymodbus(stack, port),
+            ours: exchanges.Blocks(stack, exchanges.poll(), port, "native", "event", 10)})  # fmt: skip
+        rate = {name: statistics.median(found) for name, found in rates.items()}
+        yield "an exchange of the blocks, own processor time", f"{statistics.median(used[ours]):.0f} us", "<= 60 us"
+        yield "  its rate, times C that only sends and receives", f"{rate[ours] / rate[exchanges.BEST]:.2f}", ">= 0.6"
+        yield "  its rate, times pymodbus's client", f"{rate[ours] / rate[exchanges.PLAIN]:.2f}", ""
+        commands = servers.commands(binary)
+        found: dict[str, list[float]] = {"etn_modbus, 8 sockets": [], "pymodbus": []}
+        for _ in range(servers.ROUNDS):
+            for name, measured in found.items():
+                with servers.server(commands[name]) as served:
+                    measured.append(servers.rate(binary, served, AT_ONCE))
+        ratio = statistics.median(found["etn_modbus, 8 sockets"]) / statistics.median(found["pymodbus"])
+        yield f"{AT_ONCE} clients on {AT_ONCE} sockets, times pymodbus's server", f"{ratio:.2f}", ">= 2"
+
+
+PARTS: dict[str, Callable[[], Iterator[Row]]] = {
+    "starting": starting, "compiling": compiling, "many": many, "programs": programs, "peers": peers,
+}  # fmt: skip
+WITH_C = ("programs", "peers")
+
+
+def main() -> None:
+    wanted = sys.argv[1:] or list(PARTS)
+    for name in wanted:
+        if name in WITH_C and shutil.which("cc") is None:
+            print(f"{name}: not measured, there is no compiler of C")
+            continue
+        for what, ours, limit in PARTS[name]():
+            print(f"{what:<66}{ours:>26}   {limit}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
