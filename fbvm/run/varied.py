@@ -57,6 +57,7 @@ class Conditions:
 class VariedPlc:
     """One PLC of a test, and what is still to be done to it."""
 
+    run: VariedRun
     name: str
     plc: Plc
     find: Callable[[str], Place | Span]
@@ -82,6 +83,11 @@ class VariedPlc:
             self._write(lambda row: not row.at_ns)  # parameters of the beginning are part of the program
         self._write(lambda row: self.plc.now_ns < row.at_ns <= self.elapsed_ns)
 
+    def after_scan(self) -> None:
+        """Called behind a scan of a PLC that runs alone.  Raises AssertionError if the run is not good any more."""
+        if not self.name:
+            self.run.scanned(self.plc.now_ns)
+
     def _write(self, chosen: Callable[[Written], bool]) -> None:
         for row, place in self.written:
             if chosen(row):
@@ -96,6 +102,8 @@ class VariedRun:
     plcs: list[VariedPlc] = field(default_factory=list)
     used: set[str] = field(default_factory=set)
     """The names that were written to some PLC."""
+    judge: Callable[[VariedRun, int], None] | None = None
+    """Called with the time of a scan behind all scans that begin then; raises AssertionError for a run that is not good."""
     _networks: list[LoopNetwork] = field(default_factory=list)
 
     def made(self, name: str, plc: Plc, find: Callable[[str], Place | Span], network: LoopNetwork | None) -> VariedPlc:
@@ -108,11 +116,16 @@ class VariedRun:
             network.reseed(given.seed)
             network.faults[:0] = given.faults
         cuts = [cut for cut in given.cuts if cut.plc == name or (not cut.plc and not self.plcs)]
-        found = VariedPlc(name, plc, find, list(self._places(name, find)), sorted(cuts, key=lambda cut: cut.at_ns))
+        found = VariedPlc(self, name, plc, find, list(self._places(name, find)), sorted(cuts, key=lambda cut: cut.at_ns))
         found.begins_ns = sum(phase_ns for owner, phase_ns in given.phases_ns if _is_of(name, owner))
         found._write(lambda row: not row.at_ns)
         self.plcs.append(found)
         return found
+
+    def scanned(self, now_ns: int) -> None:
+        """Called behind all scans that begin at a time.  Raises AssertionError if the run is not good any more."""
+        if self.judge:
+            self.judge(self, now_ns)
 
     def _places(self, name: str, find: Callable[[str], Place | Span]) -> Sequence[tuple[Written, Place | Span]]:
         found = []

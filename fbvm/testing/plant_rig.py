@@ -87,6 +87,8 @@ class PlantRig:
         for rig in self.rigs.values():
             if rig.elapsed_ns == now_ns:
                 rig.scan()
+        if self._varied:
+            self._varied.scanned(now_ns)
         return self
 
     def run(self, time: str | int) -> PlantRig:

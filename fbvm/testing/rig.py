@@ -287,6 +287,8 @@ class Rig:
         trap = self.plc.scan(self._varied.elapsed_ns if self._varied else None)
         if trap:
             raise Trapped(trap, trap.told(Names.of(self.plc.image, self.plc.memory.areas).instance))
+        if self._varied:
+            self._varied.after_scan()
 
     def disturb(self) -> None:
         """Does what a campaign does to the PLC before its next scan, which begins later if the power is cut."""

@@ -155,6 +155,8 @@ def _run(plc: Plc, watch: Assertions, counts: Counting, done: str, varied: Varie
         before = after
         if trap:
             raise Trapped(trap)
+        if varied:
+            varied.after_scan()
         if not waits or plc.read(done):
             return
         if plc.elapsed_ns >= LIMIT_NS:

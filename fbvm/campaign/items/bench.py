@@ -75,16 +75,15 @@ def plan_of_tests(written: Written, tests: Sequence[str]) -> Plan:
     """The plan of a campaign over tests, as pytest names them.  Raises Unfit for what only programs and projects have."""
     about = written.about
     if said := next(_of_programs(written), ""):
-        raise Unfit(f"tests judge themselves: leave out {said}")
+        raise Unfit(f"tests say that themselves: leave out {said}")
     axes = tuple(replace(axis, path=axis.path or axis.name) for axis in written.axes)
     cuts = tuple(replace(rule, plcs=rule.plcs or ("",)) for rule in written.cuts)
     nothing = Project(Source(FILE, ""), "loop", 0, None, None, (), (), frozenset(), (), ())
     return Plan(nothing, about["seed"], about["runs"], about["timing"], about["for"], axes, written.faults, cuts,
-                shown=about["show"], tests=tuple(tests))  # fmt: skip
+                written.judging, about["show"], tuple(tests))  # fmt: skip
 
 
 def _of_programs(written: Written) -> Iterator[str]:
-    about, judging = written.about, written.judging
-    yield from (name for name in ("never", "always", "until") if about[name])
-    yield from ["within"] * bool(judging.responses) + ["golden"] * bool(judging.goldens)
+    about = written.about
+    yield from ["until"] * bool(about["until"]) + ["golden"] * bool(written.goldens)
     yield from (name for name in ("project", "sources", "program", "dialect", "libraries", "servers") if about[name])

@@ -10,7 +10,7 @@ import shutil
 import zlib
 from collections.abc import Callable, Generator, Sequence
 from contextlib import chdir, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os.path import relpath
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,8 +20,9 @@ import pytest
 
 from fbvm.base.codes import CODES
 from fbvm.campaign.execution import Result
+from fbvm.campaign.items.watched import Violated, Watched
 from fbvm.campaign.judge import TEST, TRAP, Failure
-from fbvm.campaign.plan import CYCLE, PHASE, TIMING, VALUE, Plan
+from fbvm.campaign.plan import CYCLE, PHASE, TIMING, VALUE, Judging, Plan
 from fbvm.campaign.pytest_session import run_pytest
 from fbvm.campaign.variants import Variant
 from fbvm.record.recording.file_writer import fingerprint
@@ -108,7 +109,8 @@ class ItemsSession:
 
     def result(self, variant: Variant) -> Result:
         """What comes of a run: the first test that fails ends it.  Raises NoTests."""
-        session, run = self._session, VariedRun(conditions_of(self._plan, variant))
+        session, watched = self._session, Watched(self._plan.judging)
+        run = VariedRun(conditions_of(self._plan, variant), judge=watched if self._plan.judging != Judging() else None)
         if not self._is_collected:
             session.perform_collect()
         self._is_collected, self.failure = False, None
@@ -123,6 +125,8 @@ class ItemsSession:
         names = {axis.path for axis in self._plan.axes if axis.what == VALUE}
         if (unknown := sorted(names - run.used)) and not self.failure:
             raise NoTests(f"no PLC that these tests make has {unknown[0]}")
+        if run.judge and not watched.judge and not self.failure:
+            raise NoTests(f"the conditions fit no PLC that these tests make: {watched.why}")
         return self._summed(variant, run)
 
     def _summed(self, variant: Variant, run: VariedRun) -> Result:
@@ -201,8 +205,14 @@ def _failure(item: pytest.Item, call: pytest.CallInfo[None], report: pytest.Test
         site = error.trap.site
         return Failure(TRAP, CODES[error.trap.code].title, code=error.trap.code, file=site.file, pou=site.pou, line=site.line,
                        detail=f"{item.nodeid}: {said}")  # fmt: skip
+    if isinstance(error, Violated):
+        return replace(error.failure, file=Path(relpath(item.path)).as_posix(), line=_line(item, call), detail=item.nodeid)
     if isinstance(error, AssertFailed):
         return Failure(TEST, item.nodeid, file=error.site.file, pou=error.site.pou, line=error.site.line, detail=said)
+    return Failure(TEST, item.nodeid, file=Path(relpath(item.path)).as_posix(), line=_line(item, call), detail=said)
+
+
+def _line(item: pytest.Item, call: pytest.CallInfo[None]) -> int:
+    """The line of a test in which it has failed; that of its beginning if none of its lines was executed."""
     own = [entry for entry in call.excinfo.traceback if Path(entry.path) == item.path] if call.excinfo else []
-    line = own[-1].lineno + 1 if own else (item.reportinfo()[1] or 0) + 1
-    return Failure(TEST, item.nodeid, file=Path(relpath(item.path)).as_posix(), line=line, detail=said)
+    return own[-1].lineno + 1 if own else (item.reportinfo()[1] or 0) + 1

@@ -78,9 +78,18 @@ def test_a_test_in_st_is_varied_and_its_line_told(project: Path) -> None:
 
 
 @pytest.mark.slow
+def test_conditions_are_watched_behind_the_scans_of_a_test(project: Path) -> None:
+    status, said = fbvm("tests/test_counter.py", "--vary", "Step=1,2", "--never", "Total > 6", "--jobs", "1", "--json")
+    [group] = json.loads(said)["groups"]
+    assert (status, group["kind"], group["text"], group["first"], group["scan"]) == (1, "never", "Total > 6", 1, 3)
+    assert (group["file"], group["line"]) == ("tests/test_counter.py", 3)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("arguments", "said"), [
     (("tests/test_counter.py", "--vary", "Foo=1,2"), "no PLC that these tests make has Foo"),
-    (("tests/test_counter.py", "--never", "Total > 3"), "tests judge themselves: leave out never"),
+    (("tests/test_counter.py", "--until", "Total > 3"), "tests say that themselves: leave out until"),
+    (("tests/test_counter.py", "--never", "Foo > 3"), "the conditions fit no PLC that these tests make"),
     (("tests/test_counter.py", "--cycle", "5ms"), "tests say themselves what they run: leave out --cycle"),
     (("tests/test_counter.py", "src/Counter.st"), "name tests, or programs, not both"),
     (("tests/test_counter.py::test_nothing",), "not found"),
