@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fins_rig import FinsRig, TcpClient
+from fins_rig import UNIT, FinsRig, TcpClient, compiled
 from wireshark import TSHARK, tshark
 
 from fbvm.record.export.pcapng import Capture
+from fbvm.units.etn21.unit import Etn21
+from fbvm.wire.fins.frames import Address, Command, Header
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not TSHARK, reason="tshark is not installed")]
 COMMANDS = ["0101 82 0064 00 0003", "0102 82 0064 00 0002 1234 5678", "0103 82 0000 00 000A ABCD", "0104 82 0064 00 30 0064 01",
@@ -55,3 +57,22 @@ def test_a_comment_says_the_scan_and_the_frame(capture: Path) -> None:
     assert "scan 2; FINS 25 -> 1, service 7: memory area read, D100, 3 elements" in said
     assert "FINS 1 -> 25, service 7: memory area read: normal end, 6 bytes" in said
     assert "FINS 239 -> 1, service 1: forced set or reset, CIO 100.01 ON" in said
+
+
+def test_commands_over_a_connection_that_the_unit_opens_are_fins_too(tmp_path: Path) -> None:
+    path = tmp_path / "run.pcapng"
+    with path.open("wb") as file:
+        rig = FinsRig()
+        other = compiled()
+        desk = Etn21(0, "192.168.250.2", fins=True, fins_clients={"1": UNIT})
+        other.attach(desk, rig.network)
+        rig.network.tap = Capture(file, comment=lambda address: f"scan {rig.plc.scans}").tap
+        for scan in range(12):
+            if scan == 6:
+                assert desk.send(Command(Header(Address(0, 1), Address(), 7), 0x0101, bytes.fromhex("82 0064 00 0001"))) == 0
+            rig.plc.scan()
+            other.scan()
+    assert tshark(path, "-Y", "_ws.malformed") == []
+    said = " ".join(tshark(path, "-Y", "tcp.port == 9600", "-T", "fields", "-e", "frame.comment"))
+    assert "FINS/TCP: client node 2, server node 1" in said
+    assert "FINS 1 -> 2, service 7: memory area read: normal end, 2 bytes" in said
