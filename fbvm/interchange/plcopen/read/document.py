@@ -64,6 +64,8 @@ class VarList:
     qualifiers: tuple[str, ...]
     variables: tuple[Variable, ...]
     name: str = ""
+    attributes: tuple[str, ...] = ()
+    """Pragmas that stand in front of it."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,16 @@ class Body:
 
     language: str
     element: Element
+
+
+@dataclass(frozen=True)
+class Head:
+    """Of a POU the words in front of its name, what it extends and implements, and the pragmas in front of it."""
+
+    words: tuple[str, ...] = ()
+    extends: tuple[str, ...] = ()
+    implements: tuple[str, ...] = ()
+    attributes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -87,6 +99,10 @@ class Pou:
     transitions: tuple[tuple[str, Body], ...]
     note: str
     element: Element
+    head: Head = field(default_factory=Head)
+    """What CODESYS keeps of its head in addData."""
+    members: tuple[Pou, ...] = ()
+    """Its METHODs and PROPERTYs; of a property its accessors, of the kinds GET and SET."""
 
     def variable(self, name: str) -> Variable | None:
         """The variable of that name, whatever its case."""
@@ -105,6 +121,8 @@ class DataType:
     text: str
     initial: str
     note: str
+    extends: tuple[str, ...] = ()
+    attributes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from fbvm.interchange.plcopen.read.document import (
     Variable,
     VarList,
 )
+from fbvm.interchange.plcopen.read.objects import INTERFACE, METHOD, accessors, arguments, head, members, property_type
 from fbvm.interchange.plcopen.read.types import duration, location, note, type_text, value_text
 from fbvm.interchange.plcopen.schema import KINDS, LOCATION, MNEMONIC, QUALIFIERS, SECTIONS
 
@@ -30,10 +31,9 @@ TC6 = "http://www.plcopen.org/xml/tc6"
 IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
 """Namespace of IEC 61131-10, another schema (from memory of the family, assumed)."""
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
-OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "itf", "namespace"}
-"""Last words of the names of `addData` with object-oriented parts of programs (CODESYS)."""
 READ = {"pou", "element", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location",
-        "action"}
+        "action", "method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "inheritance",
+        "datatypeinheritance", "accessmodifiers", "attributes", "inputassignments"}
 """Last words of the names of `addData` whose contents are taken over."""
 SETTINGS = {"objectid", "tasksettings", "projectinformation", "projectstructure", "fbdcalltype", "fbdelementtype",
             "interfaceasplaintext", "buildproperties"}
@@ -59,6 +59,8 @@ def read_project(reading: Reading, root: Element) -> Document | None:
             types += _data_type(reading, element)
         elif element.name == "pou":
             pous += _pou(reading, element)
+        elif element.name == INTERFACE:
+            pous += _interface(reading, element)
         elif element.name == "globalVars":
             lists += _var_list(reading, element, parent.get("name"))
     configurations = tuple(_configuration(reading, c) for c in root.walk() if c.name == "configuration")
@@ -74,9 +76,9 @@ def _parts(root: Element) -> Iterator[tuple[Element, Element]]:
         if element.name == "globalVars" and parent.name in ("configuration", "resource", "interface"):
             if element.get("name") and parent.name != "interface":
                 yield element, element
-        elif element.name in ("dataType", "pou", "globalVars"):
+        elif element.name in ("dataType", "pou", "globalVars", INTERFACE):
             yield element, parent
-        if element.name not in ("pou", "dataType"):
+        if element.name not in ("pou", "dataType", INTERFACE):
             todo.extend((child, element) for child in reversed(element.children))
 
 
@@ -95,7 +97,8 @@ def _data_type(reading: Reading, element: Element) -> Iterator[DataType]:
     name = identifier(reading, element)
     kind = type_text(reading, element.one("baseType"), element)
     if name and kind:
-        yield DataType(name, kind, value_text(element.one("initialValue"), kind, reading.producer.family), note(element))
+        yield DataType(name, kind, value_text(element.one("initialValue"), kind, reading.producer.family), note(element),
+                       head(element).extends, head(element).attributes)
 
 
 # --- variables --------------------------------------------------------------------------------------------------------
@@ -108,7 +111,7 @@ def _var_list(reading: Reading, element: Element, name: str = "") -> Iterator[Va
     qualifiers = tuple(word for key, word in QUALIFIERS.items() if element.get(key) in ("true", "1"))
     variables = tuple(v for inner in element.all("variable") for v in _variable(reading, inner))
     if variables:
-        yield VarList(SECTIONS[element.name], qualifiers, variables, name)
+        yield VarList(SECTIONS[element.name], qualifiers, variables, name, head(element).attributes)
     for inner in inside:
         yield from _var_list(reading, inner, name)
 
@@ -118,7 +121,7 @@ def _variable(reading: Reading, element: Element) -> Iterator[Variable]:
     kind = type_text(reading, element.one("type"), element)
     if name and kind:
         initial = value_text(element.one("initialValue"), kind, reading.producer.family)
-        yield Variable(name, kind, initial, location(element), note(element))
+        yield Variable(name, kind + arguments(element), initial, location(element), note(element))
 
 
 # --- POUs -------------------------------------------------------------------------------------------------------------
@@ -132,11 +135,7 @@ def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
         return
     reading.where = name
     interface = element.one("interface")
-    parts = interface.children if interface else []
-    lists = tuple(made for part in parts if part.name in SECTIONS for made in _var_list(reading, part))
-    for part in parts:
-        if part.name == "accessVars" and part.all("variable"):
-            reading.report("X0203", part, "access variables are not taken over")
+    lists = _lists(reading, interface)
     returned = interface.one("returnType") if interface else None
     result = type_text(reading, returned, element) if returned and kind == "FUNCTION" else ""
     bodies = element.all("body")
@@ -145,8 +144,48 @@ def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
                        "one body a POU is read")
     body = _body(reading, bodies[0]) if bodies else None
     yield Pou(kind, name, result, lists, body, _named_bodies(reading, element, "action"),
-              _named_bodies(reading, element, "transition"), note(element) or (note(interface) if interface else ""), element)
+              _named_bodies(reading, element, "transition"), note(element) or (note(interface) if interface else ""), element,
+              head(element), _members(reading, element))
     reading.where = ""
+
+
+def _lists(reading: Reading, interface: Element | None) -> tuple[VarList, ...]:
+    """The sections of variables of a POU or a method."""
+    parts = interface.children if interface else []
+    for part in parts:
+        if part.name == "accessVars" and part.all("variable"):
+            reading.report("X0203", part, "access variables are not taken over")
+    return tuple(made for part in parts if part.name in SECTIONS for made in _var_list(reading, part))
+
+
+def _members(reading: Reading, element: Element) -> tuple[Pou, ...]:
+    """The methods and properties of a POU or an interface."""
+    found = []
+    for member in members(element):
+        name = identifier(reading, member)
+        if name and member.name == METHOD:
+            interface = member.one("interface")
+            returned = interface.one("returnType") if interface else None
+            result = type_text(reading, returned, member) if returned else ""
+            found.append(_routine(reading, "METHOD", name, result, member))
+        elif name and (kind := type_text(reading, property_type(member), member)):
+            parts = tuple(_routine(reading, which, name, "", accessor) for which, accessor in accessors(member))
+            found.append(Pou("PROPERTY", name, kind, (), None, (), (), note(member), member, head(member), parts))
+    return tuple(found)
+
+
+def _routine(reading: Reading, kind: str, name: str, result: str, element: Element) -> Pou:
+    """A method, or an accessor of a property."""
+    body = element.one("body")
+    interface = element.one("interface")
+    return Pou(kind, name, result, _lists(reading, interface), _body(reading, body) if body else None, (), (),
+               note(element) or (note(interface) if interface else ""), element, head(element))
+
+
+def _interface(reading: Reading, element: Element) -> Iterator[Pou]:
+    name = identifier(reading, element)
+    if name:
+        yield Pou("INTERFACE", name, "", (), None, (), (), note(element), element, head(element), _members(reading, element))
 
 
 def _kind(text: str) -> str | None:
@@ -228,20 +267,12 @@ def _data(element: Element) -> list[Element]:
 
 def _added(reading: Reading, root: Element) -> None:
     """Report the `addData` that are not taken over."""
-    pou = ""
     for element in root.walk():
-        if element.name == "pou":
-            pou = element.get("name")
         if element.name != "data" or not element.get("name"):
             continue
         name = element.get("name")
         last = name.rstrip("/").rpartition("/")[2].lower()
-        if last in OBJECT_ORIENTED:
-            inner = next(iter(element.children), element)
-            called = " ".join(filter(None, (last, inner.get("name"), "of", pou or "the project")))
-            reading.report("X0203", inner, f"{called} is not taken over",
-                           "object-oriented parts are not executed by this version")
-        elif last in SETTINGS:
+        if last in SETTINGS:
             reading.count("identities and settings of the tool in addData are not taken over", element)
         elif last not in READ and name not in (LOCATION, MNEMONIC):
             reading.count(f"addData {name} is not taken over", element)

@@ -65,12 +65,14 @@ def _outside(reading: Reading, document: Document, files: SourceFiles) -> None:
 
 def _data_type(data_type: DataType) -> list[str]:
     initial = f" := {data_type.initial}" if data_type.initial else ""
-    return [f"TYPE{remark(data_type.note)}", f"{data_type.name} : {data_type.text}{initial};", "END_TYPE", ""]
+    extends = f" EXTENDS {', '.join(data_type.extends)}" if data_type.extends else ""
+    return [*data_type.attributes, f"TYPE{remark(data_type.note)}", f"{data_type.name}{extends} : {data_type.text}{initial};",
+            "END_TYPE", ""]
 
 
 def _section(listed: VarList) -> list[str]:
     head = " ".join((listed.kind, *listed.qualifiers))
-    return [head, *(_variable(variable) for variable in listed.variables), "END_VAR", ""]
+    return [*listed.attributes, head, *(_variable(variable) for variable in listed.variables), "END_VAR", ""]
 
 
 def _variable(variable: Variable) -> str:
@@ -88,15 +90,26 @@ def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
     actions = [(name, bodies.lines(body)) for name, body in pou.actions]
     if pou.transitions and (pou.body is None or pou.body.language != "SFC"):
         reading.report("X0203", pou.element, f"{len(pou.transitions)} transitions without a chart are not taken over")
-    head = f"{pou.kind} {pou.name}" + (f" : {pou.result}" if pou.result else "")
     made = [VarList(section, (), tuple(Variable(name, kind) for name in names))
             for (section, kind), names in bodies.scope.made.items()]
     lines = [f"// {pou.note}"] if pou.note else []
-    lines += [head, *(line for listed in [*pou.lists, *_gathered(made)] for line in _section(listed)[:-1])]
+    lines += [*pou.head.attributes, _head(pou)]
+    lines += [line for listed in [*pou.lists, *_gathered(made)] for line in _section(listed)[:-1]]
     lines += main
     for name, inner in _ordered([*actions, *bodies.actions], main, reading.producer.generates):
         lines += ["", f"ACTION {name}:", *inner, "END_ACTION"]
+    for member in pou.members:
+        lines += ["", *(_pou(reading, document, member))]
     return [*lines, f"END_{pou.kind}"]
+
+
+def _head(pou: Pou) -> str:
+    """The head of a POU, a method or a property, or the word of an accessor."""
+    if pou.kind in ("GET", "SET"):
+        return " ".join((*pou.head.words, pou.kind))
+    bases = "".join(f" {word} {', '.join(names)}" for word, names in (("EXTENDS", pou.head.extends),
+                                                                      ("IMPLEMENTS", pou.head.implements)) if names)
+    return " ".join((pou.kind, *pou.head.words, pou.name)) + bases + (f" : {pou.result}" if pou.result else "")
 
 
 def _ordered(actions: list[NamedAction], chart: list[str], generates: bool) -> list[NamedAction]:

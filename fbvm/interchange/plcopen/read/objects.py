@@ -1,0 +1,102 @@
+"""Object-oriented parts of a document, which CODESYS keeps in `addData`: methods, properties, interfaces, inheritance.
+
+    pou/addData/data[name=.../method]/Method            interface, body, addData
+    pou/addData/data[name=.../property]/Property        interface with the type, GetAccessor, SetAccessor
+    interface/addData/data[name=.../pouinheritance]     Inheritance/Extends, Implements
+    .../addData/data[name=.../accessmodifiers]          AccessModifiers, with attributes or elements that name them
+    .../addData/data[name=.../attributes]               Attributes/Attribute with Name and Value
+    variable/addData/data[name=.../inputassignments]    InputAssignments/InputAssignment/[Name,] Value, for FB_init
+    project/addData/data[name=.../interface]/Interface  Methods/Method, Properties/Property, addData
+
+Source: exports of CODESYS V3; that of properties is assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fbvm.interchange.markup import Element
+from fbvm.interchange.plcopen.read.document import Head
+
+INTERFACE, METHOD, PROPERTY = "Interface", "Method", "Property"
+ACCESSORS = {"GetAccessor": "GET", "SetAccessor": "SET", "Get": "GET", "Set": "SET"}
+_WORDS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "ABSTRACT", "FINAL")
+
+
+def added(element: Element | None) -> list[Element]:
+    """The `data` below `addData` of an element."""
+    holder = element.one("addData") if element is not None else None
+    return holder.all("data") if holder is not None else []
+
+
+def last_word(data: Element) -> str:
+    """The last word of the name of a `data`, in small letters."""
+    return data.get("name").rstrip("/").rpartition("/")[2].lower()
+
+
+def members(element: Element) -> Iterator[Element]:
+    """The methods and properties of a POU or an interface."""
+    for data in added(element):
+        if last_word(data) in ("method", "property"):
+            yield from data.all(METHOD, PROPERTY)
+    for holder in element.all("Methods", "Properties"):
+        yield from holder.all(METHOD, PROPERTY)
+
+
+def accessors(element: Element) -> Iterator[tuple[str, Element]]:
+    """The accessors of a property: GET or SET, and the element."""
+    for child in element.children:
+        if child.name in ACCESSORS:
+            yield ACCESSORS[child.name], child
+
+
+def property_type(element: Element) -> Element | None:
+    """The element that holds the type of a property."""
+    interface = element.one("interface")
+    within = interface.one("returnType") if interface is not None else None
+    return within or element.one("type") or element.one("Type") or element.one("returnType")
+
+
+def head(element: Element) -> Head:
+    """What `addData` of a POU, method or property, and of its interface, says of its head."""
+    words: list[str] = []
+    extends: list[str] = []
+    implements: list[str] = []
+    pragmas: list[str] = []
+    for data in (*added(element.one("interface")), *added(element)):
+        word = last_word(data)
+        for inner in data.children:
+            if word == "accessmodifiers":
+                words += _access(inner)
+            elif word in ("pouinheritance", "inheritance", "datatypeinheritance"):
+                extends += _names(inner, "Extends")
+                implements += _names(inner, "Implements")
+            elif word == "attributes":
+                pragmas += _pragmas(inner)
+    return Head(*(tuple(dict.fromkeys(each)) for each in (words, extends, implements, pragmas)))
+
+
+def arguments(element: Element) -> str:
+    """The arguments of FB_init that a variable gives, as they stand behind its type; "" if it gives none."""
+    rows = [(row.one("Name"), row.one("Value")) for data in added(element) if last_word(data) == "inputassignments"
+            for row in data.walk() if row.name == "InputAssignment"]
+    given = [f"{name.text.strip()} := {value.text.strip()}" if name is not None else value.text.strip()
+             for name, value in rows if value is not None]
+    return f"({', '.join(given)})" if given else ""
+
+
+def _access(element: Element) -> list[str]:
+    said = [name.upper() for name, value in element.attributes.items() if value.strip().lower() in ("true", "1")]
+    said += [child.name.upper() for child in element.children if child.text.strip().lower() in ("", "true", "1")]
+    return [word for word in _WORDS if word in said]
+
+
+def _names(element: Element, what: str) -> list[str]:
+    return [name.strip() for child in element.all(what) for name in child.text.split(",") if name.strip()]
+
+
+def _pragmas(element: Element) -> Iterator[str]:
+    for attribute in element.all("Attribute"):
+        value = attribute.get("Value")
+        name = attribute.get("Name").replace("'", "").replace("}", "")
+        yield f"{{attribute '{name}' := '{value}'}}" if value and not set(value) & set("'}\n\r") else f"{{attribute '{name}'}}"
