@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.base.version import VERSION
-from fbvm.campaign.fleet.shard import GO_ON, OVER, STOP, Figures, Shard, run_shard
+from fbvm.campaign.fleet.shard import GO_ON, OVER, STOP, Figures, Shard, figures, run_shard
 from fbvm.campaign.planning import images_of
 from fbvm.campaign.work import packed
 from fbvm.cli.main import main
@@ -127,3 +127,18 @@ def test_a_fleet_in_two_processes_does_all_scans_of_the_project(folder: Path) ->
     assert (result.exit_code, last["plcs"], last["scans"], [each["plcs"] for each in last["shards"]]) == (0, 6, 1200, [3, 3])
     refused = CliRunner().invoke(main, ["fleet"])
     assert refused.exit_code == status.USAGE and "say when to end" in refused.stderr
+
+
+def test_the_doors_of_a_part_are_open_on_this_computer(folder: Path) -> None:
+    door = '[[door]]\naddress = "10.0.1.254:502"\nbind = "127.0.0.1:0"\ncount = 5\ncounts = "port"\n'
+    parts = shards_of(project_of('[run]\nnet = "tcp"\n' + PROJECT.partition("[[door]]")[0] + door), 2)
+    plants = [Plant(part, for_ns=1) for part in parts]
+    try:
+        doors = [plant.doors for plant in plants]
+        hosts = [[unit.host for unit in each] for each in doors]
+        assert hosts == [["10.0.1.254", "10.0.1.255"], ["10.0.2.0", "10.0.2.1", "10.0.2.2"]]
+        assert len({real for each in doors for real in each.values()}) == 5
+        assert [figures(0, plant, lambda: 1).connections for plant in plants] == [0, 0]
+    finally:
+        for plant in plants:
+            plant.close()
