@@ -121,6 +121,7 @@ END_PROGRAM
 """
 
 
+@pytest.mark.slow
 def test_power_is_cut_and_comes_back_while_time_goes_on(project: Path) -> None:
     (project / "keeps.st").write_text(KEEPS)
     run = VariedRun(Conditions(written=(Written("limit", 7),), cuts=(PowerCut("", 35_000_000, 50_000_000),)))

@@ -70,6 +70,7 @@ def test_the_page_loads_itself_again_while_it_goes_on_and_names_of_programs_stay
     assert "refresh" not in progress_page(progress, "Campaign", {})
 
 
+@pytest.mark.slow
 def test_a_campaign_leaves_its_page_and_prints_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("count.st").write_text("PROGRAM Main VAR n, limit : INT; END_VAR n := n + 1; END_PROGRAM")

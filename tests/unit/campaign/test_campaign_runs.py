@@ -81,6 +81,7 @@ def groups(said: str) -> dict[tuple[str, str, int], Any]:
     return {(group["kind"], group["file"], group["line"]): group for group in json.loads(said)["groups"]}
 
 
+@pytest.mark.slow
 def test_failures_are_grouped_by_the_statement_that_brought_them(folder: Path) -> None:
     status, said = fbvm("mix.st", "--vary", "Main.Limit=4..20", "--for", "2s", "--never", "Main.Up AND Main.Down", "--json")
     found = groups(said)
@@ -91,6 +92,7 @@ def test_failures_are_grouped_by_the_statement_that_brought_them(folder: Path) -
     assert [(row["Main.Limit"], row["result"], row["line"]) for row in rows[3:5]] == [("7", "never", "18"), ("8", "trap", "14")]
 
 
+@pytest.mark.slow
 def test_a_late_answer_is_told_with_the_statement_of_its_trigger(folder: Path) -> None:
     late = ["--within", "Main.Busy", "Main.Count = 4", "150ms", "--for", "1200ms", "--json"]
     status, said = fbvm("mix.st", "--vary", "Main.Wait=T#10ms,T#100ms,T#300ms", *late)
@@ -98,12 +100,14 @@ def test_a_late_answer_is_told_with_the_statement_of_its_trigger(folder: Path) -
         1, [(TRAPPED, 0), (("within", "mix.st", 19), 2)])
 
 
+@pytest.mark.slow
 def test_what_has_to_hold_before_the_end_fails_without_it(folder: Path) -> None:
     status, said = fbvm("mix.st", "--vary", "Main.Wait=T#100ms,T#300ms", "--until", "Main.Count = 5", "--for", "1s", "--json")
     assert (status, [(kind, group["first"]) for (kind, _, _), group in groups(said).items()]) == (1, [("until", 1)])
     assert fbvm("mix.st", "--vary", "Main.Wait=T#100ms", "--until", "Main.Count = 5", "--for", "1s", "--fresh")[0] == 0
 
 
+@pytest.mark.slow
 def test_the_recording_of_a_group_does_the_run_again_to_the_bit(folder: Path) -> None:
     fbvm("mix.st", "--cuts", "2", "--runs", "5", "--for", "3s", "--always", "Main.Kept < 8")
     recording = str(folder / "campaign-results" / "1.fbtrace")
@@ -157,6 +161,7 @@ def test_a_run_that_ends_its_process_is_a_failure_and_nothing_else_is_lost(folde
     assert [(result.number, result.failure.kind) for result in outcome.rows if result.failure] == [(7, CRASHED)]
 
 
+@pytest.mark.slow
 def test_a_campaign_goes_on_where_it_was_cut_off(folder: Path) -> None:
     """Killed while it wrote a line: the table is that of a campaign in one piece, and whole runs are not executed again."""
     arguments = ["mix.st", "--vary", "Main.Limit=1..8", "--for", "1s", "--never", "Main.Up AND Main.Down", "--jobs", "1"]
@@ -197,6 +202,7 @@ def test_a_campaign_whose_own_process_is_killed_gives_the_same_table_when_it_is_
     assert lines_in(folder / "whole" / LINES) == lines_in(lines) == 501
 
 
+@pytest.mark.slow
 def test_results_of_another_campaign_are_not_mixed(folder: Path) -> None:
     assert fbvm("mix.st", "--vary", "Main.Limit=1..3", "--for", "100ms")[0] == 0
     (folder / "mix.st").write_text(MIX.replace("Count > 2", "Count > 1"))
