@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from fbvm.code.image import Image
+from fbvm.prove.cover import Covered, Reaching
 from fbvm.prove.question import ALWAYS, NO_TRAP, REACH, WITHIN, Run, Verdict
 
 
@@ -26,8 +28,54 @@ def pytest_text(verdicts: Sequence[Verdict], files: Sequence[Path], options: dic
     return "\n".join(lines) + "\n"
 
 
+def covering_text(covered: Covered, image: Image, files: Sequence[Path], options: dict[str, str]) -> str:
+    """The text of a test module with a test for each run that meets goals of coverage.
+
+    What outputs are is what they are today: a test says that this has changed, and a person whether it is right."""
+    first, *others = (str(file) for file in files)
+    subject = f"{first}::{options['program']}" if "program" in options else first
+    given = f", sources={others!r}" if others else ""
+    given += f", dialect={options['dialect']!r}" if "dialect" in options else ""
+    lines = ['"""Runs that execute what no other test does, found by `fbvm prove --tests`.', "",
+             'The outputs are those of the program as it was: look at them once, whether they are right."""']  # fmt: skip
+    used: set[str] = set()
+    for each in covered.runs:
+        told = [spot.words(image) for spot in each.spots]
+        more = f"\n\n    {len(told)} statements and branches" if len(told) > 1 else ""
+        lines += ["", "", f"def {_named(f'reaches {Path(told[0]).name}', used)}(plc):", f'    """Executes {told[0]}.{more}"""',
+                  f"    machine = plc({subject!r}, {each.run.cycle_ns:_}{given}).plc", *_compared(each)]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _compared(each: Reaching) -> Iterator[str]:
+    """The scans of a run, with what the outputs are before each change of inputs and at its end."""
+    waiting = 0
+    for number in range(each.run.scans):
+        changes = [*_writes(each.run, number, "machine")]
+        if changes and waiting:
+            yield from _ended(each, number - 1, waiting)
+            waiting = 0
+        yield from changes
+        waiting += 1
+    yield from _ended(each, each.run.scans - 1, waiting)
+
+
+def _ended(each: Reaching, number: int, scans: int) -> Iterator[str]:
+    if number == each.run.scans - 1 and each.run.trap is not None:
+        yield f"    assert machine.run(scans={scans}) == 'trap'"
+        return
+    yield f"    machine.run(scans={scans})"
+    for place, value in each.outputs[number].items():
+        sign = "is" if isinstance(value, bool) else "=="
+        yield f"    assert machine.read({place.name!r}) {sign} {value!r}"
+
+
 def _test_name(verdict: Verdict, used: set[str]) -> str:
-    words = "_".join(re.findall(r"\w+", str(verdict.question).lower()))[:60].rstrip("_")
+    return _named(str(verdict.question), used)
+
+
+def _named(text: str, used: set[str]) -> str:
+    words = "_".join(re.findall(r"\w+", text.lower()))[:60].rstrip("_")
     name, number = f"test_{words}", 2
     while name in used:
         name, number = f"test_{words}_{number}", number + 1
@@ -71,10 +119,10 @@ def _scans(run: Run, count: int) -> Iterator[str]:
         yield f"    plc.run(scans={waiting})"
 
 
-def _writes(run: Run, number: int) -> Iterator[str]:
+def _writes(run: Run, number: int, plc: str = "plc") -> Iterator[str]:
     """What is written before the scan of a number, and how long before it the last one began where that changes."""
     passed_ns = [run.cycle_ns, *run.passed_ns]
     if number and passed_ns[number] != passed_ns[number - 1]:
-        yield f"    plc.cycle_ns = {passed_ns[number]:_}"
+        yield f"    {plc}.cycle_ns = {passed_ns[number]:_}"
     for place, value in run.writes[number].items():
-        yield f"    plc.write({place.name!r}, {value!r})"
+        yield f"    {plc}.write({place.name!r}, {value!r})"

@@ -236,18 +236,25 @@ def sampled(machine: Machine, judge: Judge, cells: Sequence[Cell], state: dict[T
     return found
 
 
-def replayed(machine: Machine, judge: Judge, inputs: Inputs, is_shortest: bool) -> Run | None:
-    """The run with these inputs, done on the engine; None if it does not meet the goal in its last scan, or earlier only."""
-    judge, plc = judge.begun(), machine.plc()
-    writer = InputWriter(plc, list(inputs.values[0]) if inputs.values else [])
-    writes: list[dict[Place, Value]] = []
+def stepped(plc: Plc, writer: InputWriter, inputs: Inputs) -> Iterator[dict[Place, Value]]:
+    """Does a run scan by scan: behind each, what was written before it."""
     for number, now in enumerate(inputs.values):
         before = inputs.values[number - 1] if number else {cell: writer.read(cell) for cell in now}
         changed = [cell for cell, value in now.items() if value != before[cell]]
         for cell in changed:
             writer.write(cell, now[cell])
-        writes.append({place: plc.read(place) for cell in changed for place in writer.places[cell]})
+        written = {place: plc.read(place) for cell in changed for place in writer.places[cell]}
         plc.scan(inputs.times_ns[number])
+        yield written
+
+
+def replayed(machine: Machine, judge: Judge, inputs: Inputs, is_shortest: bool) -> Run | None:
+    """The run with these inputs, done on the engine; None if it does not meet the goal in its last scan, or earlier only."""
+    judge, plc = judge.begun(), machine.plc()
+    writer = InputWriter(plc, list(inputs.values[0]) if inputs.values else [])
+    writes: list[dict[Place, Value]] = []
+    for number, written in enumerate(stepped(plc, writer, inputs)):
+        writes.append(written)
         if not judge.kept(plc):
             return None
         if judge.met(plc):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 from fbvm.base.data import data_folder
 from fbvm.code.image import Image
@@ -21,7 +22,7 @@ STEPS = (1, 4, 16, 64)
 def unreached(summary: Summary, goal: Goal, clock: Clock, scans: int, expired: Callable[[], bool]) -> list[int]:
     """The sites of the user's statements that no run of so many scans reaches, in the order of the source."""
     image, terms = summary.image, summary.terms
-    own = _own_files(image)
+    own = own_files(image)
     met = {site: term for site, term in summary.reached.items() if image.sites[site].file in own}
     missing = {site for site, term in met.items() if term is terms.false}
     missing |= {site for site in _never_called(summary) if image.sites[site].file in own}
@@ -54,10 +55,11 @@ def _unmet(summary: Summary, goal: Goal, clock: Clock, sites: list[int], scans: 
     return list(waiting)
 
 
-def _own_files(image: Image) -> set[str]:
+def own_files(image: Image) -> set[str]:
     """The files that are no part of a shipped library."""
     library = data_folder("fblib")
-    return {site.file for site in image.sites if not (library / site.file).is_file()}
+    names = {site.file for site in image.sites}
+    return {name for name in names if Path(name).is_absolute() or not (library / name).is_file()}
 
 
 def _called(image: Image) -> set[int]:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from fbvm.base.files import write_file
+from fbvm.cli.programs.prove_tests import answering, told, write_tests
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.given_sources import inputs, sources_of
 from fbvm.cli.shared.options import CYCLE_NS, time_ns
-from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.run_recording import described, program_text, record_run, write_page
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.sources import compile_options, compile_or_exit, report_diagnostics, source_arguments
@@ -26,17 +25,14 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove import equality
 from fbvm.prove.cycle import cycle_bounds, show_cycle
-from fbvm.prove.encoding.execution import Refused
-from fbvm.prove.prover import Limits, SpuriousRun, prove
+from fbvm.prove.prover import Limits, prove
 from fbvm.prove.pytest_text import pytest_text
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
 from fbvm.prove.ready import at_most_one, handshake
 from fbvm.prove.report import details, headline
 from fbvm.prove.runs import repeated
-from fbvm.prove.solver import SolverMissing
 from fbvm.run.time_limit import time_limit
 from fbvm.watch.paths import UnknownPlace
-from fbvm.watch.scanner import ConditionError
 from fbvm.watch.values import plain_value
 
 BUDGET_NS = 60_000_000_000
@@ -78,6 +74,9 @@ def _cycle(value: str) -> tuple[int, int]:
 @click.option("--trace", type=_FILE, metavar="FILE", help="Record the first run that is found for `fbvm chart`, `table`, `why`.")
 @click.option("--html", type=_FILE, metavar="FILE", help="Write the first run that is found as a page for a browser.")
 @click.option("--test", "test_file", type=_FILE, metavar="FILE", help="Write each run that is found as a test of pytest.")
+@click.option("--tests", "tests_file", type=_FILE, metavar="FILE",
+              help="Write tests that execute every statement and every IF and CASE without a branch.")
+@click.option("--covered", type=_FILE, metavar="FILE", help="With --tests: what tests execute already, by `--fbvm-cov-xml FILE`.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     """Prove properties of a program for all inputs and all scans, or draw the shortest run that breaks one.
@@ -89,9 +88,15 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     followed."""
     questions = _questions(options)
     pairs = options["pairs"]
+    if options["tests_file"]:
+        if questions or pairs or options["handshake"]:
+            raise click.UsageError("--tests stands alone: ask for properties in a call of its own")
+        sys.exit(write_tests(files, program, libraries, as_json, options))
+    if options["covered"]:
+        raise click.UsageError("--covered says what --tests may leave out, which is not given")
     if not questions and not pairs and not options["handshake"]:
-        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within, --at-most-one, --handshake "
-                               "or --equal")  # fmt: skip
+        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within, --at-most-one, --handshake, "
+                               "--equal or --tests")  # fmt: skip
     asked = [_equality(pair, files, libraries, options["assume"]) for pair in pairs]
     if questions or options["handshake"]:
         image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
@@ -153,26 +158,8 @@ def _answered(image: Image, question: Question, options: dict[str, Any]) -> Verd
     """The answer to one question.  Ends the verb for one that cannot be answered."""
     cycle_ns, longest_ns = options["cycle"]
     limits = Limits(cycle_ns, options["scans"], options["seed"], time_limit(options["budget_ns"]), longest_ns=longest_ns)
-    try:
-        with _told(str(question)) as tell:
-            return prove(image, question, limits, tell)
-    except (UnknownPlace, ConditionError) as error:
-        raise click.UsageError(str(error)) from None
-    except SolverMissing as error:
-        raise click.UsageError(str(error)) from None
-    except Refused as refused:
-        place = f"{image.sites[refused.site]}: " if refused.site >= 0 else ""
-        say(f"{place}{question}: {refused.reason}", fg="red", err=True)
-        sys.exit(status.PROGRAM_ERRORS)
-    except SpuriousRun as error:
-        say(f"{question}: {error}", fg="red", err=True)
-        sys.exit(status.STOPPED)
-
-
-@contextmanager
-def _told(text: str) -> Iterator[Callable[[str], None]]:
-    with show_progress(text) as update:
-        yield lambda said: update(said, 0, 1)
+    with answering(image, str(question)), told(str(question)) as tell:
+        return prove(image, question, limits, tell)
 
 
 def _print(image: Image, verdict: Verdict) -> None:

@@ -13,6 +13,7 @@ from fbvm.base.data import data_folder
 from fbvm.cli.main import main
 from fbvm.cli.programs.prove import command
 from fbvm.prove import solver
+from fbvm.testing.plugin import RigMaker
 
 INTERLOCK = str(data_folder("examples") / "classics" / "interlock.st")
 DIVIDES = "PROGRAM Main\nVAR a AT %IW0 : INT; b : INT; END_VAR\n    b := 100 / a;\nEND_PROGRAM\n"
@@ -156,3 +157,58 @@ def test_the_handshake_of_a_block_and_at_most_one(tmp_path: Path) -> None:
     assert "<title>job" in page.read_text(encoding="utf-8")
     assert "no two of the outputs" in proved(str(program), "--handshake", "Main.t").stderr
     assert "name two or more" in proved(str(program), "--at-most-one", "Main.t.Q").stderr
+
+
+PUMP = """PROGRAM Main
+VAR Level AT %IW0 : UINT; Pump AT %QX0.0 : BOOL; t : TON; END_VAR
+    t(IN := Level > 80, PT := T#20ms);
+    IF t.Q THEN
+        Pump := TRUE;
+    ELSIF Level < 20 THEN
+        Pump := FALSE;
+    ELSIF Level > 90 AND Level < 80 THEN
+        Pump := FALSE;
+    END_IF
+END_PROGRAM
+"""
+
+
+REPORT = """<?xml version="1.0"?>
+<coverage><packages><package name="."><classes><class name="pump" filename="{}"><lines>
+<line number="3" hits="9" branch="false"/>
+<line number="4" hits="9" branch="true" condition-coverage="{}"/>
+<line number="5" hits="{}" branch="false"/>
+<line number="7" hits="2" branch="false"/>
+</lines></class></classes></package></packages></coverage>
+"""
+
+
+@pytest.mark.slow
+def test_tests_for_what_no_test_executes(tmp_path: Path, plc: RigMaker) -> None:
+    program, tests, report = (tmp_path / name for name in ("pump.st", "test_pump.py", "cov.xml"))
+    program.write_text(PUMP, encoding="utf-8")
+    result = proved(str(program), "--tests", str(tests))
+    assert (result.exit_code, result.stdout.splitlines()) == (0, [
+        f"5 of 6 statements and branches are executed, with 2 new tests in {tests}", f"  {program}:9: no run ever does it"])
+    made = [run for name, run in runpy.run_path(str(tests)).items() if name.startswith("test_")]
+    assert len(made) == 2
+    for run in made:
+        run(plc)
+    report.write_text(REPORT.format(program, "25% (1/4)", 0), encoding="utf-8")
+    more = json.loads(proved(str(program), "--tests", str(tests), "--covered", str(report), "--json").stdout)
+    assert [each["executes"] for each in more["tests"]] == [[f"{program}:5", f"{program}:4 without a branch"]]
+    report.write_text(REPORT.format(program, "75% (3/4)", 1), encoding="utf-8")
+    none = proved(str(program), "--tests", str(tests), "--covered", str(report), "--json")
+    assert json.loads(none.stdout) == {"met": 5, "tests": [], "never": [f"{program}:9"], "missed": []}
+    short = proved(str(program), "--tests", str(tests), "--scans", "1")
+    assert (short.exit_code, f"{program}:5: no run of 1 scans does it" in short.stdout) == (1, True)
+
+
+def test_options_of_tests_that_do_not_go_together(tmp_path: Path) -> None:
+    program = tmp_path / "pump.st"
+    program.write_text(PUMP, encoding="utf-8")
+    rows = [(("--tests", "t.py", "--no-trap"), "--tests stands alone"), (("--covered", "c.xml", "--no-trap"), "--covered says"),
+            (("--tests", "t.py", "--covered", str(program)), "is no report of --fbvm-cov-xml")]  # fmt: skip
+    for arguments, said in rows:
+        result = proved(str(program), *arguments)
+        assert (result.exit_code, said in result.stderr) == (2, True), result.output
