@@ -86,17 +86,10 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
 
     Status 0 if all is proved or reached, 1 if a property is broken or undecided, 3 if the program has errors or cannot be
     followed."""
-    questions = _questions(options)
-    pairs = options["pairs"]
+    questions, pairs = _questions(options), options["pairs"]
+    _refuse_mixed(options, bool(questions or pairs or options["handshake"]))
     if options["tests_file"]:
-        if questions or pairs or options["handshake"]:
-            raise click.UsageError("--tests stands alone: ask for properties in a call of its own")
         sys.exit(write_tests(files, program, libraries, as_json, options))
-    if options["covered"]:
-        raise click.UsageError("--covered says what --tests may leave out, which is not given")
-    if not questions and not pairs and not options["handshake"]:
-        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within, --at-most-one, --handshake, "
-                               "--equal or --tests")  # fmt: skip
     asked = [_equality(pair, files, libraries, options["assume"]) for pair in pairs]
     if questions or options["handshake"]:
         image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
@@ -116,6 +109,17 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if found := [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]:
         _keep(asked[-1][0], found, options, files, libraries, program)
     sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
+
+
+def _refuse_mixed(options: dict[str, Any], asks: bool) -> None:
+    """Raises UsageError for options that do not go together, and where nothing is asked."""
+    if options["tests_file"] and asks:
+        raise click.UsageError("--tests stands alone: ask for properties in a call of its own")
+    if options["covered"] and not options["tests_file"]:
+        raise click.UsageError("--covered says what --tests may leave out, which is not given")
+    if not asks and not options["tests_file"]:
+        raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within, --at-most-one, --handshake, "
+                               "--equal or --tests")  # fmt: skip
 
 
 def _questions(options: dict[str, Any]) -> list[Question]:
