@@ -48,6 +48,12 @@ class ProgramFacts:
     def symbols(self) -> Mapping[str, Field]:
         return self.image.symbols
 
+    def name_in_block(self, body: int) -> str:
+        """The name of a method or an accessor of a property without that of its block."""
+        parts = self.body_name(body).split(".")
+        blocks = (count for count in range(len(parts) - 1, 0, -1) if fold(".".join(parts[:count])) in self.image.types)
+        return ".".join(parts[next(blocks, 1):])
+
     def body_name(self, body: int) -> str:
         """The name of the POU that is body number `body`."""
         return self.image.bodies[body].name

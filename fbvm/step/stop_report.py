@@ -57,7 +57,8 @@ class StopReport:
         """The path of an instance, with the method or property that is executed; a function has only its name."""
         name = self._session.facts.body_name(frame.body)
         path = self._session.names.instance(frame.base)
-        return f"{path}.{name.partition('.')[2]}" if path and self._session.facts.is_method(frame.body) else path or name
+        facts = self._session.facts
+        return f"{path}.{facts.name_in_block(frame.body)}" if path and facts.is_method(frame.body) else path or name
 
     def around(self, lines: int = AROUND) -> Iterator[str]:
         """The source around the next statement, whose line is marked with >; `lines` before and behind it."""

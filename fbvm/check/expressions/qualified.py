@@ -26,7 +26,17 @@ def bare(scope: Scope, expr: tree.Expr) -> str | None:
     if isinstance(expr, tree.Member) and is_space(scope, expr.of):
         space = dotted(expr.of)
         return f"{space}.{expr.name.text}" if scope.project.namespaces.space(space, scope.source) is not None else expr.name.text
-    return None
+    return _in_library(scope, expr) if isinstance(expr, tree.Member) else None
+
+
+def _in_library(scope: Scope, expr: tree.Member) -> str | None:
+    """The full name of what a user's library may declare in a NAMESPACE that no text has named yet, in a file of its name."""
+    name, first, project = dotted(expr), _first(expr), scope.project
+    if not name or not project.libraries.has_own_file(fold(expr.name.text)) or not isinstance(first, tree.NameRef) or \
+            scope.variable(first.text) is not None:
+        return None
+    found = project.pou(name, scope.source) or project.type_entry(name, scope.source)
+    return name if found is not None else None
 
 
 def dotted(expr: tree.Expr) -> str:

@@ -233,6 +233,10 @@ class Libraries:
         """True if a library may have a file for a folded name."""
         return name in _shipped_files() or name in self._files
 
+    def has_own_file(self, name: str) -> bool:
+        """True if a library of the user has a file for a folded name."""
+        return name in self._files
+
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(self._libraries)

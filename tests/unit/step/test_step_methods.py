@@ -124,3 +124,14 @@ def test_a_property_whose_accessor_ends_with_a_trap_says_so_and_leaves_the_memor
     with pytest.raises(CommandError, match=r"Main.slow.Actual cannot be computed: R0101 text.st:13"):
         list(commands.run("print Main.slow.Actual"))
     assert session.read(session.find("Main.slow.Speed")) == 0
+
+
+def test_a_method_of_a_namespace_is_shown_without_its_namespace() -> None:
+    text = f"NAMESPACE Plant.Drives\n{TEXT.partition('PROGRAM')[0]}END_NAMESPACE\n" \
+        "PROGRAM Main\nVAR slow : Plant.Drives.Motor; ok : BOOL; END_VAR\nok := slow.Start(Wanted := 2);\nEND_PROGRAM\n"
+    made = compile_text(text).image
+    assert made is not None
+    session = Session.of(lambda: Plc(made))
+    commands = Commands(session, StopReport(session, {"text.st": text}))
+    list(commands.run("break Plant.Drives.Motor.Start"))
+    assert any("in Main.slow.Start" in line for line in commands.run("run"))
