@@ -47,7 +47,7 @@ class Live:
     def window(self, url: str = "", **settings: Any) -> Any:
         """The page in a window of its own; what it complains about is in `complaints`."""
         page = self._browser.new_context(**{"viewport": {"width": 1400, "height": 1000}, **settings}).new_page()
-        page.set_default_timeout(20_000)
+        page.set_default_timeout(90_000)  # a busy machine checks a lesson for a minute
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("console", lambda message: self.complaints.append(message.text) if message.type == "error" else None)
         page.goto(url or self.url)
