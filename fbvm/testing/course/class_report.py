@@ -14,7 +14,8 @@ from fbvm.testing.course.lessons import OF_THE_LEARNER, Lesson, Result
 from fbvm.testing.pages import page_path
 
 _STYLE = """
-:root { color-scheme: light dark; --good: light-dark(#1b7f4d, #4cc38a); --bad: light-dark(#c92a2a, #ff8787);
+:root { color-scheme: light dark; background: Canvas; color: CanvasText }
+:root { --good: light-dark(#1b7f4d, #4cc38a); --bad: light-dark(#c92a2a, #ff8787);
   --link: light-dark(#1a4fa0, #9ec1ff) }
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 90rem; padding: 0 1rem; overflow-wrap: break-word }
 table { border-collapse: collapse } th, td { padding: .25rem .7rem; border-bottom: 1px solid #8884; text-align: left }
