@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from twincat_files import write_tested_solution
 
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
@@ -79,6 +80,13 @@ def test_runs_that_are_not_recorded_are_done_again_up_to_their_failures(monkeypa
         assert result.recorded is not None and result.recorded.scans.stop == failure.scan + 1
         lines.append(failure.site.line if failure.site is not None else None)
     assert lines == [6, 16]
+
+
+@pytest.mark.slow
+def test_suites_test_blocks_of_the_projects_that_theirs_refers_to(pytester: pytest.Pytester) -> None:
+    write_tested_solution(pytester.path)
+    result = pytester.runpytest("-q", "Line/Line.plcproj")
+    result.assert_outcomes(passed=1)
 
 
 @pytest.mark.slow

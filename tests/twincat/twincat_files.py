@@ -184,3 +184,38 @@ def write_solution(folder: Path) -> Path:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
     return folder / "Line" / "Line.plcproj"
+
+
+AXIS_TEST = HEAD + """  <POU Name="FB_Axis_Test" Id="{21}">
+    <Declaration><![CDATA[FUNCTION_BLOCK FB_Axis_Test EXTENDS TcUnit.FB_TestSuite
+VAR
+    fbAxis : Core.FB_Axis;
+END_VAR
+]]></Declaration>
+    <Implementation>
+      <ST><![CDATA[TEST('steps'); fbAxis(); AssertEquals_INT(5, fbAxis.nLast, 'last'); TEST_FINISHED();]]></ST>
+    </Implementation>
+  </POU>
+</TcPlcObject>
+"""
+TEST_PROGRAM = HEAD + """  <POU Name="PRG_TEST" Id="{22}">
+    <Declaration><![CDATA[PROGRAM PRG_TEST
+VAR
+    fbTest : FB_Axis_Test;
+END_VAR
+]]></Declaration>
+    <Implementation><ST><![CDATA[TcUnit.RUN();]]></ST></Implementation>
+  </POU>
+</TcPlcObject>
+"""
+
+
+def write_tested_solution(folder: Path) -> Path:
+    """As `write_solution`, but Line has a suite for a block of Core."""
+    line = write_solution(folder)
+    project = LINE.replace('"MAIN.TcPOU"/>', '"PRG_TEST.TcPOU"/><Compile Include="FB_Axis_Test.TcPOU"/>')
+    files = {"FB_Axis_Test.TcPOU": AXIS_TEST, "PRG_TEST.TcPOU": TEST_PROGRAM, "Line.plcproj": project,
+             "PlcTask.TcTTO": TASK.replace("MAIN", "PRG_TEST")}  # fmt: skip
+    for name, text in files.items():
+        (line.parent / name).write_text(text, encoding="utf-8")
+    return line

@@ -16,6 +16,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import dialect as named_dialect
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Site
+from fbvm.interchange.formats.given import sources_by_name
 from fbvm.interchange.twincat import PROJECT_SUFFIX
 from fbvm.interchange.twincat.project import read_project
 from fbvm.record.recording.recording import PlcRecording
@@ -44,13 +45,18 @@ class SuitesFile(pytest.File):
         self._wrong = ""
 
     def collect(self) -> Iterator[SuiteItem]:
-        project = read_project(_shown(self.path))
-        found = find_suites(project.sources)
+        path = _shown(self.path)
+        project = read_project(path)
+        used = [Source(name, text) for name, text in sources_by_name({path: project}).items()
+                if name not in project.files and isinstance(text, str)]
+        found = find_suites(project.sources, used)
         if not found:
             return
         if project.errors:
             raise self.CollectError("\n".join(message.render() for message in project.errors))
-        self.sources = [*self._libraries(project.references), *project.sources]
+        known = {source.name for source in used}
+        libraries = [each for each in self._libraries(project.references) if each.name not in known]
+        self.sources = [*libraries, *used, *project.sources]
         self.suites = [suite.path for suite in found]
         self.session.stash.setdefault(FILES, []).append(self)
         for suite in found:

@@ -48,11 +48,13 @@ class FoundSuite:
     has_others: bool
 
 
-def find_suites(sources: Sequence[Source]) -> list[FoundSuite]:
-    """The suites that the programs of some sources run, in the order of declaration; none if no program runs any."""
-    declared = [(node, source) for source in sources for node in parse(source)[0].declarations]
-    pous = {fold(node.name.text): (node, source) for node, source in declared if isinstance(node, tree.Pou)}
-    programs = [(node, source) for node, source in pous.values() if node.kind == "PROGRAM"]
+def find_suites(sources: Sequence[Source], libraries: Sequence[Source] = ()) -> list[FoundSuite]:
+    """The suites that the programs of some sources run, in the order of declaration; none if no program runs any.
+
+    Blocks of `libraries` may be suites, too, and what suites extend; their programs are not looked at."""
+    declared, behind = _declarations(sources), _declarations(libraries)
+    pous = {fold(node.name.text): (node, source) for node, source in (*behind, *declared) if isinstance(node, tree.Pou)}
+    programs = [(node, source) for node, source in declared if isinstance(node, tree.Pou) and node.kind == "PROGRAM"]
     if not any(_called(call) in RUNS for node, _ in programs for call in _calls(node)):
         return []
     found = [_suite(f"{Path(source.name).stem}.{name}", block, pous) for node, source in declared
@@ -60,6 +62,10 @@ def find_suites(sources: Sequence[Source]) -> list[FoundSuite]:
     found += [_suite(f"{node.name.text}.{name}", block, pous) for node, _ in programs for section in node.sections
               for name, block in _instances(section)]  # fmt: skip
     return [suite for suite in found if suite is not None]
+
+
+def _declarations(sources: Sequence[Source]) -> list[tuple[tree.Declaration, Source]]:
+    return [(node, source) for source in sources for node in parse(source)[0].declarations]
 
 
 Pous = dict[str, tuple[tree.Pou, Source]]
