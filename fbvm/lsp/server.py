@@ -153,6 +153,7 @@ class Server(LanguageServer):
         await asyncio.sleep(AFTER_KEY_S)
         if program.check_changes():
             self.tell(project)
+            self._garbage.typed()
             await asyncio.sleep(QUIET_S)
         steps = program.check()
         try:

@@ -135,6 +135,7 @@ def report(lines: int, places: int = PLACES, keys: int = KEYS) -> None:
         memory = [resident_mib()]
         for number in range(1, keys // len(TYPED) + 1):
             typist.statement()
+            garbage.typed()
             if number % 20 == 0:  # somebody pauses
                 program.check_all()
                 garbage.checked()

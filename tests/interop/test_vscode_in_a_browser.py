@@ -42,6 +42,13 @@ VAR Level : INT; END_VAR
     ASSERT(Level = 1);
 END_PROGRAM
 """
+PYTHON_TEST = """\
+from fbvm import compile_text
+
+
+def test_it_compiles():
+    assert compile_text("PROGRAM Main END_PROGRAM").image
+"""
 
 LAMP = """\
 <?xml version="1.0" encoding="utf-8"?>
@@ -77,6 +84,7 @@ def address(code_server: list[str], tmp_path: Path) -> Iterator[str]:
     (work / "tank.st").write_text(PUMP.replace("Levl", "Level"), encoding="utf-8")
     (work / "FB_Lamp.TcPOU").write_text(LAMP, encoding="utf-8")
     (work / "test_level.st").write_text(TEST, encoding="utf-8")
+    (work / "test_compiles.py").write_text(PYTHON_TEST, encoding="utf-8")
     fbvm = tmp_path / "fbvm"
     fbvm.write_text(f'#!/bin/sh\nexec {sys.executable} -m fbvm "$@"\n', encoding="utf-8")
     fbvm.chmod(0o755)
@@ -169,6 +177,35 @@ def test_from_a_mistake_to_a_step_back_and_a_green_test(page: Any) -> None:
     page.locator(".testing-run-glyph").first.click()
     page.locator(".codicon-testing-passed-icon, .testing-passed, .codicon-testing-passed").first.wait_for()
     assert page.locator(".squiggly-error").count() == 0
+
+    row(page, "test_compiles.py").dblclick()
+    page.locator(".view-line", has_text="test_it_compiles").wait_for()
+    page.locator(".testing-run-glyph").first.click()
+    page.locator(".codicon-testing-passed-icon, .testing-passed, .codicon-testing-passed").first.wait_for()
+
+
+def command(page: Any, name: str) -> None:
+    """Carries out a command by its name."""
+    page.keyboard.press("F1")
+    page.keyboard.type(name)
+    page.get_by_role("option", name=re.compile(re.escape(name), re.I)).first.wait_for()
+    page.keyboard.press("Enter")
+
+
+def test_a_task_says_no_mistake_twice_and_the_walkthrough_opens(page: Any) -> None:
+    row(page, "pump.st").dblclick()
+    page.locator(".squiggly-error").first.wait_for()
+    page.locator(".view-line", has_text="Levl").first.click()
+    command(page, "fbvm: Check the program")
+    page.locator(".terminal-tabs-entry, .single-terminal-tab").filter(has_text="check").locator(".codicon-error").wait_for()
+    command(page, "Problems: Focus on Problems View")
+    problems = page.get_by_role("treeitem").filter(has_text="Levl is not declared")
+    problems.first.wait_for()
+    assert problems.count() == 1, "the server tells of files that are open, and the task of others"
+    command(page, "Welcome: Open Walkthrough")
+    page.get_by_role("option", name=re.compile("PLC programs without a PLC")).first.click()
+    page.get_by_text("Stop in it, and go back").first.click()
+    page.get_by_text("Breakpoints on lines and on addresses").first.wait_for()
 
 
 def test_a_mistake_in_an_object_of_twincat_is_underlined_in_its_xml(page: Any) -> None:

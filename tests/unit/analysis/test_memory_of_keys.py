@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import gc
+import sys
 import tracemalloc
 from collections.abc import Callable
 
 import pytest
 from rows import each_of
 
+from fbvm.analysis import garbage
 from fbvm.analysis.hover import hover
 from fbvm.analysis.program import Program
 from fbvm.analysis.references import references, use_at
@@ -57,3 +59,31 @@ def test_keys_leave_nothing_behind(way: Callable[[Program], None]) -> None:
         assert typed(range(5, 5 + KEYS)) - before < MOST_BYTES
     finally:
         tracemalloc.stop()
+
+
+class Ring:
+    """What only a collection frees."""
+
+    def __init__(self) -> None:
+        self.itself = self
+        self.held = [object() for _ in range(1000)]
+
+
+@pytest.mark.slow
+def test_garbage_is_collected_when_memory_has_grown_by_a_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(garbage, "LEAST_BLOCKS", 20_000)
+    known = garbage.Garbage()
+    try:
+        known.collect()
+        before = most = sys.getallocatedblocks()
+        for way, times in ((known.typed, garbage.AT_MOST), (known.checked, garbage.IN_A_PAUSE)):
+            for _ in range(3 * before // 1000):
+                gc.collect(1)  # what is made becomes old
+                Ring()
+                way()
+                most = max(most, sys.getallocatedblocks())
+            assert most < before * times + 20_000
+            most = before
+    finally:
+        known.end()
+        gc.collect()
