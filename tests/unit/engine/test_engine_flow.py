@@ -109,49 +109,51 @@ class Walker:
         raise Return
 
 
-slots = st.integers(0, SLOTS - 1)
+LEAVES: tuple[Node, ...] = (*(load("u8", slot) for slot in range(SLOTS)), *(const("u8", number) for number in range(6)),
+                            ("tmp", "u8", 0))  # fmt: skip
+SLOT = st.integers(0, SLOTS - 1)
+VALUE = st.sampled_from((*LEAVES * len(LEAVES), *(("add", "u8", one, other) for one in LEAVES for other in LEAVES)))
+"""One of the leaves, or as often a sum of two: drawn at once, since drawing takes longer than what is drawn."""
+RELATION = st.sampled_from(("lt", "eq"))
+LABELS = st.lists(st.sampled_from([(low, low + more) for low in range(13) for more in range(5)]), min_size=1, max_size=3)
+UP_TO = [st.integers(0, most) for most in range(5)]
+AT_LEAST_ONE = {most: st.integers(1, most) for most in (3, 8)}
+ALWAYS, DEEP, IN_LOOP = ("store", "store", "let"), ("if", "if", "case", "loop"), ("exit", "next", "return")
+KIND = {(deep, in_loop): st.sampled_from((*ALWAYS, *DEEP * deep, *IN_LOOP * in_loop))
+        for deep in (False, True) for in_loop in (False, True)}  # fmt: skip
 
 
-@st.composite
-def values(draw: st.DrawFn) -> Node:
-    leaf = st.one_of(slots.map(lambda slot: load("u8", slot)), st.integers(0, 5).map(lambda value: const("u8", value)),
-                     st.just(("tmp", "u8", 0)))
-    return ("add", "u8", draw(leaf), draw(leaf)) if draw(st.booleans()) else draw(leaf)
+def condition(draw: st.DrawFn) -> Node:
+    return draw(RELATION), "b", "u8", draw(VALUE), draw(VALUE)
 
 
-@st.composite
-def conditions(draw: st.DrawFn) -> Node:
-    return draw(st.sampled_from(("lt", "eq"))), "b", "u8", draw(values()), draw(values())
+def block(draw: st.DrawFn, depth: int, in_loop: bool, most: int = 4) -> Block:
+    return tuple(statement(draw, depth, in_loop) for _ in range(draw(UP_TO[most])))
 
 
-@st.composite
-def blocks(draw: st.DrawFn, depth: int, in_loop: bool, most: int = 4) -> Block:
-    return tuple(draw(statements(depth, in_loop)) for _ in range(draw(st.integers(0, most))))
-
-
-@st.composite
-def statements(draw: st.DrawFn, depth: int, in_loop: bool) -> Node:
-    kinds = ["store", "store", "let"] + (["if", "if", "case", "loop"] if depth else []) + (
-        ["exit", "next", "return"] if in_loop else [])
-    kind = draw(st.sampled_from(kinds))
+def statement(draw: st.DrawFn, depth: int, in_loop: bool) -> Node:
+    kind = draw(KIND[depth > 0, in_loop])
     if kind == "store":
-        return "store", "u8", at(draw(slots)), draw(values())
+        return "store", "u8", at(draw(SLOT)), draw(VALUE)
     if kind == "let":
-        return "let", 0, "u8", draw(values())
+        return "let", 0, "u8", draw(VALUE)
     if kind == "if":
-        rows = tuple((draw(conditions()), draw(blocks(depth - 1, in_loop))) for _ in range(draw(st.integers(1, 3))))
-        return "if", rows, draw(blocks(depth - 1, in_loop, most=2))
+        rows = tuple((condition(draw), block(draw, depth - 1, in_loop)) for _ in range(draw(AT_LEAST_ONE[3])))
+        return "if", rows, block(draw, depth - 1, in_loop, most=2)
     if kind == "case":
-        labels = st.tuples(st.integers(0, 12), st.integers(0, 4)).map(lambda pair: (pair[0], pair[0] + pair[1]))
-        rows = tuple((tuple(draw(st.lists(labels, min_size=1, max_size=3))), draw(blocks(depth - 1, in_loop, most=2)))
-                     for _ in range(draw(st.integers(1, 8))))
-        return "case", "u8", draw(values()), rows, draw(blocks(depth - 1, in_loop, most=2))
+        choices = tuple((tuple(draw(LABELS)), block(draw, depth - 1, in_loop, most=2)) for _ in range(draw(AT_LEAST_ONE[8])))
+        return "case", "u8", draw(VALUE), choices, block(draw, depth - 1, in_loop, most=2)
     if kind == "loop":
-        leave = ("if", ((draw(conditions()), (("exit",),)),), ())
-        head = (("charge", draw(st.integers(1, 3)), 4), leave)
-        tail = (*draw(blocks(0, False, most=2)), *((leave,) if draw(st.booleans()) else ()))
-        return "loop", head, draw(blocks(depth - 1, True)), tail
+        leave = ("if", ((condition(draw), (("exit",),)),), ())
+        head = (("charge", draw(AT_LEAST_ONE[3]), 4), leave)
+        tail = (*block(draw, 0, False, most=2), *((leave,) if draw(st.booleans()) else ()))
+        return "loop", head, block(draw, depth - 1, True), tail
     return (kind,)
+
+
+@st.composite
+def blocks(draw: st.DrawFn, depth: int) -> Block:
+    return block(draw, depth, False)
 
 
 def deepened(block: Block, levels: int) -> Block:
@@ -167,7 +169,7 @@ def deep_bodies(node: Node, levels: int) -> Node:
 
 
 @pytest.mark.slow
-@given(code=blocks(3, False), levels=st.sampled_from((0, 0, 59, 75)))
+@given(code=blocks(3), levels=st.sampled_from((0, 0, 59, 75)))
 @settings(max_examples=times(40), deadline=None)
 def test_random_programs(code: Block, levels: int) -> None:
     code = (("let", 0, "u8", const("u8", 3)), *deepened(tuple(deep_bodies(node, levels) for node in code), levels))
