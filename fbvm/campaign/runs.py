@@ -17,6 +17,8 @@ from fbvm.run.time_limit import stopwatch
 MOST_IN_BATCH = 500
 QUICK_NS = 1_000_000_000
 """What takes less time is done in this process: others take about as long to begin."""
+LONG_NS = 10_000_000_000
+"""A run that takes longer than this is a batch of its own, whatever a second one would take."""
 MOST_SHRUNK = 20
 """Groups whose first run is made smaller."""
 
@@ -68,10 +70,12 @@ def conduct(bench: AnyBench, outcome: Outcome, jobs: int, take: Callable[[Sequen
     conditions that do not fit its programs."""
     left, once_ns = outcome.left, 0
     for number in left[:2]:  # what does not fit is found here; the first takes longer, since all is made ready for it
+        if once_ns > LONG_NS:
+            break
         elapsed = stopwatch()
         take([bench.execution().result(bench.variant(number))])
         once_ns = elapsed()
-    left = left[2:]
+        left = left[1:]
     if others is None and (jobs == 1 or once_ns * len(left) < QUICK_NS):
         others, size = InThisProcess(bench), 1
     else:
