@@ -235,7 +235,7 @@ class _Changes:
             if not changes:
                 continue
             change = max(changes, key=attrgetter("order"))
-            called = f"{path}.{name.partition('.')[2].removesuffix('.Get')}"
+            called = f"{path}.{name.removesuffix('.Get').rpartition('.')[2]}"
             place = replace(place, name=called if place.name == called.rpartition(".")[2] else f"{called}.{place.name}")
             text = Signal(place, place.name).text(self._trace.names.read(moment.read, place))
             key = frame.body, frame.base, number

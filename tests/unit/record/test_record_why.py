@@ -335,6 +335,13 @@ def test_what_a_property_or_method_returns_names_its_assignment(name: str, cause
     assert [f"{cause.place.name} = {cause.value}{line}" for cause, line in zip(found, lines, strict=True)] == causes
 
 
+def test_methods_of_a_namespace_are_named_by_their_instance() -> None:
+    block, _, program = OBJECTS.partition("PROGRAM Main")
+    text = f"NAMESPACE Plant.Drives {block} END_NAMESPACE PROGRAM Main{program.replace(': Motor', ': Plant.Drives.Motor')}"
+    found = ask(_recorded(text), "Main.got", 0).causes
+    assert [cause.place.name for cause in found] == ["Main.fast.Start.twice", "Main.fast.Start"]
+
+
 def test_a_method_that_calls_itself_returns_what_its_calls_have_read() -> None:
     text = OBJECTS.replace("Start := speed;", "IF much > 1 THEN Start := THIS^.Start(much - 1); RETURN; END_IF; Start := speed;")
     assert [(cause.place.name, cause.value) for cause in ask(_recorded(text), "Main.got", 0).causes] == [("Main.fast.speed", "5")]
