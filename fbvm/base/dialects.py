@@ -283,6 +283,10 @@ ALIKE = (
     ("A number that TIME or DATE cannot hold; DT + TIME past 2262-04-11", "The program stops (R0105); TIME + TIME wraps."),
     ("SIZEOF of ten INT", "20: the bytes that they fill."),
     ("TON, TOF, TP when ET = PT exactly", "The time is over."),
+    ("THIS^() and THIS^.m() in a method that a derived block inherits", "Executes what the instance's own type has, as in "
+     "CODESYS; RuSTy executes what the block has in which the method stands."),
+    ("SUPER^.m()", "What the nearest base has, whatever the instance is."),
+    ("A call of an interface that refers to nothing", "The program stops at its line (R0110)."),
     ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),
 )
 """What users ask about, and every dialect answers alike."""
