@@ -190,8 +190,10 @@ class Prover:
         cleared = self.search.cleared
         if self.search.cleared >= self.limits.scans:
             how = f"no run of {cleared} scans gets there, and no proof was found that none ever does"
+        elif cleared:
+            how = f"the time is over: no run of {_scans(cleared)} gets there"
         else:
-            how = f"the time is over: no run of {cleared} scans gets there"
+            how = "the time is over, and no scan has been searched to its end"
         return self._verdict(UNDECIDED, how)
 
     def _verdict(self, word: str, how: str, run: Run | None = None) -> Verdict:
