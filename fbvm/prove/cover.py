@@ -56,7 +56,8 @@ class Reaching:
 
 @dataclass
 class Covered:
-    """What was found: runs, goals that no run ever meets, and goals of which that is not known, with the scans searched."""
+    """What was found: runs, goals that no run ever meets, and goals of which that is not known, with the scans in which none is
+    met."""
 
     met: int = 0
     """The goals that were met, by runs or before."""
@@ -84,7 +85,10 @@ def cover(image: Image, limits: Limits, assumed: tuple[str, ...] = (), free: tup
         if inputs is None:
             continue
         reaching = _done(prover, inputs, [spot, *waiting], outputs)
-        found.runs.append(reaching)
+        if spot not in reaching.spots:  # it depends on values of which the solver knows nothing
+            found.missed[spot] = len(inputs) - 1
+        if reaching.spots:
+            found.runs.append(reaching)
         for each in reaching.spots:
             waiting.pop(each, None)
     found.met = len(spots) - len(found.never) - len(found.missed)
@@ -114,25 +118,36 @@ def _condition(prover: Prover, spot: Spot) -> Term:
 
 
 def _searched(prover: Prover, spot: Spot, found: Covered) -> Inputs | None:
-    """The inputs of the shortest run to a goal; without one the goal is noted in `found`."""
-    terms, summary, limits = prover.summary.terms, prover.summary, prover.limits
-    hit = terms.and_(_condition(prover, spot), terms.not_(prover.goal.stop))
-    goal = Goal(hit, prover.goal.stop, prover.goal.given)
-    if hit is terms.false:
+    """The inputs of the shortest run to a goal, of one that ends in a trap if no other gets there; without one the goal is noted
+    in `found`."""
+    terms, stop = prover.summary.terms, prover.goal.stop
+    condition = _condition(prover, spot)
+    missed: list[int] = []
+    for hit in dict.fromkeys((terms.and_(condition, terms.not_(stop)), condition)):
+        inputs, cleared = _run_to(prover, Goal(hit, stop, prover.goal.given))
+        if inputs is not None:
+            return inputs
+        missed += [] if cleared is None else [cleared]
+    if missed:
+        found.missed[spot] = min(missed)
+    else:
         found.never.append(spot)
-        return None
-    search = BoundedSearch(summary, goal, prover.clock, limits.expired)
+    return None
+
+
+def _run_to(prover: Prover, goal: Goal) -> tuple[Inputs | None, int | None]:
+    """The inputs of the shortest run to a goal, and how many scans were searched; None for these if no run ever gets there."""
+    limits, whole = prover.limits, prover.whole(goal)
+    if whole.hit is prover.summary.terms.false:
+        return None, None
+    search = BoundedSearch(prover.summary, goal, prover.clock, limits.expired)
     inputs = search.until(min(FIRST_SCANS, limits.scans))
     if inputs is None and search.cleared > INDUCTION:
-        induction = Induction(summary, goal, prover.clock, limits.expired)
-        while induction.depth < INDUCTION:
+        induction = Induction(prover.summary, whole, prover.clock, limits.expired)
+        while induction.depth < INDUCTION and not limits.expired():
             if induction.step() == UNSAT:
-                found.never.append(spot)
-                return None
-    inputs = inputs or search.until(limits.scans)
-    if inputs is None:
-        found.missed[spot] = search.cleared
-    return inputs
+                return None, None
+    return inputs or search.until(limits.scans), search.cleared
 
 
 def _done(prover: Prover, inputs: Inputs, spots: Sequence[Spot], places: Sequence[Place]) -> Reaching:
@@ -146,7 +161,7 @@ def _done(prover: Prover, inputs: Inputs, spots: Sequence[Spot], places: Sequenc
         executed, skipped = counts.executed(), counts.skipped()
     met = tuple(spot for spot in spots if (skipped if spot.is_skip else executed).get(spot.site))
     run = Run(tuple(writes), tuple(inputs.times_ns), prover.machine.cycle_ns, True, plc.trap, 0, prover.clock.is_free)
-    return Reaching(run, met or (spots[0],), tuple(outputs))
+    return Reaching(run, met, tuple(outputs))
 
 
 def output_places(prover: Prover) -> list[Place]:

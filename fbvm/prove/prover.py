@@ -100,7 +100,7 @@ class Prover:
         self.notes: list[str] = []
         relevant = leaves([*self.goal.terms, *self.summary.next.values()])
         self.inputs = [cell for variable, cell in self.summary.inputs.items() if variable in relevant]
-        self.search = BoundedSearch(self.summary, self._whole_goal(), self.clock, limits.expired)
+        self.search = BoundedSearch(self.summary, self.whole(self.goal), self.clock, limits.expired)
 
     def _goal(self, names: Names) -> Goal:
         terms, summary = self.summary.terms, self.summary
@@ -267,7 +267,7 @@ class Prover:
     def _induced(self, found: Sequence[Guess], most: int) -> Verdict | None:
         """k-induction up to a depth, which the bounded search has cleared."""
         facts = facts_of(self.summary, found, self.clock)
-        induction = Induction(self.summary, self._whole_goal(), self.clock, self.limits.expired, facts)
+        induction = Induction(self.summary, self.whole(self.goal), self.clock, self.limits.expired, facts)
         while induction.depth <= min(most, self.search.cleared - 1) and not self.limits.expired():
             if induction.step() == UNSAT:
                 how = f"by induction over {induction.depth + 1} scan{'s' * (induction.depth > 0)}"
@@ -276,13 +276,10 @@ class Prover:
                 return self._verdict(UNREACHABLE if self.question.is_reach else PROVED, how)
         return None
 
-    def _whole_goal(self) -> Goal:
-        """The goal with loops that were not followed to their end as part of it: nothing is known of the scans behind."""
-        if not self.unwound:
-            return self.goal
+    def whole(self, goal: Goal) -> Goal:
+        """A goal with loops that were not followed to their end as part of it: nothing is known of the scans behind."""
         terms = self.summary.terms
-        return Goal(terms.or_(self.goal.hit, terms.any_of(*(trap.condition for trap in self.unwound))), self.goal.stop,
-                    self.goal.given)  # fmt: skip
+        return replace(goal, hit=terms.or_(goal.hit, terms.any_of(*(trap.condition for trap in self.unwound))))
 
     def _state(self) -> list[Term]:
         """The variables of the state on which the answer depends, the nearest first."""
