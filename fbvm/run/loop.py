@@ -69,7 +69,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
 
     All have the same time, real if a network of any of them is real, so that PLCs may share a network.  `progress` is called
     at most every 100 ms.  When `until` returns True between two scans, the loop is left; the runs go on with `resumed`, after
-    `Running.resume` of each."""
+    `Running.resume` of each.  `until` may not look at the PLCs: those in a batch are up to date only behind the loop."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     with _uncollected() if networks else nullcontext():
         _run_all(runs, progress, until, resumed, list(networks.values()))
@@ -101,7 +101,7 @@ def _run_all(runs: Sequence[Running], progress: Callable[[], None] | None, until
     else:
         _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
-    batches = Batches(len(watchdogs) > 1 and until is None and _are_alone(runs))
+    batches = Batches(len(watchdogs) > 1 and _are_alone(runs))
     told_ns, pause_ns = time.monotonic_ns(), max(PROGRESS_NS, PLC_PROGRESS_NS * len(runs))
     recorders = _recorders(runs)
     try:
@@ -137,7 +137,7 @@ def _recorders(runs: Sequence[Running]) -> list[InputRecorder]:
 
 
 def _are_alone(runs: Sequence[Running]) -> bool:
-    """True if nobody outside has a turn between two scans of any of them, but for `progress` and `until` of the loop."""
+    """True if nobody outside looks at a PLC between two scans of any of them, but for `progress` of the loop."""
     return not any(run.calls_out for run in runs)
 
 

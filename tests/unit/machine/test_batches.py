@@ -69,7 +69,8 @@ class Ran:
     """PLCs with toys after a run in which they may be in batches, or not since somebody is told of each scan."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, programs: list[dict[str, Any]], bounds: dict[str, Any], *,
-                 late: int = 0, is_batched: bool = True, most: int = 3, progress: Any = None) -> None:  # fmt: skip
+                 late: int = 0, is_batched: bool = True, most: int = 3, progress: Any = None,
+                 until: Any = None) -> None:  # fmt: skip
         clock = Clock(late)
         for module in (loop, batches, watchdog):
             monkeypatch.setattr(module, "time", clock)
@@ -82,7 +83,7 @@ class Ran:
             for rig in self.rigs:
                 rig.plc.watchers.append(lambda plc: None)
         self.runs = [Running(rig.plc, **bounds, phase_ns=number % 3 * MS // 4) for number, rig in enumerate(self.rigs)]
-        run_all(self.runs, progress and (lambda: progress(self)))
+        run_all(self.runs, progress and (lambda: progress(self)), until)
         self.batched = sum(scans)
 
     @property
@@ -130,6 +131,19 @@ def test_what_is_changed_from_outside_counts_from_the_next_scan_on(monkeypatch: 
     assert forced.read("W5") == 9 and trapped.trap is not None and trapped.scans < 110
     assert stopped.read("Main.n") < 110 < stopped.scans == alone.scans and len(told) > 200
     assert watched.read("Main.n") == alone.read("Main.n") == alone.scans == 350
+
+
+@pytest.mark.slow
+def test_plcs_are_up_to_date_when_the_loop_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+
+    def until() -> bool:
+        asked.append(1)
+        return len(asked) == 400
+
+    ran = Ran(monkeypatch, [{"every": 500}] * 5, {"for_ns": 9_000 * MS}, until=until)
+    assert ran.batched > 200 and not any(run.reason for run in ran.runs)
+    assert all(rig.plc.read("Main.n") == rig.plc.scans > 100 for rig in ran.rigs)
 
 
 ENDLESS = """
