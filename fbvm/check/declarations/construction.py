@@ -7,7 +7,7 @@ for all that its type extends, the base first.  Instances that live as long as t
 cycle of the first task; those of a method or function, and VAR_TEMP, each time its body begins.
 
 FB_exit is called in the opposite order, the derived block first, by a body of its own that the program never calls: whoever puts
-another program in place of this one executes it (machine.retention).  Instances of methods and functions, and those of a PLC
+another program in place of this one executes it (machine/endings.py).  Instances of methods and functions, and those of a PLC
 whose power goes off, just end.  Nobody changes a program while it runs: FB_reinit is never called.
 
 Source: Beckhoff Information System and CODESYS online help, Methods FB_init, FB_reinit and FB_exit; attribute call_after_init."""
