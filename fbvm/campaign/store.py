@@ -66,7 +66,7 @@ class Store:
             try:
                 if number:
                     self.known.append(result_of(json.loads(line)))
-            except (ValueError, TypeError, KeyError):
+            except (ArithmeticError, ValueError, TypeError, KeyError):
                 break
             good += len(line)
         self._file.seek(good)

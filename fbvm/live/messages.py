@@ -127,7 +127,7 @@ def _check(action: str, name: str, value: object, kind: type | tuple[type, ...])
         raise MessageError(f"{action}: {name} is a {' or '.join(one.__name__ for one in wanted)}")
     if isinstance(value, str) and len(value) > MOST_TEXT:
         raise MessageError(f"{action}: {name} has {len(value)} characters, more than {MOST_TEXT}")
-    if isinstance(value, int) and abs(value) >= 1 << 62:
+    if isinstance(value, int | float) and abs(value) >= 1 << 62:  # 1e999 is infinite
         raise MessageError(f"{action}: {name} is too large")
     if isinstance(value, list) and (len(value) > MOST_NAMES or not all(isinstance(one, str) and len(one) <= MOST_TEXT
                                                                       for one in value)):  # fmt: skip

@@ -241,7 +241,7 @@ def _read(lines: Iterable[str]) -> Iterator[Entry]:
             raise JournalError(f"line {number}: {error.msg} at column {error.colno}") from None
         except KeyError as error:
             raise JournalError(f"line {number}: {error} is missing") from None
-        except (TypeError, ValueError, AttributeError, RecursionError) as error:
+        except (ArithmeticError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise JournalError(f"line {number}: {error}") from None
         scans += isinstance(entry, Scan)
         yield entry

@@ -236,7 +236,7 @@ def _passing(text: bytes) -> NetworkEvent:
         now_ns, what, host, port, other, other_port, out, mirrored, data = json.loads(text)
         local, remote = Peer(str(host), int(port)), Peer(str(other), int(other_port))
         return NetworkEvent(int(now_ns), TapEvent(TapKind(what), local, remote, bool(out), bytes.fromhex(data), bool(mirrored)))
-    except (ValueError, TypeError) as error:
+    except (ArithmeticError, ValueError, TypeError) as error:
         raise IndexError(f"an event of the network cannot be read: {error}") from None
 
 
@@ -245,7 +245,7 @@ def _header(payload: bytes) -> dict[str, Any]:
         head = json.loads(payload)
         if head["format"] != FORMAT:
             raise TraceError(f"a trace of format {head['format']}; this version of fbvm reads format {FORMAT}")
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ArithmeticError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise error if isinstance(error, TraceError) else TraceError(f"the trace's header is damaged: {error}") from None
     made: dict[str, Any] = head
     return made

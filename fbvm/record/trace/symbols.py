@@ -49,7 +49,7 @@ def from_data(data: Mapping[str, Any]) -> dict[str, Field]:
         return fields
     except SymbolError:
         raise
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError) as error:
+    except (ArithmeticError, KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError) as error:
         raise SymbolError(f"no symbols: {type(error).__name__} {error}") from None
 
 

@@ -36,7 +36,7 @@ def test_a_misspelt_verb(typed: str, said: str) -> None:
     (["check", "pump"], "Path 'pump' does not exist; did you mean pump.st?"),
     (["step", "src/mian.st"], f"Path 'src/mian.st' does not exist; did you mean src{os.sep}main.st?"),
     (["fmt", "PUMPS.ST"], "Path 'PUMPS.ST' does not exist; did you mean pump.st?"),
-    (["list", "zzz.st"], "File 'zzz.st' does not exist"),
+    (["list", "zzz.st"], "Path 'zzz.st' does not exist"),
     (["chart", "rum.fbtrace"], "File 'rum.fbtrace' does not exist; did you mean run.fbtrace?"),
     (["why", "Main.n", "rum.fbtrace"], "File 'rum.fbtrace' does not exist; did you mean run.fbtrace?"),
     (["run", "pump.st", "--library", "scr"], "Directory 'scr' does not exist; did you mean src?"),

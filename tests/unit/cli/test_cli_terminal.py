@@ -94,6 +94,7 @@ def test_what_a_project_says(fbvm: Fbvm, name: str) -> None:
     text = f"[campaign]\n{json.dumps(EVIL)} = 1\n[[vary]]\nname = {json.dumps(EVIL)}\n"
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
     fbvm("campaign", str(folder))
+    fbvm("fleet", str(folder))
 
 
 @pytest.mark.slow
@@ -116,6 +117,7 @@ def test_options_and_arguments(fbvm: Fbvm) -> None:
         ("campaign", "trapped.st", "--for", "20ms", "--out", f"o{EVIL}"),
         ("sweep", "counter.st", "--for", "20ms", "--vary", f"Main.n={EVIL}"),
         ("sweep", "trapped.st", "--for", "20ms", "--show", EVIL),
+        ("fleet", f"no{EVIL}"), ("fleet", ".", "--cluster", EVIL), ("fleet", ".", "--doors", f"no{EVIL}/d.csv"),
     ):  # fmt: skip
         fbvm(*arguments)
 

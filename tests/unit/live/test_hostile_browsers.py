@@ -143,6 +143,7 @@ def test_broken_frames_end_the_connection(data: bytes) -> None:
     '{"do":"write","plc":["pump"],"name":"a","value":"1"}',
     '{"do":"write","plc":"pump","name":"Main.Level","value":"1","path":"/etc"}', '{"do":"step","scans":true}',
     '{"do":"step","scans":1e99}', '{"do":"step","scans":99999999999999999999999999}', '{"do":"speed","factor":NaN}',
+    '{"do":"speed","factor":1e999}',
     '{"do":"speed","factor":-1}', '{"do":"look","plc":"pump","names":[1]}', '{"do":"look","plc":"pump","memory":"../D"}',
     '{"do":"view","plc":"pump","scan":-5}', '{"do":"hello","version":2}', '{"id":{},"do":"ready"}',
     '{"do":"source","plc":"pump","instance":"Main.Level"}', '{"do":"parts","plc":"pump","name":"nothing"}',

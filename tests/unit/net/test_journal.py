@@ -369,6 +369,7 @@ def test_the_journal_of_another_program(good: str) -> None:
     [
         ('"scan":3,', '"scan":4,', "line 6: scan 4 where 3 should be: lines are missing, or not in their order"),
         ('"now_ns":20000000,', "", "line 5: 'now_ns' is missing"),
+        ('"now_ns":20000000', '"now_ns":1e999', "line 5: cannot convert float infinity to integer"),
         ('"now_ns":20000000', '"now_ns":"soon"', "line 5: invalid literal for int() with base 10: 'soon'"),
         ('["Opened",1,', '["Opened",', "line 6: 'Opened' with 2 values is no event"),
         ('["Opened",', '["Exploded",', "line 6: 'Exploded' with 3 values is no event"),

@@ -107,7 +107,8 @@ def test_memory_that_is_written_during_a_run_is_an_input(image: Image, when: str
 def test_memory_that_is_written_while_the_loop_runs_is_an_input(
     image: Image, when: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(loop, "PROGRESS_NS", 0)
+    for name in ("PROGRESS_NS", "PLC_PROGRESS_NS"):
+        monkeypatch.setattr(loop, name, 0)
     plc = Plc(image)
     kept = recorded(plc)
 
