@@ -9,6 +9,18 @@ FILLER = "\uffa0"
 """A letter of half a width that shows nothing (HALFWIDTH HANGUL FILLER), so that a name with fillers is still one word."""
 
 
+class _Filled(dict[int, str]):
+    """Each character with its filler, by its number; those that a drawing has are few."""
+
+    def __missing__(self, number: int) -> str:
+        character = chr(number)
+        self[number] = filled = character + FILLER * (unicodedata.east_asian_width(character) in "WF")
+        return filled
+
+
+_FILLED = _Filled()
+
+
 def cells(text: str) -> str:
     """A text with a filler behind each wide character.
 
@@ -17,7 +29,7 @@ def cells(text: str) -> str:
     """
     if text.isascii():
         return text
-    return "".join(character + FILLER * (unicodedata.east_asian_width(character) in "WF") for character in text)
+    return text.translate(_FILLED)
 
 
 def text_of(filled: str) -> str:

@@ -28,6 +28,8 @@ _NAMED = {False: re.compile(rf"[\[\]|┤┫](?: ?(/)| ?([PN↑↓])(?= )|) ?({_O
           True: re.compile(rf"\((?: ?(/)| ?([PNSR↑↓]|SET|RSET)(?= )|) ?({_OPERAND}) ?\)")}
 """Contacts and coils with their operand inside: `[ a ]`, `[/a]`, `( b )`, `(S b)`."""
 _BRACKETS = re.compile(r"\[[^\[\]|]*\w[^\[\]|]*\]")
+_BEGIN = re.compile(r"[┤┫┥┨|\[\](]")
+"""The characters with which each of these begins."""
 _LINK = re.compile(r"[►▶>](\d+)")
 _TITLE = re.compile(r"([^\W\d]\w*) ?: ?([^\W\d]\w*(?:\.[^\W\d]\w*)*)")
 _NAME = re.compile(r" *([^\W\d]\w*) *")
@@ -259,7 +261,8 @@ class Grid:
         self.elements.sort(key=lambda element: (element.y, element.x))
 
     def _next_element(self, line: str, at: int, y: int) -> DrawnElement | None:
-        for x in range(at, len(line)):
+        for begin in _BEGIN.finditer(line, at):
+            x = begin.start()
             if named := self._named(line, x, y):
                 return named
             for is_coil, shape, known in ((False, _CONTACT, _KNOWN), (True, _COIL, _COIL_KNOWN)):

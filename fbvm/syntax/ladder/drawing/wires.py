@@ -69,8 +69,8 @@ class Wires:
     def _join_wires(self) -> None:
         grid = self.grid
         for y, line in enumerate(grid.lines):
-            for x in range(len(line)):
-                if x in (grid.left, grid.right) and (x, y) not in grid.taken:
+            for x, character in enumerate(line):
+                if character == " " or x in (grid.left, grid.right) and (x, y) not in grid.taken:
                     continue
                 borders = [border(x, y, way) for way in sorted(grid.ways(x, y))]
                 for one in borders:
