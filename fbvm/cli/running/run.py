@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ import click
 
 from fbvm.cli.running.project_run import run_project
 from fbvm.cli.shared.breakpoint_options import breakpoint_options, halt_lines, set_breakpoints
-from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.networks import build_network, mailbox_names, net_of, try_doors
@@ -142,8 +141,7 @@ def command(
             plc.attach(unit, network)
         try_doors(plc, network, options["mappings"], options["doors"])
         html = options["html"]
-        with record_run(options, said, html is not None) as recorded, \
-                draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
+        with record_run(options, said, html is not None) as recorded, _drawn(plc, options["rungs"], options["charts"]):
             if recorded.recording:
                 text = program_text(files, libraries, program=program, drawn=drawn, e_banks=tuple(banks),
                                     **compile_options(files))  # fmt: skip
@@ -229,6 +227,18 @@ def _run(
             say(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
     wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
     return RunResult(plc, running.reason, places, recorder, as_json, until or "", wanted)
+
+
+@contextmanager
+def _drawn(plc: Plc, rungs: str | None, charts: str | None) -> Iterator[None]:
+    """Draws rungs and charts as some scans execute them, if asked; what draws is loaded only then."""
+    if not rungs and not charts:
+        yield
+        return
+    from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
+
+    with draw_executed_rungs(plc, rungs), draw_executed_charts(plc, charts):
+        yield
 
 
 def _execute(running: Running, debug_port: int | None, files: tuple[Path, ...], libraries: tuple[Path, ...],

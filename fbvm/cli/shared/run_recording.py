@@ -19,8 +19,6 @@ from fbvm.cli.shared.given_sources import sources_of
 from fbvm.cli.shared.terminal import named, say
 from fbvm.cli.shared.traces import statement_lines
 from fbvm.machine.plc import Plc
-from fbvm.record.page.data import page_data
-from fbvm.record.page.page import page
 from fbvm.record.recording.file_writer import Described, RecordingWriter
 from fbvm.record.recording.library_texts import library_texts
 from fbvm.record.recording.program_text import ProgramText
@@ -161,6 +159,9 @@ def program_text(files: Sequence[Path], libraries: Sequence[Path], **choices: An
 
 def write_page(recorded: RunRecording, path: Path, lines: Mapping[str, Mapping[int, str]]) -> None:
     """Writes the scans of a run as one HTML file: all, or after Ctrl-C the last ones."""
+    from fbvm.record.page.data import page_data  # most runs write no page
+    from fbvm.record.page.page import page
+
     assert recorded.recording
     source = RecordedScans(recorded.recording[next(iter(recorded.recording))], lines)
     last = max(source.scans.start, source.scans.stop - INTERRUPTED_SCANS)
