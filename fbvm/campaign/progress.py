@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -75,7 +76,7 @@ class Progress:
     @property
     def present_rate(self) -> float:
         """Runs a second in the last seconds."""
-        return _rate([sample for sample in self._samples if sample[0] >= self._samples[-1][0] - NOW_S])
+        return _rate(self._samples[self._index(self._samples[-1][0] - NOW_S):])
 
     @property
     def left_s(self) -> float | None:
@@ -97,10 +98,13 @@ class Progress:
 
     def _done_at(self, at_s: float) -> float:
         """How many results there were at a moment: between two samples they are taken to have come evenly."""
-        for (first_s, first), (last_s, last) in pairwise(self._samples):
-            if first_s <= at_s <= last_s:
-                return first + (last - first) * (at_s - first_s) / max(last_s - first_s, 1e-9)
-        return self._samples[-1][1]
+        at = min(max(self._index(at_s), 1), len(self._samples) - 1)
+        (first_s, first), (last_s, last) = self._samples[at - 1], self._samples[at]
+        return first + (last - first) * min(max((at_s - first_s) / max(last_s - first_s, 1e-9), 0), 1)
+
+    def _index(self, at_s: float) -> int:
+        """The number of the first sample at a moment or behind it.  A campaign of a day has 170,000 of them."""
+        return bisect_left(self._samples, at_s, key=lambda sample: sample[0])
 
     def as_dict(self) -> dict[str, Any]:
         """The progress for --json-lines."""

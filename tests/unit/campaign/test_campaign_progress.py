@@ -81,3 +81,15 @@ def test_a_campaign_leaves_its_page_and_prints_lines(tmp_path: Path, monkeypatch
     assert (result.exit_code, last["done"], last["failing"], last["groups"][0]["runs"]) == (1, 4, 4, 4)
     page = Path("campaign-results/progress.html").read_text()
     assert "<p>over</p>" in page and "<code>1.fbtrace</code>" in page
+
+
+def test_a_rate_is_never_below_nothing() -> None:
+    """The first result is there some time after the beginning, many together."""
+    clock = Clock()
+    clock.now_s = 0.01
+    progress = Progress(100, clock)
+    for second in (1, 2):
+        clock.now_s = second
+        progress.add([Result(number) for number in range(40 * (second - 1), 40 * second)])
+    assert min(rate for _, rate in progress.rates) >= 0
+    assert sum(rate * 2 / 60 for _, rate in progress.rates) == pytest.approx(80)
