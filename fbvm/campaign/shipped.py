@@ -52,7 +52,10 @@ class Shipped(Generic[Task, Result]):
         """Does a task, for `limit_ns` at most; a worker with several threads has a process for each."""
         mark = self.mark
         place = _places.get(mark) or _places.setdefault(mark, _Place())
-        pool = place.idle.pop() if place.idle else self._opened(place)
+        try:
+            pool = place.idle.pop()
+        except IndexError:  # other threads of the worker have them
+            pool = self._opened(place)
         try:
             ((_, result),) = pool.results([task], limit_ns)
         finally:
