@@ -137,7 +137,8 @@ def _conducted(places: AbstractContextManager[Places], options: dict[str, Any]) 
                     say_json(_as_dict(told))
                 if not has_doors and _all(told, "running", "over"):
                     has_doors = True
-                    _write_doors(told, options["doors_file"])
+                    if options["doors_file"]:
+                        _write_doors(told, options["doors_file"])
         except KeyboardInterrupt:
             say("stopping all parts", err=True)
         parts.stop()
@@ -168,11 +169,9 @@ def _as_dict(told: Told) -> dict[str, Any]:
             "shards": shards}  # fmt: skip
 
 
-def _write_doors(told: Told, path: Path | None) -> None:
-    """Says where units can be reached: in a file, or how many doors there are."""
+def _write_doors(told: Told, path: Path) -> None:
+    """Writes into a file where each unit can be reached."""
     doors = {unit: (real, where) for where, each in told.values() for unit, real in each.doors.items()}
-    if path is None:
-        return
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["unit", "door", "where"])
