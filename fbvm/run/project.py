@@ -67,7 +67,7 @@ NETS = ("loop", "tcp")
 MOST = 100_000
 """PLCs of one kind."""
 
-LAST_PORT = 65_535
+LAST_PORT, MOST_ADDRESS = 65_535, 0xFFFF_FFFF
 MOST_NAMED = 5
 """Files that a hint names."""
 MOST_NUMBER = 1 << 62
@@ -302,20 +302,28 @@ def doors_of(row: Mapping[str, Any]) -> Iterator[tuple[Peer, tuple[str, int]]]:
     if (real := row["bind"] or row["host"]) is None:
         return
     for number in range(row["count"]):
-        unit = replace(row["address"], host=str(IPv4Address(row["address"].host) + number))
+        unit = replace(row["address"], host=_counted(row["address"].host, number))
         if row["counts"] == "address":
-            yield unit, (real[0] if not number else str(_address_of(real[0]) + number), real[1])
+            yield unit, (_counted(real[0], number), real[1])
         elif not real[1] or real[1] + number <= LAST_PORT:
             yield unit, (real[0], real[1] + number if real[1] else 0)
         else:
             raise ValueError(f"there are no {row['count']:,} ports from {real[1]} on")
 
 
-def _address_of(name: str) -> IPv4Address:
+def _counted(host: str, number: int) -> str:
+    """The address so many behind another one; of 0 the host as it is written.  Raises ValueError."""
+    if not number:
+        return host
     try:
-        return IPv4Address(name)
+        first = IPv4Address(host)
     except ValueError:
-        raise ValueError(f'{name} is no address that counts up; write counts = "port"') from None
+        first = IPv4Address(0)
+    if first.is_unspecified:
+        raise ValueError(f'{host} is no address that counts up; write counts = "port"')
+    if int(first) + number > MOST_ADDRESS:
+        raise ValueError(f"the addresses behind {host} are too few")
+    return str(first + number)
 
 
 def _check_inside(reading: Reading, plcs: Mapping[str, Any], folder: Path) -> None:

@@ -84,6 +84,8 @@ def test_doors_count_up_by_address_or_by_port(more: str, said: object) -> None:
 
 @pytest.mark.parametrize(("change", "said"), [
     (("127.0.1.1:5020", "here:5020"), "door 1: here is no address that counts up; write counts = \"port\""),
+    (("127.0.1.1:5020", "0.0.0.0:5020"), "door 1: 0.0.0.0 is no address that counts up; write counts = \"port\""),
+    (("127.0.1.1:5020", "255.255.255.254:5020"), "door 1: the addresses behind 255.255.255.254 are too few"),
     (('"127.0.1.1:5020"', '"127.0.1.1:65533"\ncounts = "port"'), "door 1: there are no 5 ports from 65533 on"),
     (("10.0.0.1:502", "10.0.2.1:502"), "door 2 has the address of door 1")])
 def test_doors_that_cannot_count_up_are_refused(change: tuple[str, str], said: str) -> None:
