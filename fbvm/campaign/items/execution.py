@@ -90,6 +90,7 @@ class ItemsExecution:
     def recorded(self, variant: Variant, path: Path) -> tuple[Result, list[Path]]:
         """Executes a run and leaves a trace of each PLC that it makes by a fixture: that of the one that scanned last at `path`,
         those of others beside it.  Returns the result and the files.  Raises NoTests, OSError."""
+        path.unlink(missing_ok=True)  # of an earlier campaign: not every test leaves a trace
         with TemporaryDirectory() as folder:
             result = self.within(lambda session: session.result(variant), "--fbvm-traces", folder)
             traces = sorted(Path(folder).iterdir(), key=lambda trace: trace.stat().st_mtime_ns, reverse=True)

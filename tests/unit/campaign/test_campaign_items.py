@@ -167,3 +167,14 @@ def test_failures_are_explained_where_somebody_reads_them_only(project: Path) ->
     assert result.failure and because not in execution.report
     again, _ = execution.recorded(bench.variant(0), project / "run.fbtrace")
     assert again == result and because in execution.report
+
+
+@pytest.mark.slow
+def test_a_run_that_leaves_no_trace_leaves_none_of_an_earlier_one(project: Path) -> None:
+    from fbvm.campaign.items.bench import plan_of_tests
+    from fbvm.campaign.plan_file import Written as InFile
+
+    bench, path = ItemsBench.of(plan_of_tests(InFile(), ["tests/test_st.st"]), project), project / "run.fbtrace"
+    path.write_bytes(b"of an earlier campaign")
+    result, kept = bench.execution().recorded(bench.variant(0), path)
+    assert (result.failure, kept, path.exists()) == (None, [], False)
