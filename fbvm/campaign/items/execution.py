@@ -162,7 +162,7 @@ def _shown(run: VariedRun, name: str) -> Value:
     return ""
 
 
-@dataclass
+@dataclass(eq=False)  # pytest puts plugins into sets
 class _Session:
     """A plugin of pytest: in place of executing each test once, it has `body` execute runs."""
 

@@ -178,3 +178,12 @@ def test_a_run_that_leaves_no_trace_leaves_none_of_an_earlier_one(project: Path)
     path.write_bytes(b"of an earlier campaign")
     result, kept = bench.execution().recorded(bench.variant(0), path)
     assert (result.failure, kept, path.exists()) == (None, [], False)
+
+
+@pytest.mark.slow
+def test_folders_may_have_settings_of_pytest_of_their_own(project: Path) -> None:
+    for folder in ("tests", "tests/slow", "tests/quick"):
+        (project / folder).mkdir(exist_ok=True)
+        (project / folder / "conftest.py").write_text("def pytest_runtest_setup(item):\n    pass\n")
+    (project / "tests" / "quick" / "test_here.py").write_text(TESTS.partition("\n\n\n")[2])
+    assert fbvm("tests/quick/test_here.py", "tests/test_counter.py::test_it_scans", "--runs", "2", "--jobs", "1")[0] == 0
