@@ -76,7 +76,11 @@ def sources_in(folder: Path) -> list[Path]:
 def taken_folders(context: click.Context, parameter: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
     """Called by click with FILE...: each folder that is no project stands for its sources.
 
-    Raises UsageError for one that has none."""
+    Raises UsageError for one that has none, and for a project where the verb takes sources only."""
+    takes_projects = "PROJECT" in (parameter.metavar or "")
+    for path in files:
+        if path.is_dir() and not takes_projects and not _is_of_sources(path):
+            raise click.UsageError(f"{path} is a project, and `{context.command_path}` takes sources: name the files of one PLC")
     return tuple(file for path in files for file in (_taken(path) if _is_of_sources(path) else [path]))
 
 

@@ -171,6 +171,13 @@ def test_a_folder_without_a_project_stands_for_its_sources(tmp_path: Path) -> No
     assert (shown.exit_code, "Twice" in shown.output) == (0, True)
 
 
+@pytest.mark.parametrize("verb", ["list", "ladder", "serve", "prove"])
+def test_a_project_is_told_to_verbs_that_take_sources(tmp_path: Path, verb: str) -> None:
+    (tmp_path / "fbvm.toml").write_text("")
+    result = CliRunner().invoke(main, [verb, str(tmp_path)])
+    assert result.exit_code == 2 and result.stderr.endswith(f"`main {verb}` takes sources: name the files of one PLC\n")
+
+
 def check(*arguments: str) -> Result:
     return CliRunner().invoke(main, ["check", *arguments])
 
