@@ -87,7 +87,8 @@ def _print(image: Image, found: Covered, file: Path) -> None:
     for spot in found.never:
         say(f"  {spot.words(image)}: no run ever does it")
     for spot, scans in found.missed.items():
-        say(f"  {spot.words(image)}: no run of {scans} scans does it")
+        what = f"no run of {scans} scan{'s' * (scans > 1)} does it" if scans else "it was not found out whether a run does it"
+        say(f"  {spot.words(image)}: {what}")
 
 
 def _as_dict(image: Image, found: Covered) -> dict[str, object]:

@@ -201,7 +201,7 @@ def test_tests_for_what_no_test_executes(tmp_path: Path, plc: RigMaker) -> None:
     none = proved(str(program), "--tests", str(tests), "--covered", str(report), "--json")
     assert json.loads(none.stdout) == {"met": 5, "tests": [], "never": [f"{program}:9"], "missed": []}
     short = proved(str(program), "--tests", str(tests), "--scans", "1")
-    assert (short.exit_code, f"{program}:5: no run of 1 scans does it" in short.stdout) == (1, True)
+    assert (short.exit_code, f"{program}:5: no run of 1 scan does it" in short.stdout) == (1, True)
 
 
 def test_options_of_tests_that_do_not_go_together(tmp_path: Path) -> None:
