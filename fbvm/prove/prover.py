@@ -29,6 +29,7 @@ from fbvm.prove.question import (
     UNDECIDED,
     UNREACHABLE,
     WITHIN,
+    WRITTEN_ONCE,
     Names,
     Question,
     Run,
@@ -37,6 +38,7 @@ from fbvm.prove.question import (
 from fbvm.prove.runs import Judge, Machine, replayed, sampled, simulated
 from fbvm.prove.solver import UNSAT
 from fbvm.prove.unreached import unreached
+from fbvm.watch.bits import bits_of
 from fbvm.watch.names import Names as PlaceNames
 from fbvm.watch.paths import Place
 
@@ -92,7 +94,8 @@ class Prover:
         self.judge = Judge.of(image, question)
         names = Names(image, question.prefix)
         free = [extent for name in question.free for extent in names.extents(name)]
-        self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired, self.judge.all_places)
+        self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired, self.judge.all_places,
+                                           [bits_of(place) for place in self.judge.written])  # fmt: skip
         longest_ns = max(limits.longest_ns, limits.cycle_ns)
         self.clock: Clock = clock_of(self.summary.terms, image.tasks, limits.cycle_ns, longest_ns)
         self.machine = Machine(image, limits.cycle_ns, longest_ns, STEP_BUDGET)
@@ -111,12 +114,18 @@ class Prover:
         self.condition = stop
         if self.question.kind == NO_TRAP:
             return Goal(stop, stop, given)
+        self.condition = hit = self._hit(names)
+        return Goal(terms.and_(hit, terms.not_(stop)), stop, given)
+
+    def _hit(self, names: Names) -> Term:
+        """The condition that a scan which does not trap gets to the goal."""
+        terms, summary = self.summary.terms, self.summary
+        if self.question.kind == WRITTEN_ONCE:
+            return summary.writes.twice()
         condition = condition_term(summary.contents, names.condition(self.question.text).term)
         if self.question.kind == WITHIN:
             condition = self._awaited(condition, condition_term(summary.contents, names.condition(self.question.trigger).term))
-        hit = terms.not_(condition) if self.question.kind == ALWAYS else condition
-        self.condition = hit
-        return Goal(terms.and_(hit, terms.not_(stop)), stop, given)
+        return terms.not_(condition) if self.question.kind == ALWAYS else condition
 
     def _awaited(self, answer: Term, trigger: Term) -> Term:
         """The condition that an answer is late.
@@ -201,7 +210,10 @@ class Prover:
 
     def _note_limits(self) -> None:
         """Notes what makes an answer worth less: variables that never change, operations of which nothing is known."""
-        for place in self._constants():
+        is_about_writes = self.question.kind == WRITTEN_ONCE
+        if is_about_writes and not self.summary.writes.conditions:
+            self.notes.append(f"no statement writes {self.question.text}")
+        for place in () if is_about_writes else self._constants():
             self.notes.append(f"{place.name} has the same value in every scan: it is no input, and no code changes it")
         if found := self._unknowns():
             self.notes.append(f"taken for any value: {', '.join(found)}")

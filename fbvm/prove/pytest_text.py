@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fbvm.code.image import Image
 from fbvm.prove.cover import Covered, Reaching
-from fbvm.prove.question import ALWAYS, NO_TRAP, REACH, WITHIN, Run, Verdict
+from fbvm.prove.question import ALWAYS, NO_TRAP, REACH, WITHIN, WRITTEN_ONCE, Run, Verdict
 
 
 def pytest_text(verdicts: Sequence[Verdict], files: Sequence[Path], options: dict[str, str]) -> str:
@@ -17,7 +17,9 @@ def pytest_text(verdicts: Sequence[Verdict], files: Sequence[Path], options: dic
     `options` are keyword arguments of `compile_files`.  A test of a property fails until the program keeps it; that of what was
     to be reached passes."""
     given = "".join(f", {name}={value!r}" for name, value in options.items())
-    lines = ['"""Runs that `fbvm prove` has found."""', "", "from fbvm import Plc, compile_files", "",
+    writers = any(verdict.run and verdict.run.writers for verdict in verdicts)
+    more = ["from fbvm.testing import double_writes"] * writers
+    lines = ['"""Runs that `fbvm prove` has found."""', "", "from fbvm import Plc, compile_files", *more, "",
              f"FILES = [{', '.join(repr(str(file)) for file in files)}]"]  # fmt: skip
     used: set[str] = set()
     for verdict in verdicts:
@@ -92,6 +94,8 @@ def _statements(verdict: Verdict, run: Run) -> list[str]:
     lines = list(_scans(run, first_asked))
     if question.kind == NO_TRAP:
         return [*lines, *_writes(run, first_asked), "    assert plc.scan() is None"]
+    if question.kind == WRITTEN_ONCE:
+        return [*lines, *_writes(run, first_asked), f"    assert double_writes(plc, {question.text!r}) == []"]
     ended = f"plc.run(scans=1, until={question.text!r})"
     if question.kind == WITHIN:
         lines.append("    answers = []")

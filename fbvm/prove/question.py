@@ -6,23 +6,24 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from fbvm.base.types import AnyType, ArrayType, OpenArrayType, RefType, StringType, StructType, Type
-from fbvm.code.image import Image
+from fbvm.code.image import Image, Site
 from fbvm.engine.trap import Trap
 from fbvm.watch.conditions import Condition, parse_condition
 from fbvm.watch.paths import Place, Span, UnknownPlace, find
 from fbvm.watch.scopes import Scope
 from fbvm.watch.values import Value, show_time
 
-NEVER, ALWAYS, REACH, NO_TRAP, WITHIN = "never", "always", "reach", "no trap", "within"
+NEVER, ALWAYS, REACH, NO_TRAP, WITHIN, WRITTEN_ONCE = "never", "always", "reach", "no trap", "within", "written once"
 
 PROVED, BROKEN, REACHED, UNREACHABLE, UNDECIDED = "proved", "broken", "reached", "unreachable", "undecided"
 
 
 @dataclass(frozen=True)
 class Question:
-    """A property: `kind` is NEVER, ALWAYS, REACH (of `text`, a condition behind a scan), NO_TRAP or WITHIN.
+    """A property: `kind` is NEVER, ALWAYS, REACH (of `text`, a condition behind a scan), NO_TRAP, WITHIN or WRITTEN_ONCE.
 
     WITHIN: when the condition `trigger` becomes TRUE, `text` holds behind that scan or one that begins `within_ns` later at most.
+    WRITTEN_ONCE: in no scan two statements write the same bit of `text`, a name, an address or a range.
 
     Each of `assumptions` holds behind each scan that is looked at; `free` are names and addresses that are inputs, besides those
     that `summary.input_places` finds."""
@@ -68,12 +69,17 @@ class Names:
         """The condition that `text` writes.  Raises ConditionError."""
         return parse_condition(text, self.find)
 
-    def extents(self, text: str) -> list[tuple[int, int, int | None]]:
-        """Where the places lie that a name, address or range names: offset, bytes, bit.  Raises UnknownPlace."""
+    def places(self, text: str) -> tuple[Place, ...]:
+        """The places that `text` names.  Raises UnknownPlace, also for what lies behind a reference."""
         found = self.find(text)
         places = found.places if isinstance(found, Span) else (found,)
         if any(place.hops for place in places):
             raise UnknownPlace(f"{text} lies behind a reference: name the variable itself")
+        return places
+
+    def extents(self, text: str) -> list[tuple[int, int, int | None]]:
+        """Where the places lie that a name, address or range names: offset, bytes, bit.  Raises UnknownPlace."""
+        places = self.places(text)
         for place in places:
             if part := _unfree(place.type, text):
                 raise UnknownPlace(f"{part}: bits, numbers and times can be free, texts, references and instances cannot")
@@ -109,6 +115,8 @@ class Run:
     """Of WITHIN: when the trigger became true whose answer does not come in time."""
     has_free_times: bool = False
     """True if its scans could have begun at other times: there was no fixed cycle."""
+    writers: tuple[Site, ...] = ()
+    """Of WRITTEN_ONCE: two statements that write the same bit in the last scan."""
 
     @property
     def scans(self) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from itertools import combinations
 
 from fbvm.base.types import StructType, fold
-from fbvm.prove.question import NEVER, Names, Question
+from fbvm.prove.question import NEVER, WRITTEN_ONCE, Names, Question
 from fbvm.watch.paths import Place, UnknownPlace
 
 EXCLUSIVE = (("DONE", "BUSY", "ERROR", "COMMANDABORTED"), ("ENO", "ERROR"))
@@ -18,6 +18,16 @@ def at_most_one(conditions: Sequence[str], assumed: tuple[str, ...] = (), free: 
     if len(conditions) < 2:
         raise ValueError("at most one of them: name two or more, with commas between them")
     return Question(NEVER, _two_of(conditions), assumed, free, title=f"at most one of {', '.join(conditions)}")
+
+
+def written_once(names: Names, text: str, assumed: tuple[str, ...] = (), free: tuple[str, ...] = ()) -> list[Question]:
+    """Of each of some names, addresses and ranges with commas between them: no bit is written by two statements in one scan.
+
+    Raises UnknownPlace."""
+    asked = [each.strip() for each in text.split(",")]
+    for each in asked:
+        names.places(each)
+    return [Question(WRITTEN_ONCE, each, assumed, free, names.prefix) for each in asked]
 
 
 def handshake(names: Names, path: str, assumed: tuple[str, ...] = (), free: tuple[str, ...] = ()) -> Question:

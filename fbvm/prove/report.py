@@ -25,6 +25,8 @@ def details(image: Image, verdict: Verdict, width: int | None = None) -> Iterato
         if verdict.run.has_free_times and verdict.run.passed_ns:
             yield f"  times between its scans: {show_passed(verdict.run.passed_ns)}"
         yield from run_chart(image, verdict, verdict.run, width).splitlines()
+        if verdict.run.writers:
+            yield f"  written in its last scan by {' and '.join(map(str, verdict.run.writers))}"
         if verdict.run.trap is not None:
             yield f"  {verdict.run.trap}"
 

@@ -4,18 +4,20 @@ solver says."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from random import Random
 
-from fbvm.base.types import BOOL, EnumType, SubrangeType, base
+from fbvm.base.types import BOOL, Elementary, EnumType, SubrangeType, base
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.bounded import Inputs
 from fbvm.prove.encoding.cells import BIT, Cell
 from fbvm.prove.encoding.terms import Term
 from fbvm.prove.invariants import Sample, Values
-from fbvm.prove.question import ALWAYS, NO_TRAP, WITHIN, Question, Run
+from fbvm.prove.question import ALWAYS, NO_TRAP, WITHIN, WRITTEN_ONCE, Question, Run
 from fbvm.prove.question import Names as QuestionNames
+from fbvm.record.trace.writes import Writes, noting_writes
 from fbvm.watch.conditions import Condition
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
@@ -47,24 +49,37 @@ class Judge:
     assumptions: tuple[Condition, ...]
     trigger: Condition | None = None
     waiting: Waiting = field(default_factory=Waiting)
+    written: tuple[Place, ...] = ()
+    """Of WRITTEN_ONCE: the places of which it is asked who writes them."""
+    writes: Writes | None = None
+    """Who writes them in the last scan of this run."""
 
     @classmethod
     def of(cls, image: Image, question: Question) -> Judge:
         """Raises ConditionError for conditions that do not fit the program."""
         names = QuestionNames(image, question.prefix)
-        condition = None if question.kind == NO_TRAP else names.condition(question.text)
+        written = names.places(question.text) if question.kind == WRITTEN_ONCE else ()
+        condition = None if question.kind in (NO_TRAP, WRITTEN_ONCE) else names.condition(question.text)
         trigger = names.condition(question.trigger) if question.kind == WITHIN else None
-        return cls(question, condition, tuple(names.condition(text) for text in question.assumptions), trigger)
+        return cls(question, condition, tuple(names.condition(text) for text in question.assumptions), trigger,
+                   written=written)  # fmt: skip
 
-    def begun(self) -> Judge:
-        """The judge of a new run."""
-        return replace(self, waiting=Waiting())
+    @contextmanager
+    def judging(self, plc: Plc) -> Iterator[Judge]:
+        """The judge of the run that `plc` does inside the `with` block."""
+        begun = replace(self, waiting=Waiting())
+        if not self.written:
+            yield begun
+            return
+        with noting_writes(plc, self.written) as writes:
+            yield replace(begun, writes=writes)
 
     @property
     def places(self) -> tuple[Place, ...]:
         """What the property names."""
         conditions = [each for each in (self.trigger, self.condition) if each is not None]
-        return tuple(dict.fromkeys(place for condition in conditions for place in condition.places))
+        plain = [place for place in self.written if isinstance(base(place.type), Elementary)]
+        return tuple(dict.fromkeys([*(place for condition in conditions for place in condition.places), *plain]))
 
     @property
     def all_places(self) -> tuple[Place, ...]:
@@ -73,6 +88,8 @@ class Judge:
 
     def met(self, plc: Plc) -> bool:
         """True if the last scan of a PLC met the goal.  To be asked once behind each scan of a run."""
+        if self.writes is not None:
+            return plc.trap is None and bool(self.writes.twice())
         if self.condition is None:
             return plc.trap is not None
         if self.trigger is not None:
@@ -186,32 +203,32 @@ class Found:
 def simulated(machine: Machine, judge: Judge, cells: Sequence[Cell], scans: int, seed: int) -> Iterator[Found | None]:
     """Runs with random inputs, some scans each; yields None now and then, and the run that met the goal, at last."""
     for number, hold_scans in enumerate(HOLD_SCANS):
-        judge = judge.begun()
         plc = machine.plc()
         random = Random(f"{seed} {number}")
         times_ns = machine.random_times(random, hold_scans)
         writer = InputWriter(plc, cells)
         values = RandomInputs(writer, random)
         inputs = Inputs([], [])
-        for _ in range(scans):
-            now = dict(inputs.values[-1]) if inputs.values else {}
-            for cell in cells:
-                if not inputs.values or random.randrange(hold_scans) == 0:
-                    now[cell] = values.value(cell)
-            inputs.values.append(now)
-            inputs.times_ns.append(next(times_ns))
-            for cell, value in now.items():
-                writer.write(cell, value)
-            plc.scan(inputs.times_ns[-1])
-            if not judge.kept(plc):
-                break
-            if judge.met(plc):
-                yield Found(inputs, seed, hold_scans)
-                return
-            if plc.trap:
-                break
-            if plc.scans % SCANS_AT_A_TIME == 0:
-                yield None
+        with judge.judging(plc) as judging:
+            for _ in range(scans):
+                now = dict(inputs.values[-1]) if inputs.values else {}
+                for cell in cells:
+                    if not inputs.values or random.randrange(hold_scans) == 0:
+                        now[cell] = values.value(cell)
+                inputs.values.append(now)
+                inputs.times_ns.append(next(times_ns))
+                for cell, value in now.items():
+                    writer.write(cell, value)
+                plc.scan(inputs.times_ns[-1])
+                if not judging.kept(plc):
+                    break
+                if judging.met(plc):
+                    yield Found(inputs, seed, hold_scans)
+                    return
+                if plc.trap:
+                    break
+                if plc.scans % SCANS_AT_A_TIME == 0:
+                    yield None
 
 
 def sampled(machine: Machine, judge: Judge, cells: Sequence[Cell], state: dict[Term, Cell], scans: int,
@@ -250,20 +267,22 @@ def stepped(plc: Plc, writer: InputWriter, inputs: Inputs) -> Iterator[dict[Plac
 
 def replayed(machine: Machine, judge: Judge, inputs: Inputs, is_shortest: bool) -> Run | None:
     """The run with these inputs, done on the engine; None if it does not meet the goal in its last scan, or earlier only."""
-    judge, plc = judge.begun(), machine.plc()
+    plc = machine.plc()
     writer = InputWriter(plc, list(inputs.values[0]) if inputs.values else [])
     writes: list[dict[Place, Value]] = []
-    for number, written in enumerate(stepped(plc, writer, inputs)):
-        writes.append(written)
-        if not judge.kept(plc):
-            return None
-        if judge.met(plc):
-            is_last = number == len(inputs) - 1
-            run = Run(tuple(writes), tuple(inputs.times_ns), machine.cycle_ns, is_shortest, plc.trap, judge.waiting.since_ns,
-                      machine.longest_ns > machine.cycle_ns)  # fmt: skip
-            return run if is_last else None
-        if plc.trap:
-            return None
+    with judge.judging(plc) as judging:
+        for number, written in enumerate(stepped(plc, writer, inputs)):
+            writes.append(written)
+            if not judging.kept(plc):
+                return None
+            if judging.met(plc):
+                sites = judging.writes.twice() if judging.writes else ()
+                run = Run(tuple(writes), tuple(inputs.times_ns), machine.cycle_ns, is_shortest, plc.trap,
+                          judging.waiting.since_ns, machine.longest_ns > machine.cycle_ns,
+                          tuple(plc.image.sites[site] for site in sites))  # fmt: skip
+                return run if number == len(inputs) - 1 else None
+            if plc.trap:
+                return None
     return None
 
 

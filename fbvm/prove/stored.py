@@ -9,7 +9,7 @@ from fbvm.base.cache import Cache, name_of, state_of
 from fbvm.base.data import PACKAGE
 from fbvm.code.image import Image
 from fbvm.prove.prover import Limits, prove
-from fbvm.prove.question import PROVED, Names, Question, Verdict
+from fbvm.prove.question import PROVED, WRITTEN_ONCE, Names, Question, Verdict
 
 PROOFS = Cache("proofs", b"fbvm proof 1\n", 4 << 20)
 
@@ -36,6 +36,8 @@ def _methods() -> str:
 def _asked(image: Image, question: Question) -> list[str]:
     """The question in texts: with the places that its names have in this image."""
     names = Names(image, question.prefix)
-    texts = [*([question.text] if question.text else []), *question.assumptions]
+    written = question.kind == WRITTEN_ONCE
+    texts = [*([question.text] if question.text and not written else []), *question.assumptions]
     places = [repr(names.condition(text).places) for text in texts]
+    places += [repr(names.places(question.text))] if written else []
     return [question.kind, *texts, *places, *(repr(names.extents(name)) for name in question.free)]

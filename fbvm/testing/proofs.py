@@ -14,7 +14,7 @@ from fbvm.code.image import Image
 from fbvm.prove.cycle import cycle_bounds
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits
-from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, Question, Verdict
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, WRITTEN_ONCE, Question, Verdict
 from fbvm.prove.report import details, headline
 from fbvm.prove.stored import proved_once
 from fbvm.run.time_limit import time_limit
@@ -29,23 +29,26 @@ class NotProved(AssertionError):
         self.verdict = verdict
 
 
-def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False, assume: str | Sequence[str] = (),
-           free: str | Sequence[str] = (), scans: int = 1000, seconds: float = 60, cycle: str = "") -> Verdict:  # fmt: skip
+def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False, written_once: str = "",
+           assume: str | Sequence[str] = (), free: str | Sequence[str] = (), scans: int = 1000, seconds: float = 60,
+           cycle: str = "") -> Verdict:  # fmt: skip
     """Asserts that a property of the block or program of a rig holds in every run from power-on.
 
-    One of `never`, `always` (conditions, as `until` takes them) and `no_trap` says which.  Inputs of a block or of a program
-    are free in each scan; `free` names others.  `assume` are conditions that all runs keep.  `scans` is how far to look
-    where there is no proof, `seconds` how long.  `cycle` is the time between two scans, that of the rig unless given:
+    One of `never`, `always` (conditions, as `until` takes them), `no_trap` and `written_once` (a name, address or range
+    of which no bit is written by two statements in one scan) says which.  Inputs of a block or of a program are free in each
+    scan; `free` names others.  `assume` are conditions that all runs keep.  `scans` is how far to look where there is no proof,
+    `seconds` how long.  `cycle` is the time between two scans, that of the rig unless given:
     `5ms..50ms` lets any time within these bounds pass.  Stubs and units have no part in it.  A proof is kept on disk until the
     program or the property changes.
 
     Raises NotProved, and ValueError for a program that cannot be followed, for names that it does not have, or without exactly
     one property."""
     __tracebackhide__ = True
-    kinds = [(NEVER, never), (ALWAYS, always), (NO_TRAP, "no trap" if no_trap else "")]
+    kinds = [(NEVER, never), (ALWAYS, always), (NO_TRAP, "no trap" if no_trap else ""),
+             (WRITTEN_ONCE, written_once)]  # fmt: skip
     chosen = [(kind, text) for kind, text in kinds if text]
     if len(chosen) != 1:
-        raise ValueError("say what to prove: one of never, always and no_trap")
+        raise ValueError("say what to prove: one of never, always, no_trap and written_once")
     kind, text = chosen[0]
     subject = rig.subject
     named = [free] if isinstance(free, str) else [*free]

@@ -28,7 +28,7 @@ from fbvm.prove.cycle import cycle_bounds, show_cycle
 from fbvm.prove.prover import Limits, prove
 from fbvm.prove.pytest_text import pytest_text
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
-from fbvm.prove.ready import at_most_one, handshake
+from fbvm.prove.ready import at_most_one, handshake, written_once
 from fbvm.prove.report import details, headline
 from fbvm.prove.runs import repeated
 from fbvm.run.time_limit import time_limit
@@ -56,6 +56,8 @@ def _cycle(value: str) -> tuple[int, int]:
 @click.option("--at-most-one", multiple=True, metavar="EXPRESSION,EXPRESSION...", help="Never two of them hold behind a scan.")
 @click.option("--handshake", multiple=True, metavar="INSTANCE",
               help="Of its outputs Done, Busy, Error never two are TRUE, nor ENO and Error.")
+@click.option("--written-once", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST,...",
+              help="Never two statements write the same output, or bit of it, in one scan.")
 @click.option("--no-trap", is_flag=True, help="No scan ends in a trap.")
 @click.option("--within", nargs=3, multiple=True, metavar="TRIGGER EXPRESSION TIME",
               help="When TRIGGER becomes true, EXPRESSION holds behind a scan that begins TIME later at most.")
@@ -87,14 +89,14 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     Status 0 if all is proved or reached, 1 if a property is broken or undecided, 3 if the program has errors or cannot be
     followed."""
     questions, pairs = _questions(options), options["pairs"]
-    _refuse_mixed(options, bool(questions or pairs or options["handshake"]))
+    needs_names = options["handshake"] or options["written_once"]
+    _refuse_mixed(options, bool(questions or pairs or needs_names))
     if options["tests_file"]:
         sys.exit(write_tests(files, program, libraries, as_json, options))
     asked = [_equality(pair, files, libraries, options["assume"]) for pair in pairs]
-    if questions or options["handshake"]:
+    if questions or needs_names:
         image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
-        questions += _ready(lambda: [handshake(Names(image), path, options["assume"], options["free"])
-                                     for path in options["handshake"]])  # fmt: skip
+        questions += _ready(lambda: _named(Names(image), options))
         asked += [(image, question) for question in questions]
     verdicts = []
     for image, question in asked:
@@ -119,7 +121,7 @@ def _refuse_mixed(options: dict[str, Any], asks: bool) -> None:
         raise click.UsageError("--covered says what --tests may leave out, which is not given")
     if not asks and not options["tests_file"]:
         raise click.UsageError("say what to prove: --never, --always, --reach, --no-trap, --within, --at-most-one, --handshake, "
-                               "--equal or --tests")  # fmt: skip
+                               "--written-once, --equal or --tests")  # fmt: skip
 
 
 def _questions(options: dict[str, Any]) -> list[Question]:
@@ -132,6 +134,13 @@ def _questions(options: dict[str, Any]) -> list[Question]:
     found += [Question(NO_TRAP, "", assumed, free)] * options["no_trap"]
     return found + _ready(lambda: [at_most_one([each.strip() for each in text.split(",")], assumed, free)
                                    for text in options["at_most_one"]])  # fmt: skip
+
+
+def _named(names: Names, options: dict[str, Any]) -> list[Question]:
+    """What the options ask of names.  Raises UnknownPlace."""
+    given = options["assume"], options["free"]
+    found = [handshake(names, path, *given) for path in options["handshake"]]
+    return found + [question for text in options["written_once"] for question in written_once(names, text, *given)]
 
 
 def _ready(make: Callable[[], list[Question]]) -> list[Question]:
@@ -180,7 +189,7 @@ def _as_dict(verdict: Verdict) -> dict[str, object]:
     if run := verdict.run:
         found["run"] = {
             "scans": run.scans, "shortest": run.is_shortest, "trap": run.trap.code if run.trap else None,
-            "times_ns": [*run.times_ns],
+            "times_ns": [*run.times_ns], "writers": [str(site) for site in run.writers],
             "writes": [{"scan": number, "values": {place.name: plain_value(place.type, value) for place, value in writes.items()}}
                        for number, writes in enumerate(run.writes) if writes],
         }  # fmt: skip

@@ -4,14 +4,15 @@ Nothing here knows an operation; `expressions` and `statements` hold a row for e
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from fbvm.code.image import Image
-from fbvm.code.operations import Node
+from fbvm.code.operations import Address, Node
 from fbvm.prove.encoding.cells import Contents
 from fbvm.prove.encoding.terms import Term, Terms
+from fbvm.prove.encoding.writes import Writes
 
 MOST_STEPS = 400_000
 """Statements that one scan may execute symbolically, rounds of loops counted each."""
@@ -88,10 +89,10 @@ class Execution:
     """One scan that is executed symbolically: what its code is, and what it has met.
 
     `now` is the term of the scan's time in nanoseconds, `budget` the steps that a scan may take.  `expressions` and `statements`
-    are the rows by which operations are executed."""
+    are the rows by which operations are executed; `watched` are bits of which it is noted who writes them."""
 
     def __init__(self, image: Image, terms: Terms, now: Term, budget: int, expressions: dict[str, Row],
-                 statements: dict[str, Row]) -> None:  # fmt: skip
+                 statements: dict[str, Row], watched: Sequence[range] = ()) -> None:  # fmt: skip
         self.image, self.terms, self.now, self.budget = image, terms, now, budget
         self.expressions, self.statements = expressions, statements
         self.traps: list[TrapCondition] = []
@@ -99,6 +100,9 @@ class Execution:
         """When the statement at a site is executed."""
         self.unknowns: dict[str, int] = {}
         """Operations whose result is not known, with a site of each."""
+        self.writes = Writes(terms, watched)
+        self.stored: tuple[Address, list[Any]] | None = None
+        """Where the last store went that an observation may follow, whose subscripts it may have changed."""
         self.base = 0
         """Where the instance begins that is executed."""
         self.site = -1

@@ -4,7 +4,7 @@ What the machine says of time and tasks is asked of a `Signals`: constants where
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from fbvm.base.areas import AREAS
@@ -47,11 +47,13 @@ class Scanned:
     ended: Trapped | None = None
 
 
-def scan(image: Image, contents: Contents, signals: Signals, budget: int) -> Scanned:
-    """Executes one scan over `contents`, which holds its inputs already."""
+def scan(image: Image, contents: Contents, signals: Signals, budget: int, watched: Sequence[range] = ()) -> Scanned:
+    """Executes one scan over `contents`, which holds its inputs already.
+
+    `watched` are bits of which it is noted who writes them."""
     terms = contents.terms
     _write_clock(contents, signals)
-    x = Execution(image, terms, signals(("now", 0)), budget, EXPRESSION_ROWS, STATEMENT_ROWS)
+    x = Execution(image, terms, signals(("now", 0)), budget, EXPRESSION_ROWS, STATEMENT_ROWS, watched)
     state = State(contents, terms.true)
     following: dict[Signal, Term] = {}
     due = [(number, _due(image, contents, number, task, signals, following)) for number, task in by_priority(image.tasks)]

@@ -10,8 +10,8 @@ from functools import partial
 from typing import Any
 
 from fbvm.code.image import Body
-from fbvm.code.operations import SIZES, TEXT_UNITS, WHOLE_BYTES, Address, Block, Node
-from fbvm.prove.encoding.addresses import targets
+from fbvm.code.operations import SIZES, TEXT_UNITS, WHOLE_BYTES, Address, Block, Node, detail_size
+from fbvm.prove.encoding.addresses import Target, targets
 from fbvm.prove.encoding.execution import UNWOUND, Execution, Refused, Row, State
 from fbvm.prove.encoding.expressions import is_signed
 from fbvm.prove.encoding.terms import Term
@@ -51,14 +51,14 @@ MOST_CALLS = 32
 
 def call(x: Execution, state: State, body: Body, base: int) -> State:
     """The state behind a call of a body for the instance at `base`; `state` itself, written."""
-    x.calls += 1
+    x.calls, x.stored = x.calls + 1, None
     if x.calls > MOST_CALLS + len(x.image.bodies):
         raise Refused(f"calls come back more than {MOST_CALLS} times, which is too deep to be followed", x.site)
     outer_base, outer_temporaries, x.base, state.temporaries = x.base, state.temporaries, base, {}
     begun = state.path
     following, left = run_block(x, body.code, state)
     ends = left.get("return", []) + ([following] if following else [])
-    x.base = outer_base
+    x.base, x.stored = outer_base, None
     x.calls -= 1
     if not ends:
         raise Refused("a call never ends", x.site)
@@ -187,9 +187,16 @@ BRANCHES: dict[str, Callable[..., tuple[State | None, Outcomes]]] = {"if": _if, 
 # --- stores -----------------------------------------------------------------------------------------------------------
 
 
+def _stored(x: Execution, state: State, address: Address, size: int) -> list[Target]:
+    """The places that a store writes, kept for the observation behind it."""
+    found = targets(x, state, address, size)
+    x.stored = address, found
+    return found
+
+
 def _store(x: Execution, state: State, machine: str, address: Address, a: Node) -> None:
     size = SIZES[machine]
-    found = targets(x, state, address, size)
+    found = _stored(x, state, address, size)
     value = x.value(state, a)
     for target in found:
         if machine == "b":
@@ -199,14 +206,14 @@ def _store(x: Execution, state: State, machine: str, address: Address, a: Node) 
 
 
 def _store_bit(x: Execution, state: State, address: Address, bit: int, a: Node) -> None:
-    found = targets(x, state, address, 1)
+    found = _stored(x, state, address, 1)
     value = x.value(state, a)
     for target in found:
         state.contents.write_bit(target.offset, bit, value, target.condition)
 
 
 def _store_flag(x: Execution, state: State, address: Address, a: Node) -> None:
-    found = targets(x, state, address, 1)
+    found = _stored(x, state, address, 1)
     value = x.value(state, a)
     for target in found:
         if target.bit == WHOLE_BYTES:
@@ -217,7 +224,7 @@ def _store_flag(x: Execution, state: State, address: Address, a: Node) -> None:
 
 def _store_text(x: Execution, state: State, address: Address, capacity: int, a: Node) -> None:
     unit = TEXT_UNITS[a[1]]
-    found = targets(x, state, address, (capacity + 1) * unit)
+    found = _stored(x, state, address, (capacity + 1) * unit)
     value = x.value(state, a)
     for target in found:
         if value.is_constant:
@@ -232,7 +239,7 @@ def _store_text(x: Execution, state: State, address: Address, capacity: int, a: 
 
 
 def _copy(x: Execution, state: State, to: Address, source: Address, size: int) -> None:
-    into, origins = targets(x, state, to, size), targets(x, state, source, size)
+    into, origins = _stored(x, state, to, size), targets(x, state, source, size)
     if len(into) == 1 and len(origins) == 1:
         state.contents.copy(into[0].offset, origins[0].offset, size, x.terms.true)
         return
@@ -246,7 +253,7 @@ def _copy(x: Execution, state: State, to: Address, source: Address, size: int) -
 
 
 def _fill(x: Execution, state: State, address: Address, pattern: bytes) -> None:
-    for target in targets(x, state, address, len(pattern)):
+    for target in _stored(x, state, address, len(pattern)):
         partition = state.contents.partition
         for cell in partition.covering(target.offset, len(pattern)):
             first = cell.offset - target.offset
@@ -264,7 +271,7 @@ def _fill(x: Execution, state: State, address: Address, pattern: bytes) -> None:
 
 
 def _reverse(x: Execution, state: State, address: Address, size: int, runs: tuple[tuple[int, ...], ...]) -> None:
-    for target in targets(x, state, address, size):
+    for target in _stored(x, state, address, size):
         for offset, count, stride, item in runs:
             for start in range(target.offset + offset, target.offset + offset + count * stride, stride):
                 parts = [state.contents.number(start + at, 1) for at in range(item)]
@@ -317,6 +324,18 @@ def _observe(x: Execution, state: State, kind: str, site: int, detail: Any) -> N
     if kind in ("statement", "rung"):
         x.site = site
         x.reached[site] = x.terms.or_(x.reached.get(site, x.terms.false), state.path)
+    elif kind == "write" and x.writes.watched:
+        _note_write(x, state, site, *detail)
+
+
+def _note_write(x: Execution, state: State, site: int, form: str | tuple[str, int], address: Address, bit: int) -> None:
+    """Notes who has written, as the engine tells it: where the store went whose subscripts it may have changed."""
+    size = detail_size(form) if bit == WHOLE_BYTES else 1
+    found = x.stored[1] if x.stored and x.stored[0] == address else targets(x, state, address, size)
+    x.stored = None
+    for target in found:
+        named = target.bit if form == "b" and bit == WHOLE_BYTES else bit
+        x.writes.note(site, target.offset, size, named, x.terms.and_(state.path, target.condition))
 
 
 STATEMENT_ROWS: dict[str, Row] = {

@@ -18,6 +18,7 @@ from fbvm.prove.encoding.properties import place_term
 from fbvm.prove.encoding.scan import WIDTHS, Scanned, Signal, scan
 from fbvm.prove.encoding.term import constants_of
 from fbvm.prove.encoding.terms import Term, Terms, never
+from fbvm.prove.encoding.writes import Writes
 from fbvm.watch.paths import Place
 
 FRAMES_A_LEVEL = 8
@@ -36,6 +37,8 @@ class Summary:
     terms: Terms
     contents: Contents
     """What memory holds behind the scan."""
+    writes: Writes
+    """Which statements write the bits that are watched."""
     initial: dict[Term, Term] = field(default_factory=dict)
     """The value of each variable of the state before the first scan."""
     next: dict[Term, Term] = field(default_factory=dict)
@@ -58,25 +61,27 @@ IsInput = Callable[[Cell], bool]
 
 
 def summarize(image: Image, budget: int, free: Iterable[tuple[int, int, int | None]] = (),
-              expired: Callable[[], bool] = never, seen: Sequence[Place] = ()) -> Summary:  # fmt: skip
+              expired: Callable[[], bool] = never, seen: Sequence[Place] = (),
+              watched: Sequence[range] = ()) -> Summary:  # fmt: skip
     """The summary of a program.
 
     `budget` is the step budget of a scan; `free` are places (offset, bytes, bit or None) that are inputs besides those that
-    `input_places` finds; `seen` are places at which somebody looks behind a scan.  Raises Refused for a program that cannot be
-    followed, with the site, and TimeOver if `expired` answers True before it is done."""
+    `input_places` finds; `seen` are places at which somebody looks behind a scan, `watched` bits of which it is asked who writes
+    them.  Raises Refused for a program that cannot be followed, with the site, and TimeOver
+    if `expired` answers True before it is done."""
     places = [*input_places(image), *free]
-    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_summarized, image, budget, places, expired, seen))
+    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_summarized, image, budget, places, expired, seen, watched))
 
 
 def _summarized(image: Image, budget: int, free: list[tuple[int, int, int | None]], expired: Callable[[], bool],
-                seen: Sequence[Place]) -> Summary:  # fmt: skip
+                seen: Sequence[Place], watched: Sequence[range]) -> Summary:  # fmt: skip
     area = AREAS["CIO"]
     partition = Partition(bitwise=range(area.offset, area.offset + area.size_bytes))
     numbers: frozenset[int] = frozenset()
     for _ in range(MOST_ROUNDS):
         try:
             used = set(partition.used)
-            found = _Fixpoint(image, budget, partition, free, expired, seen).summary()
+            found = _Fixpoint(image, budget, partition, free, expired, seen, watched).summary()
             if partition.used == used:
                 found.terms.expired = never
                 return found
@@ -93,8 +98,8 @@ class _Fixpoint:
     """Finds what is state: at first nothing is, then what some scan leaves with another value than it may have had before."""
 
     def __init__(self, image: Image, budget: int, partition: Partition, free: list[tuple[int, int, int | None]],
-                 expired: Callable[[], bool], seen: Sequence[Place]) -> None:  # fmt: skip
-        self.seen = [place for place in seen if not place.hops]
+                 expired: Callable[[], bool], seen: Sequence[Place], watched: Sequence[range]) -> None:  # fmt: skip
+        self.seen, self.watched = [place for place in seen if not place.hops], watched
         self.image, self.budget, self.partition, self.terms = image, budget, partition, Terms(expired)
         self.power_on = initial_bytes(image.initial)
         self.free_bytes = {at for offset, size, bit in free if bit is None for at in range(offset, offset + size)}
@@ -169,7 +174,7 @@ class _Fixpoint:
         begun = contents.child()
         for place in self.seen:  # what only the property reads: the machine, too, writes where somebody looks
             place_term(begun, place)
-        return scan(self.image, begun, self.signal, self.budget)
+        return scan(self.image, begun, self.signal, self.budget, self.watched)
 
     def _take(self, scanned: Scanned) -> None:
         """What the scan shows to be written, and to be state."""
@@ -198,7 +203,7 @@ class _Fixpoint:
     def _made(self, scanned: Scanned) -> Summary:
         terms, x = self.terms, scanned.execution
         made = Summary(self.image, terms, scanned.contents, inputs=self.inputs, traps=x.traps, reached=x.reached,
-                       unknowns=x.unknowns)  # fmt: skip
+                       unknowns=x.unknowns, writes=x.writes)  # fmt: skip
         for cell in sorted(self.variable):
             if self.is_input(cell):
                 continue

@@ -72,6 +72,27 @@ def test_an_answer_that_comes_too_late_is_written_as_a_test(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
+def test_an_output_that_two_statements_write_is_shown_and_written_as_a_test(tmp_path: Path) -> None:
+    program, test = tmp_path / "program.st", tmp_path / "test_double.py"
+    text = "PROGRAM Main\nVAR In AT %IX0.0 : BOOL; Q AT %QX0.0 : BOOL; END_VAR\n" \
+           "    Q := FALSE;\n    IF In THEN Q := TRUE; END_IF\nEND_PROGRAM\n"
+    program.write_text(text, encoding="utf-8")
+    result = proved(str(program), "--written-once", "Main.Q, Main.In", "--test", str(test))
+    first, *_, last, other, note = result.stdout.splitlines()
+    assert (result.exit_code, first, other) == (1, "written once Main.Q: BROKEN after 1 scan, by the shortest run",
+                                                "written once Main.In: PROVED by induction over 1 scan")  # fmt: skip
+    assert last == f"  written in its last scan by {program}:3:5 in Main and {program}:4:16 in Main"
+    assert note == "  no statement writes Main.In"
+    [row] = json.loads(proved(str(program), "--written-once", "Main.Q", "--json").stdout)["properties"]
+    assert [place.split(":")[-2] for place in row["run"]["writers"]] == ["3", "4"]
+    double = runpy.run_path(str(test))["test_written_once_main_q"]
+    with pytest.raises(AssertionError):
+        double()
+    program.write_text(text.replace("    Q := FALSE;\n", ""), encoding="utf-8")
+    double()
+
+
+@pytest.mark.slow
 def test_two_blocks_are_compared(tmp_path: Path) -> None:
     program = tmp_path / "blocks.st"
     block = "FUNCTION {} : INT\nVAR_INPUT a : INT; END_VAR\n    {} := {};\nEND_FUNCTION\n"
@@ -93,7 +114,8 @@ def test_the_run_is_recorded(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [[], ["--never", "Main.Nobody"], ["--never", "Main.Left +"], ["--always", "3"],
-                                       ["--never", "Main.Left", "--free", "Nobody"]])  # fmt: skip
+                                       ["--never", "Main.Left", "--free", "Nobody"],
+                                       ["--written-once", "Main.Left,Nobody"]])  # fmt: skip
 def test_wrong_use_has_status_2(arguments: list[str]) -> None:
     result = proved(INTERLOCK, *arguments)
     assert result.exit_code == 2, result.output

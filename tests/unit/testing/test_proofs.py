@@ -9,7 +9,7 @@ import pytest
 
 from fbvm.base.data import data_folder
 from fbvm.prove import stored
-from fbvm.testing import NotProved, proved
+from fbvm.testing import NotProved, double_writes, proved
 
 GATE = """
 FUNCTION_BLOCK Gate
@@ -55,7 +55,7 @@ def test_a_proof_is_kept_until_the_program_changes(fb: Any, monkeypatch: pytest.
 
 @pytest.mark.parametrize("asked", [{}, {"never": "Up", "always": "Up"}])
 def test_one_property_is_asked_at_a_time(fb: Any, asked: dict[str, str]) -> None:
-    with pytest.raises(ValueError, match="one of never, always and no_trap"):
+    with pytest.raises(ValueError, match="one of never, always, no_trap and written_once"):
         proved(fb("Gate", text=GATE), **asked)
 
 
@@ -80,3 +80,30 @@ INTERLOCKS = [
 def test_the_interlocks_of_the_classics_hold(plc: Any, name: str, never: str, twin: str) -> None:
     rig = plc(str(Path(data_folder("examples")) / "classics" / f"{name}{twin}.st"))
     assert proved(rig, never=never).word == "proved"
+
+
+DOUBLE = """
+FUNCTION_BLOCK Signal
+VAR_INPUT Run, Fault : BOOL; END_VAR
+VAR_OUTPUT Lamp, Horn : BOOL; END_VAR
+    Lamp := Run;
+    IF Fault THEN
+        Lamp := TRUE;
+    END_IF
+    Horn := Fault;
+END_FUNCTION_BLOCK
+"""
+
+
+def test_an_output_that_two_statements_write_fails_with_both(fb: Any) -> None:
+    assert proved(fb("Signal", text=DOUBLE), written_once="Horn").word == "proved"
+    with pytest.raises(NotProved) as failed:
+        proved(fb("Signal", text=DOUBLE), written_once="Lamp")
+    first, *_, last = str(failed.value).splitlines()
+    assert first == "written once Lamp: BROKEN after 1 scan, by the shortest run"
+    assert last.split(" by ")[1].split(" in ")[0].endswith(":5:5") and last.endswith(":7:9 in Signal")
+    rig = fb("Signal", text=DOUBLE)
+    place = f"{rig.subject.prefix}Lamp"
+    assert double_writes(rig.plc, place) == []
+    rig.plc.write(f"{rig.subject.prefix}Fault", True)
+    assert len(double_writes(rig.plc, place)) == 2
