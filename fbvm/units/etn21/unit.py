@@ -90,8 +90,9 @@ class Etn21:
         self._fins: FinsService | None = None
         if fins_access not in ACCESS:
             raise ValueError(f"fins_access {fins_access!r} is none of {', '.join(ACCESS)}")
-        if (fins_nodes or fins_clients or fins_permitted) and not fins:
-            raise ValueError("fins_nodes, fins_clients and fins_permitted are settings of FINS; write fins = true, too")
+        if any((fins_nodes, fins_clients, fins_permitted, fins_error_flags)) and not fins:
+            raise ValueError("fins_nodes, fins_clients, fins_permitted and fins_error_flags are settings of FINS; write "
+                             "fins = true, too")  # fmt: skip
         if fins:
             nodes, clients = endpoints_of(fins_nodes or {}), endpoints_of(fins_clients or {}, "FINS/TCP connection")
             self._fins = FinsService(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from typing import Any
 
 import pytest
 from fins_rig import UNIT, FinsRig, compiled
@@ -221,6 +222,8 @@ def test_settings_that_cannot_be(clients: dict[str, str]) -> None:
         Etn21(0, UNIT, fins=True, fins_clients=clients)
 
 
-def test_clients_without_fins_are_refused() -> None:
-    with pytest.raises(ValueError, match="fins = true"):
-        Etn21(0, UNIT, fins_clients={"1": SERVER})
+@pytest.mark.parametrize("given", [{"fins_clients": {"1": "192.168.250.2"}}, {"fins_permitted": ["192.168.250.2"]},
+                                   {"fins_nodes": {"2": "192.168.250.2"}}, {"fins_error_flags": True}])  # fmt: skip
+def test_settings_of_fins_are_refused_where_there_is_none(given: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="are settings of FINS; write fins = true, too"):
+        Etn21(0, UNIT, **given)
