@@ -127,7 +127,8 @@ class ItemsSession:
         if (unknown := sorted(names - run.used)) and not self.failure:
             raise NoTests(f"no PLC that these tests make has {unknown[0]}")
         if run.judge and not watched.judge and not self.failure:
-            raise NoTests(f"the conditions fit no PLC that these tests make: {watched.why}")
+            why = f"the conditions fit no PLC that these tests make: {watched.why}"
+            raise NoTests(why if run.plcs else "these tests make no PLC by a fixture, of which conditions could hold")
         return self._summed(variant, run)
 
     def _summed(self, variant: Variant, run: VariedRun) -> Result:

@@ -234,8 +234,9 @@ def _about(outcome: Outcome, group: Group, recordings: dict[int, Path]) -> list[
              *map(str, variant.faults), *map(str, variant.cuts), *(["late units"] * (variant.timing == "real"))]  # fmt: skip
     failure = group.shrunk.result.failure if group.shrunk else group.failure
     assert failure
-    lines = [f"run {group.first}, {'made smaller' if group.shrunk else 'as it was'}: {', '.join(parts) or 'without any fault'}",
-             f"fails in scan {failure.scan} of {failure.plc}"]  # fmt: skip
+    lines = [f"run {group.first}, {'made smaller' if group.shrunk else 'as it was'}: {', '.join(parts) or 'without any fault'}"]
+    if failure.plc:  # a test may fail before it makes one
+        lines.append(f"fails in scan {failure.scan} of {failure.plc}")
     if common := in_common(plan, group, outcome.results):
         lines.append(f"all of them, and not all others, have {', '.join(common)}")
     if failure.detail:

@@ -187,3 +187,12 @@ def test_folders_may_have_settings_of_pytest_of_their_own(project: Path) -> None
         (project / folder / "conftest.py").write_text("def pytest_runtest_setup(item):\n    pass\n")
     (project / "tests" / "quick" / "test_here.py").write_text(TESTS.partition("\n\n\n")[2])
     assert fbvm("tests/quick/test_here.py", "tests/test_counter.py::test_it_scans", "--runs", "2", "--jobs", "1")[0] == 0
+
+
+@pytest.mark.slow
+def test_tests_may_make_no_plc(project: Path) -> None:
+    (project / "tests" / "test_none.py").write_text("def test_it():\n    assert 1 < 2\n\ndef test_other():\n    assert 1 > 2\n")
+    status, said = fbvm("tests/test_none.py::test_other", "--runs", "2", "--jobs", "1")
+    assert (status, "fails in scan" in said) == (1, False)
+    status, said = fbvm("tests/test_none.py::test_it", "--never", "Foo > 3", "--fresh")
+    assert (status, "these tests make no PLC by a fixture" in said) == (2, True)
