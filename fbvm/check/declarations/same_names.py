@@ -17,7 +17,7 @@ def hides_result(scope: Scope, pou: Pou, variable: Variable) -> bool:
         return True
     hint = f", or take {takers('locals_hide_results')}" if is_local else ""
     scope.project.report.add("S0202", variable.source, variable.node, text,
-                     f"that name stands for the result; rename the variable{hint}")
+                             f"that name stands for the result; rename the variable{hint}")
     pou.failed_names.add(fold(variable.name))
     return False
 
@@ -30,11 +30,11 @@ def declared_twice(scope: Scope, pou: Pou, variable: Variable, other: Variable) 
     is_step, there = variable.role == "step" and not other.role, (other.source, other.node.start, "first declared here")
     if not is_step or not scope.dialect.steps_apart:
         scope.project.report.add("S0202", variable.source, variable.node, f"{variable.name} is declared twice in {pou.name}",
-                         f"rename one, or take {takers('steps_apart')}" if is_step else "", there)
+                                 f"rename one, or take {takers('steps_apart')}" if is_step else "", there)
         return
     name = variable.name
     scope.project.report.add("S0193", variable.source, variable.node,
-                     f"a variable is called {name}, too: {name}.X and {name}.T are flags of the step", "", there)
+                             f"a variable is called {name}, too: {name}.X and {name}.T are flags of the step", "", there)
     variable.name = f"{name} step"
     pou.variables[fold(variable.name)] = other.step = variable
     pou.order.append(variable)
