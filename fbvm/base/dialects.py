@@ -62,6 +62,7 @@ class Dialect:
     comments_end_at_once: bool = False
     pragmas_of_c: bool = False
     zero_durations: bool = False
+    bare_construction: bool = False
     first_label_counts: bool = False
     idle_statements: bool = False
     idle_constants: bool = False
@@ -167,6 +168,8 @@ QUESTIONS = {
     "pragmas_of_c": ("{{ text of C }}, {disable code generation}, {#include}: pragmas of the generator of matiec",
                      "{{ }} is an error, the others have no effect (S0190)",
                      "{{ }} is passed over with a warning (S0190); the others are refused by name (S0901)"),
+    "bare_construction": ("METHOD FB_init without inputs", "an error (S1011): it has bInitRetains and bInCopyCode",
+                          "called once at the start, the one of the base first"),
     "zero_durations": ("t = 0, where t is a TIME", "an error", "T#0s"),
     "first_label_counts": ("CASE n OF 1..5: .. 3: ..: a label twice", "an error", "the first one counts, with a warning (S0193)"),
     "idle_statements": ("a + 1; as a statement", "an error", "worked out, with a warning (S0193)"),
@@ -235,7 +238,7 @@ _ROWS = (
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
-            short_circuits=True, ampersand_refers=True, bits_by_name=True, zero_durations=True,
+            short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
             generic_functions=True, times_are_numbers=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),

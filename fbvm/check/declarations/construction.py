@@ -307,6 +307,8 @@ def _parameters(context: Context, method: Pou, phase: str,
     declared = [(name, each, section) for section in method.tree.sections if section.kind == "VAR_INPUT"
                 for each in section.variables for name in each.names]
     wanted = FLAGS[phase]
+    if phase == INIT and not declared and context.project.dialect.bare_construction:
+        return (), []
     if len(declared) < len(wanted) or phase == EXIT and len(declared) > len(wanted):
         how = "begins with two inputs" if phase == INIT else "has one input"
         context.report.add("S1011", method.source, method.tree.name, f"{phase} {how}",

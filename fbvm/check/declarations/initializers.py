@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.base.types import ArrayType, Type, machine
+from fbvm.base.types import ArrayType, Type, fold, machine
 from fbvm.check.expressions.constants import decode
 from fbvm.check.expressions.scope import Scope
-from fbvm.check.symbols.facts import Pou
+from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import changed
 
@@ -44,6 +44,9 @@ def varies(scope: Scope, initial: tree.Initial) -> bool:
             variable = scope.variable(node.text)
             if variable is not None and not variable.constant:
                 return True
+        variable = _of_instance(scope, node)
+        if variable is not None and not variable.constant:
+            return True
         called = node.callee if isinstance(node, tree.Call) else None
         if isinstance(called, tree.NameRef) and scope.project.pou(called.text, scope.source) is not None:
             return True
@@ -63,7 +66,7 @@ def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
 def _initial_value(scope: Scope, place: tree.Expr) -> tuple[Type, bytes] | None:
     """Type and initial bytes of a variable or a part of one; None if they are not known."""
     facts = scope.facts
-    variable = facts.variables.get(place)
+    variable = facts.variables.get(place) or _of_instance(scope, place)
     if variable is not None:
         return None if variable.reference else (variable.type, variable.initial)
     if isinstance(place, tree.Member) and place in facts.fields:
@@ -84,6 +87,16 @@ def _initial_value(scope: Scope, place: tree.Expr) -> tuple[Type, bytes] | None:
         size = outer[0].element.size
         return outer[0].element, outer[1][at * size:(at + 1) * size]
     return None
+
+
+def _of_instance(scope: Scope, place: tree.Expr) -> Variable | None:
+    """The variable that THIS^.name or SUPER^.name means, also where a local variable has that name."""
+    if not isinstance(place, tree.Member) or scope.pou is None:
+        return None
+    followed = place.of.of if isinstance(place.of, tree.Deref) else place.of
+    if not isinstance(followed, tree.NameRef) or fold(followed.text) not in ("THIS", "SUPER"):
+        return None
+    return (scope.pou.block or scope.pou).variables.get(fold(place.name.text))
 
 
 def _places(expr: tree.Expr) -> Iterator[tree.Expr]:

@@ -26,6 +26,8 @@ def call(body: BodyContext, called: PouCall, instance: Place | None, site: int) 
     if not called.dynamic or instance is None:
         return ("call", body.program.number(body.program.executed(pou)), address)
     found = body.program.candidates(pou)
+    if not found:
+        return ("stop", _NO_SUCH_TYPE, site)
     if len(found) == 1:
         (only,) = found
         block = _row(body, pou, only, address)
