@@ -231,7 +231,7 @@ _ROWS = (
             ("codesys/blocks", "matiec/additional"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
-            constants_wrap=True, short_names=True),
+            constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True),
     Dialect("rusty", "programs for RuSTy", reals_of_other_widths=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
@@ -288,8 +288,20 @@ ALIKE = (
     ("TON, TOF, TP when ET = PT exactly", "The time is over."),
     ("THIS^() and THIS^.m() in a method that a derived block inherits", "Executes what the instance's own type has, as in "
      "CODESYS; RuSTy executes what the block has in which the method stands."),
+    ("THIS.x, SUPER.x", "The same as THIS^.x and SUPER^.x, with a method or a variable behind the dot; RuSTy wants the ^."),
     ("SUPER^.m()", "What the nearest base has, whatever the instance is."),
     ("A call of an interface that refers to nothing", "The program stops at its line (R0110)."),
+    ("VAR_OUTPUT of a METHOD or FUNCTION when its call begins", "Its initial value; in RuSTy the value of the variable that the "
+     "call names for it, where that is an array, a structure or a text."),
+    ("m(x => v), where x is VAR_IN_OUT", "An error (S0402): := passes an in-out; RuSTy takes => as well."),
+    ("REF(x), where x is a variable of a FUNCTION or METHOD", "An error (S0407): x ends with the call; ADR(x) and REF= are taken, "
+     "and stop the program (R0110) if they are followed later. RuSTy takes REF too, and checks nothing."),
+    ("A value, as a property gives it, for VAR_INPUT {ref}", "An error (S0407) where {ref} has an effect, which is under rusty: "
+     "assign it to a variable first; RuSTy passes a hidden one."),
+    ("PROPERTY whose GET and SET have no statement", "Keeps nothing: GET gives the first value of its type. The first RuSTy "
+     "with properties kept what was assigned."),
+    ("__FPOINTER, __VOID, __vtable, Table#(pointer^) of RuSTy", "Errors: they are how RuSTy makes calls of methods inside, and "
+     "its programs need none of them."),
     ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),
 )
 """What users ask about, and every dialect answers alike."""

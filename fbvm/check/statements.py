@@ -7,7 +7,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 
 from fbvm.base.dialects import takers
-from fbvm.base.types import BOOL, EnumType, RefType, StringType, StructType, Type, base
+from fbvm.base.types import BOOL, EnumType, RefType, StringType, StructType, Type, base, followed
 from fbvm.check import charts
 from fbvm.check.calls import calls
 from fbvm.check.expressions import objects, references
@@ -60,7 +60,11 @@ class _Statements:
 
     def _assign(self, node: tree.Assign) -> None:
         if node.op == "REF=" and len(node.targets) == 1:
-            references.bind(self.scope, node)
+            is_property, taken = objects.target_property(self.scope, node.targets[0])
+            if is_property:
+                self._set_reference(node, taken)
+            else:
+                references.bind(self.scope, node)
             return
         if node.op == "REF=":
             self.error("S0901", node, f"{node.op} is understood but not executed by this version")
@@ -80,11 +84,25 @@ class _Statements:
             self.facts.assigned.add(node.value)
         if len(node.targets) > 1 and any(target in self.facts.sets for target in node.targets):
             self.error("S1008", node.targets[0], "one of several targets is a property", "assign to it by itself")
+        if node.targets[-1] in self.facts.sets and isinstance(last, RefType) and last.follows:
+            self._set_reference(node, last)
+            return
         self.scope.fit(node.value, last)
         for kind, value, value_kind in zip(kinds, node.targets[1:], kinds[1:], strict=False):
             if kind is not None and value_kind is not None and not assignable(value_kind, kind):
                 self.error("S0301", value, f"the value is {value_kind}, but {kind} is needed here",
                            conversion_hint(value_kind, kind))
+
+    def _set_reference(self, node: tree.Assign, taken: Type | None) -> None:
+        """`block.Name := x` and `block.Name REF= x` for a property whose SET takes a REFERENCE TO: it gets one to x."""
+        target = node.targets[-1]
+        if isinstance(taken, RefType) and taken.follows:
+            references.lend(self.scope, node.value, followed(taken), "S0301", self.scope.text(target))
+            return
+        if taken is not None:
+            self.error("S0301", target, "REF= binds a variable that is declared REFERENCE TO",
+                       f"write {self.scope.text(target)} := ...")
+        self.scope.infer(node.value)
 
     def _attempt(self, node: tree.Assign, kinds: list[Type | None]) -> None:
         """`r ?= s`: r becomes s if the types agree, else NULL; of references to instances the program finds out which."""

@@ -168,6 +168,9 @@ def bind(scope: Scope, node: tree.Assign) -> None:
     if kind is None:
         scope.infer(node.value)
         return
+    if target in scope.facts.gets:
+        scope.error("S1008", target, f"the property {scope.text(target)} has no SET and cannot be bound")
+        return
     if target not in scope.facts.followed:
         scope.error("S0301", target, "REF= binds a variable that is declared REFERENCE TO",
                     "assign REF(...) to a REF_TO")

@@ -19,7 +19,7 @@ from fbvm.syntax.tree import il, ladder, sfc
 
 
 def _assign(body: BodyContext, node: tree.Assign, site: int) -> None:
-    if node.op == "REF=":
+    if node.op == "REF=" and node.targets[0] not in body.facts.sets:
         slot = body.reusable(body.reference_slot(node.targets[0]))
         body.emit(slot.store(pointers.binding(body, node.value), site))
         return

@@ -72,5 +72,7 @@ def test_who_is_refused_what_another_dialect_takes_is_told_which() -> None:
               and any(said.startswith("S") and "--dialect" not in said for said in row.expected.values())]
     assert silent == [
         "1.2 comments that nest", "1.4 code generation switched off", "1.4b another file included", "1.11b = for :=",
-        "2.2 BOOL for a number", "2.8 a real for an integer", "2.11 BCD for a USINT", "2.16b ADR of a local of a function",
+        "2.2 BOOL for a number", "2.8 a real for an integer", "2.11 BCD for a USINT",
+        "2.13 a long time of day for a short one", "2.14 a duration for a time of day", "2.14b a duration for a date and time",
+        "2.14c a time of day for an integer", "2.16b ADR of a local of a function",
         "3.23 the counter of a loop, written", "6.2 a pointer compared with 0", "6.5 the difference of pointers"]
