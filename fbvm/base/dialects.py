@@ -294,8 +294,8 @@ ALIKE = (
     ("VAR_OUTPUT of a METHOD or FUNCTION when its call begins", "Its initial value; in RuSTy the value of the variable that the "
      "call names for it, where that is an array, a structure or a text."),
     ("m(x => v), where x is VAR_IN_OUT", "An error (S0402): := passes an in-out; RuSTy takes => as well."),
-    ("REF(x), where x is a variable of a FUNCTION or METHOD", "An error (S0407): x ends with the call; ADR(x) and REF= are taken, "
-     "and stop the program (R0110) if they are followed later. RuSTy takes REF too, and checks nothing."),
+    ("REF(x), where x is a variable of a FUNCTION or METHOD", "An error (S0407): x ends with the call; ADR(x) and REF= are "
+     "taken, and stop the program (R0110) if they are followed later. RuSTy takes REF too, and checks nothing."),
     ("A value, as a property gives it, for VAR_INPUT {ref}", "An error (S0407) where {ref} has an effect, which is under rusty: "
      "assign it to a variable first; RuSTy passes a hidden one."),
     ("PROPERTY whose GET and SET have no statement", "Keeps nothing: GET gives the first value of its type. The first RuSTy "
