@@ -300,8 +300,10 @@ ALIKE = (
      "assign it to a variable first; RuSTy passes a hidden one."),
     ("PROPERTY whose GET and SET have no statement", "Keeps nothing: GET gives the first value of its type. The first RuSTy "
      "with properties kept what was assigned."),
-    ("__FPOINTER, __VOID, __vtable, Table#(pointer^) of RuSTy", "Errors: they are how RuSTy makes calls of methods inside, and "
-     "its programs need none of them."),
+    ("VAR a AT b, where b is a variable; VAR x AT %MB0 in a FUNCTION or METHOD", "Errors (S0101, S0604): REFERENCE TO gives a "
+     "variable another name, and what a call declares has no address. RuSTy takes both."),
+    ("__FPOINTER, __VOID, __vtable, POINTER TO Block.Method, Table#(pointer^) of RuSTy", "Errors: they are how RuSTy makes calls "
+     "of methods inside, and its programs need none of them."),
     ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),
 )
 """What users ask about, and every dialect answers alike."""

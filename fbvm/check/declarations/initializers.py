@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.base.types import ArrayType, Type, fold, machine
+from fbvm.base.types import ArrayType, RefType, Type, fold, machine
+from fbvm.check.expressions import references
 from fbvm.check.expressions.constants import decode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Pou, Variable
@@ -58,8 +59,12 @@ def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
     assigned: list[tree.Statement] = []
     for each in declared:
         assert isinstance(each.initial, tree.Expr)
-        targets = [tree.NameRef(name.start, name.end, name.text) for name in each.names]
-        assigned += [tree.Assign(target.start, each.initial.end, (target,), ":=", each.initial) for target in targets]
+        for name in each.names:
+            kind = pou.variables[fold(name.text)].type
+            binds = isinstance(kind, RefType) and kind.follows
+            value = references.named(each.initial) if binds else each.initial
+            target = tree.NameRef(name.start, name.end, name.text)
+            assigned.append(tree.Assign(target.start, each.initial.end, (target,), "REF=" if binds else ":=", value))
     return changed(pou.tree, body=(*assigned, *pou.tree.body))
 
 
