@@ -255,13 +255,12 @@ def sampled(machine: Machine, judge: Judge, cells: Sequence[Cell], state: dict[T
 
 def stepped(plc: Plc, writer: InputWriter, inputs: Inputs) -> Iterator[dict[Place, Value]]:
     """Does a run scan by scan: behind each, what was written before it."""
-    for number, now in enumerate(inputs.values):
-        before = inputs.values[number - 1] if number else {cell: writer.read(cell) for cell in now}
-        changed = [cell for cell, value in now.items() if value != before[cell]]
+    for now, now_ns in zip(inputs.values, inputs.times_ns, strict=True):
+        changed = [cell for cell, value in now.items() if value != writer.read(cell)]  # the program may have written it, too
         for cell in changed:
             writer.write(cell, now[cell])
         written = {place: plc.read(place) for cell in changed for place in writer.places[cell]}
-        plc.scan(inputs.times_ns[number])
+        plc.scan(now_ns)
         yield written
 
 

@@ -131,6 +131,16 @@ def test_a_word_is_free_if_it_is_named() -> None:
     assert verdict.word == "broken"
 
 
+def test_a_free_word_that_the_program_writes_is_written_again_in_the_run() -> None:
+    image = program("IF w = 0 THEN n := n + 1; END_IF w := 5;", "w AT %D100 : INT; n : INT;")
+    verdict = prove(image, Question(REACH, "Main.n = 3", free=("D100",)), FEW)
+    assert (verdict.word, verdict.run and verdict.run.scans) == ("reached", 3)
+    assert verdict.run is not None
+    plc = Plc(image, verdict.run.cycle_ns)
+    repeated(plc, verdict.run)
+    assert plc.read("Main.n") == 3
+
+
 def test_inputs_that_only_the_property_reads_are_free() -> None:
     image = program("n := n;", "n, Unread : INT;")
     for name, free in (("Main.Unread", ("Main.Unread",)), ("D5", ("D4..D6",)), ("Main.Level", ())):
