@@ -11,6 +11,7 @@ from fbvm.machine.plc import STEP_BUDGET
 from fbvm.prove.bounded import BoundedSearch, Goal, Inputs
 from fbvm.prove.copies import copied
 from fbvm.prove.cycle import show_cycle
+from fbvm.prove.encoding.cells import initial_bytes
 from fbvm.prove.encoding.clocks import Clock, clock_of
 from fbvm.prove.encoding.execution import UNWOUND, Refused
 from fbvm.prove.encoding.properties import condition_term, place_term
@@ -37,6 +38,8 @@ from fbvm.prove.question import (
 )
 from fbvm.prove.runs import Judge, Machine, replayed, sampled, simulated
 from fbvm.prove.solver import UNSAT
+from fbvm.prove.unit_rules import Word, free_words, offset_of, words_of
+from fbvm.prove.unit_rules import rules as rules_of
 from fbvm.prove.unreached import unreached
 from fbvm.watch.bits import bits_of
 from fbvm.watch.names import Names as PlaceNames
@@ -93,8 +96,11 @@ class Prover:
         self.image, self.question, self.limits, self.tell = image, question, limits, tell
         self.judge = Judge.of(image, question)
         names = Names(image, question.prefix)
-        free = [extent for name in question.free for extent in names.extents(name)]
-        self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired, self.judge.all_places,
+        rules = [rule for unit, socket in question.units for rule in rules_of(unit, socket)]
+        self.rules = tuple(rules)
+        free = [extent for name in (*question.free, *free_words(rules)) for extent in names.extents(name)]
+        seen = [place for word in words_of(rules) for place in names.places(f"{word[0]}{word[1]}")]
+        self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired, [*self.judge.all_places, *seen],
                                            [bits_of(place) for place in self.judge.written])  # fmt: skip
         longest_ns = max(limits.longest_ns, limits.cycle_ns)
         self.clock: Clock = clock_of(self.summary.terms, image.tasks, limits.cycle_ns, longest_ns)
@@ -110,7 +116,7 @@ class Prover:
         stop = terms.any_of(*(trap.condition for trap in summary.traps if trap.code != UNWOUND))
         self.unwound = [trap for trap in summary.traps if trap.code == UNWOUND]
         assumed = (condition_term(summary.contents, names.condition(text).term) for text in self.question.assumptions)
-        given = terms.all_of(*assumed, *self._types())
+        given = terms.all_of(*assumed, *self._types(), *self._kept_rules())
         self.condition = stop
         if self.question.kind == NO_TRAP:
             return Goal(stop, stop, given)
@@ -145,6 +151,19 @@ class Prover:
         next_one = terms.add(since, terms.constant(64, self.limits.cycle_ns))  # begins then at the earliest
         comes_late = terms.and_(asked, terms.less(limit, since, False))
         return terms.or_(comes_late, terms.and_(open_, terms.less(limit, next_one, False)))
+
+    def _kept_rules(self) -> Iterable[Term]:
+        """That units keep their rules.  Adds to the state the words as the program left them in the scan before."""
+        terms, summary = self.summary.terms, self.summary
+        initial = initial_bytes(self.image.initial)
+        before, after = dict[Word, Term](), dict[Word, Term]()
+        for word in words_of(self.rules):
+            offset = offset_of(word)
+            before[word] = left = terms.variable(("left", offset), 16)
+            after[word] = summary.before.number(offset, 2)
+            summary.initial[left] = terms.constant(16, int.from_bytes(initial(offset, 2), "little"))
+            summary.next[left] = summary.contents.number(offset, 2)
+        return [rule.term(terms, before, after) for rule in self.rules]
 
     def _types(self) -> Iterable[Term]:
         """What the types of inputs say: enumerations have their members, subranges their limits."""
@@ -219,6 +238,8 @@ class Prover:
             self.notes.append(f"taken for any value: {', '.join(found)}")
         if self.clock.is_free:
             self.notes.append(f"time between two scans: {show_cycle(self.clock.cycle_ns, self.clock.longest_ns)}")
+        for unit, socket in self.question.units:
+            self.notes.append(f"assumed: what the manuals say of socket {socket} of ETN21 {unit}")
         if self.question.assumptions:
             self.notes.append(f"assumed: {'; '.join(self.question.assumptions)}")
 

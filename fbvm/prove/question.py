@@ -38,6 +38,8 @@ class Question:
     """What is asked, in words, where the condition is too long."""
     trigger: str = ""
     within_ns: int = 0
+    units: tuple[tuple[int, int], ...] = ()
+    """Numbers of ETN21s and of sockets, whose words the unit changes by the rules of `unit_rules`."""
 
     def __str__(self) -> str:
         if self.title:

@@ -17,6 +17,7 @@ from fbvm.prove.encoding.terms import Term
 from fbvm.prove.invariants import Sample, Values
 from fbvm.prove.question import ALWAYS, NO_TRAP, WITHIN, WRITTEN_ONCE, Question, Run
 from fbvm.prove.question import Names as QuestionNames
+from fbvm.prove.unit_rules import Rule, Watch, rules
 from fbvm.record.trace.writes import Writes, noting_writes
 from fbvm.watch.conditions import Condition
 from fbvm.watch.names import Names
@@ -51,6 +52,9 @@ class Judge:
     waiting: Waiting = field(default_factory=Waiting)
     written: tuple[Place, ...] = ()
     """Of WRITTEN_ONCE: the places of which it is asked who writes them."""
+    rules: tuple[Rule, ...] = ()
+    watch: Watch | None = None
+    """Whether the units of this run keep their rules."""
     writes: Writes | None = None
     """Who writes them in the last scan of this run."""
 
@@ -62,12 +66,16 @@ class Judge:
         condition = None if question.kind in (NO_TRAP, WRITTEN_ONCE) else names.condition(question.text)
         trigger = names.condition(question.trigger) if question.kind == WITHIN else None
         return cls(question, condition, tuple(names.condition(text) for text in question.assumptions), trigger,
-                   written=written)  # fmt: skip
+                   written=written, rules=tuple(rule for unit, socket in question.units for rule in rules(unit, socket)))
 
     @contextmanager
     def judging(self, plc: Plc) -> Iterator[Judge]:
         """The judge of the run that `plc` does inside the `with` block."""
         begun = replace(self, waiting=Waiting())
+        if self.rules:
+            watch = Watch(plc, self.rules)
+            begun = replace(begun, watch=watch)
+            plc.phases.append(watch.phase)
         if not self.written:
             yield begun
             return
@@ -107,7 +115,7 @@ class Judge:
 
     def kept(self, plc: Plc) -> bool:
         """True if the assumptions hold now."""
-        return all(assumption.holds(plc.read) for assumption in self.assumptions)
+        return (self.watch is None or self.watch.is_kept) and all(assumption.holds(plc.read) for assumption in self.assumptions)
 
 
 class InputWriter:
@@ -211,14 +219,8 @@ def simulated(machine: Machine, judge: Judge, cells: Sequence[Cell], scans: int,
         inputs = Inputs([], [])
         with judge.judging(plc) as judging:
             for _ in range(scans):
-                now = dict(inputs.values[-1]) if inputs.values else {}
-                for cell in cells:
-                    if not inputs.values or random.randrange(hold_scans) == 0:
-                        now[cell] = values.value(cell)
-                inputs.values.append(now)
+                inputs.values.append(_drawn(writer, values, random, hold_scans, judging))
                 inputs.times_ns.append(next(times_ns))
-                for cell, value in now.items():
-                    writer.write(cell, value)
                 plc.scan(inputs.times_ns[-1])
                 if not judging.kept(plc):
                     break
@@ -241,16 +243,29 @@ def sampled(machine: Machine, judge: Judge, cells: Sequence[Cell], state: dict[T
         times_ns = machine.random_times(random, hold_scans)
         writer = InputWriter(plc, cells)
         values = RandomInputs(writer, random)
-        for _ in range(scans):
-            for cell in cells:
-                if not plc.scans or random.randrange(hold_scans) == 0:
-                    writer.write(cell, values.value(cell))
-            plc.scan(next(times_ns))
-            if plc.trap or not judge.kept(plc):
-                break
-            seen: Values = {variable: writer.read(cell) for variable, cell in state.items()}
-            found.append(Sample(seen, plc.now_ns))
+        with judge.judging(plc) as judging:
+            for _ in range(scans):
+                _drawn(writer, values, random, hold_scans, judging)
+                plc.scan(next(times_ns))
+                if plc.trap or not judging.kept(plc):
+                    break
+                seen: Values = {variable: writer.read(cell) for variable, cell in state.items()}
+                found.append(Sample(seen, plc.now_ns))
     return found
+
+
+def _drawn(writer: InputWriter, values: RandomInputs, random: Random, hold_scans: int, judging: Judge) -> dict[Cell, int]:
+    """Writes the inputs of a scan at random, each of which keeps its value for some scans; a unit writes what its rules allow.
+
+    Returns what all of them are then."""
+    for cell in writer.cells:
+        if writer.plc.scans and random.randrange(hold_scans):
+            continue
+        value, before = values.value(cell), writer.read(cell)
+        writer.write(cell, value)
+        if judging.watch is not None and not judging.watch.allows(writer.plc, cell.offset):
+            writer.write(cell, before)
+    return {cell: writer.read(cell) for cell in writer.cells}
 
 
 def stepped(plc: Plc, writer: InputWriter, inputs: Inputs) -> Iterator[dict[Place, Value]]:

@@ -40,4 +40,4 @@ def _asked(image: Image, question: Question) -> list[str]:
     texts = [*([question.text] if question.text and not written else []), *question.assumptions]
     places = [repr(names.condition(text).places) for text in texts]
     places += [repr(names.places(question.text))] if written else []
-    return [question.kind, *texts, *places, *(repr(names.extents(name)) for name in question.free)]
+    return [question.kind, repr(question.units), *texts, *places, *(repr(names.extents(name)) for name in question.free)]

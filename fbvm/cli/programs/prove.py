@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,14 @@ def _cycle(value: str) -> tuple[int, int]:
         raise click.BadParameter(str(error)) from None
 
 
+def _unit(value: str) -> tuple[int, int]:
+    """The number of a unit and of one of its sockets.  Raises BadParameter."""
+    unit, colon, socket = value.partition(":")
+    if not colon or not unit.isdecimal() or not socket.isdecimal() or int(unit) > 15 or int(socket) not in range(1, 9):
+        raise click.BadParameter(f"{value!r} is not UNIT:SOCKET, a unit number 0 to 15 and a socket 1 to 8: write 0:1")
+    return int(unit), int(socket)
+
+
 @click.command("prove")
 @source_arguments
 @click.option("--never", multiple=True, metavar="EXPRESSION", help="It never holds behind a scan: 'Main.Up AND Main.Down'.")
@@ -66,6 +75,8 @@ def _cycle(value: str) -> tuple[int, int]:
 @click.option("--assume", multiple=True, metavar="EXPRESSION", help="Look only at runs in which it holds behind every scan.")
 @click.option("--free", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST",
               help="Takes any value in each scan, as inputs do.")
+@click.option("--unit-rules", type=_unit, multiple=True, metavar="UNIT:SOCKET",
+              help="The words of this socket of an ETN21 change as its manuals say, and not otherwise: 0:1.")
 @click.option("--cycle", type=_cycle, default=str(CYCLE_NS // 1_000_000) + "ms", metavar="TIME|TIME..TIME", show_default="10ms",
               help="How often the PLC scans; 5ms..50ms: any time within these bounds passes between two scans.")
 @click.option("--scans", type=click.IntRange(min=1), default=1000, show_default=True, metavar="N",
@@ -99,7 +110,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         questions += _ready(lambda: _named(Names(image), options))
         asked += [(image, question) for question in questions]
     verdicts = []
-    for image, question in asked:
+    for image, plain in asked:
+        question = replace(plain, units=options["unit_rules"])
         verdict = _answered(image, question, options)
         verdicts.append(verdict)
         if not as_json:
@@ -117,6 +129,8 @@ def _refuse_mixed(options: dict[str, Any], asks: bool) -> None:
     """Raises UsageError for options that do not go together, and where nothing is asked."""
     if options["tests_file"] and asks:
         raise click.UsageError("--tests stands alone: ask for properties in a call of its own")
+    if options["tests_file"] and options["unit_rules"]:
+        raise click.UsageError("--unit-rules goes with properties; tests are written for any words: name them with --free")
     if options["covered"] and not options["tests_file"]:
         raise click.UsageError("--covered says what --tests may leave out, which is not given")
     if not asks and not options["tests_file"]:

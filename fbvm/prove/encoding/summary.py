@@ -37,6 +37,8 @@ class Summary:
     terms: Terms
     contents: Contents
     """What memory holds behind the scan."""
+    before: Contents
+    """What it holds when the scan begins: the state and the inputs."""
     writes: Writes
     """Which statements write the bits that are watched."""
     initial: dict[Term, Term] = field(default_factory=dict)
@@ -171,6 +173,7 @@ class _Fixpoint:
         for cell in dict.fromkeys(cell for cells in self.partition.at.values() for cell in cells):
             if self.is_input(cell):
                 contents.written[cell] = self._input(cell)
+        self.before = contents
         begun = contents.child()
         for place in self.seen:  # what only the property reads: the machine, too, writes where somebody looks
             place_term(begun, place)
@@ -202,7 +205,7 @@ class _Fixpoint:
 
     def _made(self, scanned: Scanned) -> Summary:
         terms, x = self.terms, scanned.execution
-        made = Summary(self.image, terms, scanned.contents, inputs=self.inputs, traps=x.traps, reached=x.reached,
+        made = Summary(self.image, terms, scanned.contents, self.before, inputs=self.inputs, traps=x.traps, reached=x.reached,
                        unknowns=x.unknowns, writes=x.writes)  # fmt: skip
         for cell in sorted(self.variable):
             if self.is_input(cell):

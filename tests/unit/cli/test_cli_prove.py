@@ -115,7 +115,8 @@ def test_the_run_is_recorded(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("arguments", [[], ["--never", "Main.Nobody"], ["--never", "Main.Left +"], ["--always", "3"],
                                        ["--never", "Main.Left", "--free", "Nobody"],
-                                       ["--written-once", "Main.Left,Nobody"]])  # fmt: skip
+                                       ["--written-once", "Main.Left,Nobody"], ["--never", "Main.Left", "--unit-rules", "0:9"],
+                                       ["--tests", "t.py", "--unit-rules", "0:1"]])  # fmt: skip
 def test_wrong_use_has_status_2(arguments: list[str]) -> None:
     result = proved(INTERLOCK, *arguments)
     assert result.exit_code == 2, result.output

@@ -10,7 +10,7 @@ import pytest
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.prove.prover import Limits, Prover, prove
-from fbvm.prove.question import NEVER, NO_TRAP, Question, Verdict
+from fbvm.prove.question import NEVER, NO_TRAP, REACH, Question, Verdict
 
 pytestmark = pytest.mark.slow
 UNIT_WORDS = ("CIO1509", "CIO1519", "D30001", "D30009", "D30018..D30027", "D32510..D32642")
@@ -57,6 +57,24 @@ def test_error_and_success_are_never_told_together(name: str) -> None:
 def test_a_connection_is_never_up_and_in_error() -> None:
     assert asked(client(), "Main.conn.ENO AND Main.conn.Error").word == "proved"
     assert asked(client(), "Main.conn.ENO AND Main.conn.Waiting_Server").word == "proved"
+
+
+def test_a_block_never_sends_and_receives_at_once_if_the_unit_keeps_its_rules() -> None:
+    both = "CIO1519.03 AND CIO1519.04"  # W421 6-9-4 p156 forbids it
+    image = client("Fn03")
+    kept = prove(image, Question(NEVER, both, free=("D32510..D32642",), units=((0, 1),)), LIMITS)
+    assert (kept.word, kept.notes) == ("proved", ("assumed: what the manuals say of socket 1 of ETN21 0",))
+    assert asked(image, both).word == "broken"
+    connected = prove(image, Question(REACH, "Main.conn.ENO", units=((0, 1),)), LIMITS)
+    assert connected.word == "reached"
+
+
+def test_a_run_that_is_shown_keeps_the_rules() -> None:
+    image = client()
+    verdict = prove(image, Question(NEVER, "D30027 = 5", units=((0, 1),)), LIMITS)
+    assert verdict.run is not None
+    assert (verdict.word, verdict.run.scans) == ("broken", 2)  # the first scan asks for it
+    assert asked(image, "D30027 = 5").run.scans == 1  # type: ignore[union-attr]
 
 
 def test_two_blocks_that_use_the_socket_at_once_are_not_found() -> None:

@@ -1,0 +1,80 @@
+"""The rules of the ETN21 for proofs: every run of the emulated unit keeps them, and each of them says something."""
+
+from __future__ import annotations
+
+import pytest
+from common_unit_tests import answer, events
+from depth import times
+from etn21_rig import CIO, D, Rig
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fbvm.prove.encoding.terms import Terms
+from fbvm.prove.unit_rules import KINDS, Rule, Word, rules
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21, Fault
+from fbvm.wire.link import Event, Peer, Request
+
+SOCKETS = (1, 2)
+parameters = st.fixed_dictionaries({
+    "option": st.integers(0, 3), "local_port": st.sampled_from([0, 502, 3000]), "count": st.sampled_from([0, 1, 12, 1984, 1985]),
+    "remote": st.builds(Peer, st.sampled_from(["0.0.0.0", "192.168.250.7"]), st.sampled_from([0, 502])),
+    "address": st.sampled_from([(D, 1000, 0), (CIO, 100, 0), (0x30, 0, 0), (D, 1000, 7)]),
+    "timeout": st.sampled_from([0, 1, 100]),
+})  # fmt: skip
+turns = st.tuples(st.sampled_from(SOCKETS), st.sampled_from(Switch), parameters)
+cycles = st.tuples(st.lists(turns, max_size=2), st.lists(events(st.integers(1, 2)), max_size=2), st.booleans(),
+                   st.sampled_from([10, 10, 10, 200, 80_000]))  # fmt: skip
+
+
+def words_of(rig: Rig, some: tuple[Rule, ...]) -> dict[Word, int]:
+    return {word: rig.memory.words(word[0])[word[1]] for rule in some for word in rule.words}
+
+
+def broken(some: tuple[Rule, ...], before: dict[Word, int], after: dict[Word, int]) -> list[Rule]:
+    terms = Terms()
+    old, new = ({word: terms.constant(16, value) for word, value in values.items()} for values in (before, after))
+    return [rule for rule in some if rule.term(terms, old, new) is not terms.true]
+
+
+@pytest.mark.slow
+@settings(max_examples=times(100), deadline=None)
+@given(st.lists(cycles, max_size=25), st.sampled_from(["exact", "real"]), st.integers(0, 9))
+def test_every_run_of_the_emulated_unit_keeps_the_rules(
+    script: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, int]], timing: str, seed: int
+) -> None:
+    rig = Rig(Etn21(timing=timing, seed=seed, faults=[Fault(0x2211, Switch.SEND), Fault(0x0302, socket=2)]))
+    asked: list[Request] = []
+    some = tuple(rule for socket in SOCKETS for rule in rules(0, socket))
+    for program, told, is_answered, cycle_ms in script:
+        for socket, switch, values in program:
+            rig.parameters(socket, socket, **values)  # type: ignore[arg-type]
+            rig.turn_on(switch, socket)
+        before = words_of(rig, some)
+        replies = answer(asked) if is_answered else []
+        rig.cycle_ns = cycle_ms * 1_000_000
+        asked = rig.scan(*told, *replies) if is_answered else [*asked, *rig.scan(*told)]
+        assert broken(some, before, words_of(rig, some)) == []
+
+
+STATUS, SWITCHES, STATE, CODE = ("CIO", 1509), ("CIO", 1519), ("D", 30009), ("D", 30027)
+WRONG = [
+    ("only clears", SWITCHES, 0, 1), ("stays off", STATUS, 0, 0x10), ("at most", STATE, 0, 0xB), ("keeps", ("D", 30018), 1, 2),
+    ("becomes at most", ("D", 30023), 1985, 1986),
+    ("rises while", STATUS, 0, 1), ("changes while", CODE, 0xFFFF, 0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "word", "old", "new"), WRONG)
+def test_a_unit_that_does_otherwise_breaks_a_rule(kind: str, word: Word, old: int, new: int) -> None:
+    some = rules(0, 1)
+    before = {word: 0 for rule in some for word in rule.words} | {word: old}
+    assert broken(some, before, before) == []
+    assert kind in {rule.kind for rule in broken(some, before, before | {word: new})}
+
+
+def test_every_kind_of_rule_has_a_source_and_is_used() -> None:
+    assert {rule.kind for rule in rules(15, 8)} == set(KINDS) == {kind for kind, *_ in WRONG}
+    assert all(rule.source.startswith(("W420", "W421")) for rule in rules(15, 8))
+    with pytest.raises(ValueError, match="socket 9"):
+        rules(0, 9)
