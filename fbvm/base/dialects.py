@@ -169,7 +169,7 @@ QUESTIONS = {
                      "{{ }} is an error, the others have no effect (S0190)",
                      "{{ }} is passed over with a warning (S0190); the others are refused by name (S0901)"),
     "bare_construction": ("METHOD FB_init without inputs", "an error (S1011): it has bInitRetains and bInCopyCode",
-                          "called once at the start, the one of the base first"),
+                          "called for each instance as it begins, the one of the base first"),
     "zero_durations": ("t = 0, where t is a TIME", "an error", "T#0s"),
     "first_label_counts": ("CASE n OF 1..5: .. 3: ..: a label twice", "an error", "the first one counts, with a warning (S0193)"),
     "idle_statements": ("a + 1; as a statement", "an error", "worked out, with a warning (S0193)"),
@@ -300,8 +300,8 @@ ALIKE = (
      "assign it to a variable first; RuSTy passes a hidden one."),
     ("PROPERTY whose GET and SET have no statement", "Keeps nothing: GET gives the first value of its type. The first RuSTy "
      "with properties kept what was assigned."),
-    ("VAR a AT b, where b is a variable; VAR x AT %MB0 in a FUNCTION or METHOD", "Errors (S0101, S0604): REFERENCE TO gives a "
-     "variable another name, and what a call declares has no address. RuSTy takes both."),
+    ("VAR a AT b, where b is a variable; VAR x AT %MB0 in a METHOD", "Errors (S0101, S0604): REFERENCE TO gives a variable "
+     "another name, and the block declares what has an address. RuSTy takes both."),
     ("__FPOINTER, __VOID, __vtable, POINTER TO Block.Method, Table#(pointer^) of RuSTy", "Errors: they are how RuSTy makes calls "
      "of methods inside, and its programs need none of them."),
     ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),
