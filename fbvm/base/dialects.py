@@ -302,8 +302,8 @@ ALIKE = (
      "with properties kept what was assigned."),
     ("VAR a AT b, where b is a variable; VAR x AT %MB0 in a METHOD", "Errors (S0101, S0604): REFERENCE TO gives a variable "
      "another name, and the block declares what has an address. RuSTy takes both."),
-    ("__FPOINTER, __VOID, __vtable, POINTER TO Block.Method, Table#(pointer^) of RuSTy", "Errors: they are how RuSTy makes calls "
-     "of methods inside, and its programs need none of them."),
+    ("__FPOINTER, __VOID, __vtable, POINTER TO Block.Method, REF_TO Function, Table#(p^) of RuSTy", "Errors: RuSTy makes "
+     "calls of methods from them inside; a program calls a method through a base or an interface instead."),
     ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),
 )
 """What users ask about, and every dialect answers alike."""
