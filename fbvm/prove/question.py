@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from fbvm.base.types import AnyType, ArrayType, OpenArrayType, RefType, StringType, StructType, Type
-from fbvm.code.image import Image, Site
+from fbvm.code.image import Image
 from fbvm.engine.trap import Trap
 from fbvm.watch.conditions import Condition, parse_condition
 from fbvm.watch.paths import Place, Span, UnknownPlace, find
@@ -117,8 +117,8 @@ class Run:
     """Of WITHIN: when the trigger became true whose answer does not come in time."""
     has_free_times: bool = False
     """True if its scans could have begun at other times: there was no fixed cycle."""
-    writers: tuple[Site, ...] = ()
-    """Of WRITTEN_ONCE: two statements that write the same bit in the last scan."""
+    writers: tuple[str, ...] = ()
+    """Of WRITTEN_ONCE: the places of two statements that write the same bit in the last scan."""
 
     @property
     def scans(self) -> int:

@@ -26,7 +26,7 @@ def details(image: Image, verdict: Verdict, width: int | None = None) -> Iterato
             yield f"  times between its scans: {show_passed(verdict.run.passed_ns)}"
         yield from run_chart(image, verdict, verdict.run, width).splitlines()
         if verdict.run.writers:
-            yield f"  written in its last scan by {' and '.join(map(str, verdict.run.writers))}"
+            yield f"  written in its last scan by {' and '.join(verdict.run.writers)}"
         if verdict.run.trap is not None:
             yield f"  {verdict.run.trap}"
 

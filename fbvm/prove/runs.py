@@ -290,10 +290,10 @@ def replayed(machine: Machine, judge: Judge, inputs: Inputs, is_shortest: bool) 
             if not judging.kept(plc):
                 return None
             if judging.met(plc):
-                sites = judging.writes.twice() if judging.writes else ()
+                writers = judging.writes.twice() if judging.writes else ()
                 run = Run(tuple(writes), tuple(inputs.times_ns), machine.cycle_ns, is_shortest, plc.trap,
                           judging.waiting.since_ns, machine.longest_ns > machine.cycle_ns,
-                          tuple(plc.image.sites[site] for site in sites))  # fmt: skip
+                          writers)  # fmt: skip
                 return run if number == len(inputs) - 1 else None
             if plc.trap:
                 return None

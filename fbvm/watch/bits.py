@@ -9,8 +9,11 @@ from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType
 from fbvm.watch.paths import Place
 
-Written = tuple[int, range]
-"""A write: the site of its statement, and the bits that it writes."""
+Writer = tuple[tuple[int, int], ...]
+"""Who writes: the calls that lead there, each the site of the statement that calls and the byte at which the instance begins;
+last the site of the statement that writes, with 0.  The rounds of a loop are one writer, the instances of a block several."""
+Written = tuple[Writer, range]
+"""A write: who writes, and the bits."""
 
 
 def bits_of(place: Place) -> range:
@@ -32,7 +35,7 @@ def meet(*bits: range) -> bool:
 
 
 def written_twice(writes: Iterable[Written], watched: Iterable[range]) -> Iterable[tuple[Written, Written]]:
-    """The pairs of writes by different statements that write the same bit, one that is watched."""
+    """The pairs of writes by different writers that write the same bit, one that is watched."""
     watched = tuple(watched)
     for one, other in combinations(writes, 2):
         if one[0] != other[0] and any(meet(one[1], other[1], bits) for bits in watched):

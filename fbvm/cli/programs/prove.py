@@ -203,7 +203,7 @@ def _as_dict(verdict: Verdict) -> dict[str, object]:
     if run := verdict.run:
         found["run"] = {
             "scans": run.scans, "shortest": run.is_shortest, "trap": run.trap.code if run.trap else None,
-            "times_ns": [*run.times_ns], "writers": [str(site) for site in run.writers],
+            "times_ns": [*run.times_ns], "writers": [*run.writers],
             "writes": [{"scan": number, "values": {place.name: plain_value(place.type, value) for place, value in writes.items()}}
                        for number, writes in enumerate(run.writes) if writes],
         }  # fmt: skip

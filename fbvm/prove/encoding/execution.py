@@ -13,6 +13,7 @@ from fbvm.code.operations import Address, Node
 from fbvm.prove.encoding.cells import Contents
 from fbvm.prove.encoding.terms import Term, Terms
 from fbvm.prove.encoding.writes import Writes
+from fbvm.watch.bits import Writer
 
 MOST_STEPS = 400_000
 """Statements that one scan may execute symbolically, rounds of loops counted each."""
@@ -106,6 +107,8 @@ class Execution:
         self.base = 0
         """Where the instance begins that is executed."""
         self.site = -1
+        self.callers: Writer = ()
+        """The calls that have led here."""
         self.calls = 0
         """How many calls are nested now."""
         self.steps = 0

@@ -81,6 +81,7 @@ def _run_task(x: Execution, state: State, number: int, due: Term, some_fresh: Te
     word, bit = FIRST_TASK_CYCLE
     _flag(inner.contents, word, bit, fresh, some_fresh)
     for run in task.programs:
+        x.site = -1
         call(x, inner, x.image.bodies[run.body], run.offset)
     if inner is not state:
         path, state.path = state.path, due

@@ -55,10 +55,11 @@ def call(x: Execution, state: State, body: Body, base: int) -> State:
     if x.calls > MOST_CALLS + len(x.image.bodies):
         raise Refused(f"calls come back more than {MOST_CALLS} times, which is too deep to be followed", x.site)
     outer_base, outer_temporaries, x.base, state.temporaries = x.base, state.temporaries, base, {}
+    outer_site, outer_callers, x.callers = x.site, x.callers, (*x.callers, (x.site, base))
     begun = state.path
     following, left = run_block(x, body.code, state)
     ends = left.get("return", []) + ([following] if following else [])
-    x.base, x.stored = outer_base, None
+    x.base, x.stored, x.site, x.callers = outer_base, None, outer_site, outer_callers
     x.calls -= 1
     if not ends:
         raise Refused("a call never ends", x.site)
@@ -335,7 +336,7 @@ def _note_write(x: Execution, state: State, site: int, form: str | tuple[str, in
     x.stored = None
     for target in found:
         named = target.bit if form == "b" and bit == WHOLE_BYTES else bit
-        x.writes.note(site, target.offset, size, named, x.terms.and_(state.path, target.condition))
+        x.writes.note((*x.callers, (site, 0)), target.offset, size, named, x.terms.and_(state.path, target.condition))
 
 
 STATEMENT_ROWS: dict[str, Row] = {

@@ -22,6 +22,11 @@ VAR_INPUT Go : BOOL; END_VAR VAR_IN_OUT Lamp : BOOL; END_VAR
     IF Go THEN Lamp := TRUE; RETURN; END_IF
     Lamp := FALSE;
 END_FUNCTION_BLOCK
+FUNCTION Put : BOOL
+VAR_INPUT Go : BOOL; END_VAR VAR_IN_OUT Lamp : BOOL; END_VAR
+    IF Go THEN Lamp := TRUE; END_IF
+    Put := Go;
+END_FUNCTION
 FUNCTION_BLOCK Source
 VAR_INPUT Go : BOOL; END_VAR VAR_OUTPUT Q : BOOL; END_VAR
     Q := Go;
@@ -68,6 +73,13 @@ ROWS = [
     ("in a reference", "s(Go := In, Lamp := Q); s(Go := In, Lamp := P);", "s : Setter; P, Q : BOOL;", "Main.Q", True),
     ("in a reference and here", "s(Go := In, Lamp := Q); IF In THEN Q := FALSE; END_IF", "s : Setter; Q : BOOL;",
      "Main.Q", False),
+    ("two instances", "s(Go := In, Lamp := Q); t(Go := In, Lamp := Q);", "s, t : Setter; Q : BOOL;", "Main.Q", False),
+    ("two calls of one instance", "s(Go := In, Lamp := Q); s(Go := In, Lamp := Q);", "s : Setter; Q : BOOL;", "Main.Q", False),
+    ("instances that take turns", "IF In THEN s(Lamp := Q); ELSE t(Lamp := Q); END_IF", "s, t : Setter; Q : BOOL;",
+     "Main.Q", True),
+    ("instances of an array", "FOR i := 0 TO 1 DO s[i](Lamp := Q); END_FOR", "s : ARRAY[0..1] OF Setter; i : INT; Q : BOOL;",
+     "Main.Q", False),
+    ("a function that is called twice", "a := Put(In, Q); a := Put(In, Q);", "a, Q : BOOL;", "Main.Q", False),
     ("an output of a call", "s(Go := In, Q => Q); IF Other THEN Q := FALSE; END_IF", "s : Source; Q : BOOL;", "Main.Q", False),
     ("a structure as a whole", "s := t; s.Run := In;", "s, t : STRUCT Run, Stop : BOOL; END_STRUCT;", "Main.s.Run", False),
     ("another part of it", "s := t; s.Run := In;", "s, t : STRUCT Run, Stop : BOOL; END_STRUCT;", "Main.s.Stop", True),
@@ -90,7 +102,15 @@ def test_the_encoder_and_the_engine_agree(about: str, body: str, variables: str,
 def test_both_statements_are_told_of_the_shortest_run() -> None:
     verdict = asked(image_of("n := n + 1; Q := In;\nIF n = 3 THEN\n    Q := TRUE;\nEND_IF", "n : INT; Q : BOOL;"), "Main.Q")
     assert verdict.run is not None
-    assert (verdict.run.scans, [site.line for site in verdict.run.writers]) == (3, [12, 14])
+    assert (verdict.run.scans, [place.split(":")[1] for place in verdict.run.writers]) == (3, ["17", "19"])
+
+
+def test_one_statement_in_two_instances_is_told_with_its_calls() -> None:
+    verdict = asked(image_of("s(Go := In, Lamp := Q);\nt(Go := In, Lamp := Q);", "s, t : Setter; Q : BOOL;"), "Main.Q")
+    assert verdict.run is not None
+    inner = [place.split(", called by ") for place in verdict.run.writers]
+    assert inner[0][0] == inner[1][0]
+    assert [place.split(":")[1] for _, place in inner] == ["17", "18"]
 
 
 def test_two_coils_of_one_output_are_a_double_write() -> None:
