@@ -19,7 +19,7 @@ BENCH = Path(__file__).resolve().parent
 sys.path[:0] = [str(BENCH.parents[1]), str(BENCH)]
 
 from debugger import program as hundred_lines  # noqa: E402
-from editing import text_of  # noqa: E402
+from large_text import text_of  # noqa: E402
 
 from fbvm.dap.framing import Framer, encode  # noqa: E402
 

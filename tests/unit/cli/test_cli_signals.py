@@ -72,7 +72,7 @@ VERBS: dict[str, list[list[str]]] = {
     "campaign": [[DEMO, *PEER, "--faults", "1", "--runs", "1000000", "--for", "100s", "--jobs", "2"]],
     "fleet": [["fleet", *FOREVER, "--jobs", "2"]],
     "sweep": [[DEMO, *PEER, "--vary", "Main.Quantity=1..120", "--for", "10000s", "--jobs", "2"]],
-    "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["long.fbtrace", "Main.Step"]],
+    "chart": [["long.fbtrace"]], "table": [["long.fbtrace", "Main.Step"]], "why": [["Main.Step", "long.fbtrace"]],
     "lsp": [[]],
     "prove": [["big.st", "--always", "Main.b0.a <> 4711", "--budget", "100s", "--scans", "100000"]],
     "convert": [["long.fbtrace", "out.html"], ["long.fbtrace", "out.csv"]],
