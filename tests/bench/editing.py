@@ -16,8 +16,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-HOUSE = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(HOUSE))
+BENCH = Path(__file__).resolve().parent
+sys.path[:0] = [str(BENCH.parents[1]), str(BENCH)]
 
 from large_text import text_of  # noqa: E402
 
