@@ -198,3 +198,12 @@ def test_a_drawing_does_what_its_instructions_did(text: str) -> None:
         assert list(drawn.memory.words(area)) == list(listed.memory.words(area)), area
     for name in ("CX_IR", "P_CY", "P_EQ", "P_ER"):
         assert drawn.read(name) == listed.read(name), name
+
+
+def test_a_condition_with_a_box_stays_a_list_where_and_load_joins_it_to_another() -> None:
+    """Drawn in series, NOT would invert what is in front of it, too."""
+    for box in ("NOT", "UP", "DOWN"):
+        rung = f"LADDER\nRUNG\nLD W0.00\nLD W0.01\n{box}\nAND LD\nOUT W0.02\nEND_LADDER"
+        made = written(f"PROGRAM Main\n{rung}\nEND_PROGRAM\n", Form.DRAWING)
+        assert [line.split()[0] for line in made.splitlines() if "W0" in line or line.split()[:1] in ([box], ["ANDLD"])] == [
+            "LD", "LD", box, "ANDLD", "OUT"]

@@ -115,6 +115,12 @@ def diagram(steps: Sequence[StepText]) -> Point:
     return reader.bar
 
 
+def _changes_power(path: Series) -> bool:
+    """Whether there is a box among these conditions, such as NOT or UP, which does not only pass power on."""
+    return any(isinstance(part, Box) or isinstance(part, Parallel) and any(map(_changes_power, part.branches))
+               for part in path.parts)
+
+
 class _Reader:
     """Follows the steps with the stack of conditions with which they are executed."""
 
@@ -162,6 +168,8 @@ class _Reader:
         is_branch = how == "OR" and before.start is self.now.start and not self.now.is_empty()
         if self.now.start is not self.bar and not is_branch:
             raise Undrawable
+        if how == "AND" and _changes_power(self.now.path):
+            raise Undrawable  # in series it would change the power of what is in front, too
         if how == "AND":
             before.path.parts += self.now.path.parts
         elif before.start is not self.now.start or before.is_empty():
