@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from editing import MARK, at_mark
+from editing import MARK, at_mark, at_word, check_declaration
 from rows import each_of
 
 from fbvm.analysis.completion import complete
 from fbvm.analysis.outline import outline
 from fbvm.analysis.program import Program
-from fbvm.analysis.references import declared_at, references, rename
+from fbvm.analysis.references import rename
 
 PLANT = """\
 USING Plant;
@@ -43,8 +43,7 @@ END_PROGRAM
 
 def plant(before: str, word: str) -> tuple[Program, int]:
     """The plant, and the place of a word that stands behind a piece of its text."""
-    at = PLANT.index(before) + PLANT[PLANT.index(before):].index(word)
-    return at_mark(PLANT[:at] + MARK + PLANT[at:])
+    return at_word(PLANT, before, word)
 
 
 @each_of("before, word, line, count", [
@@ -60,13 +59,7 @@ def plant(before: str, word: str) -> tuple[Program, int]:
     ("p.Run", "y", 14, 2),
 ])
 def test_a_name_leads_to_its_declaration_in_its_namespace(before: str, word: str, line: int, count: int) -> None:
-    program, offset = plant(before, word)
-    declared = declared_at(program, "pump.st", offset)
-    assert declared is not None
-    placed = program.place(declared.source)
-    assert placed is not None
-    assert placed[0].source.place(placed[1] + declared.node.start)[0] == line
-    assert len(references(program, declared.key)) == count
+    check_declaration(PLANT, before, word, line, count)
 
 
 def test_what_is_renamed_is_what_the_namespace_declares() -> None:

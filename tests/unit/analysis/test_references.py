@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from editing import at_mark
+from editing import at_mark, at_word, check_declaration
 from lang_corpus import programs
 from rows import each_of
 
@@ -42,8 +42,7 @@ END_PROGRAM
 
 def plant(before: str, word: str) -> tuple[Program, int]:
     """The plant, and the place of a word that stands behind a piece of its text."""
-    at = PLANT.index(before) + PLANT[PLANT.index(before):].index(word)
-    return at_mark(PLANT[:at] + "‸" + PLANT[at:])
+    return at_word(PLANT, before, word)
 
 
 @pytest.mark.slow
@@ -60,13 +59,7 @@ def plant(before: str, word: str) -> tuple[Program, int]:
     ("P1 : Pump", "P1", 20, 3),
 ])
 def test_a_name_leads_to_its_declaration_and_to_all_its_places(before: str, word: str, line: int, count: int) -> None:
-    program, offset = plant(before, word)
-    declared = declared_at(program, "pump.st", offset)
-    assert declared is not None
-    placed = program.place(declared.source)
-    assert placed is not None
-    assert placed[0].source.place(placed[1] + declared.node.start)[0] == line
-    assert len(references(program, declared.key)) == count
+    check_declaration(PLANT, before, word, line, count)
 
 
 def test_places_know_whether_they_read_or_write() -> None:
