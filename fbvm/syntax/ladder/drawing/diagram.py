@@ -116,9 +116,9 @@ def diagram(steps: Sequence[StepText]) -> Point:
 
 
 def _changes_power(path: Series) -> bool:
-    """Whether there is a box among these conditions, such as NOT or UP, which does not only pass power on."""
-    return any(isinstance(part, Box) or isinstance(part, Parallel) and any(map(_changes_power, part.branches))
-               for part in path.parts)
+    """Whether there is a box in this series, such as NOT or UP, which does not only pass power on.  One in a branch takes the
+    power of its branch."""
+    return any(isinstance(part, Box) for part in path.parts)
 
 
 class _Reader:
