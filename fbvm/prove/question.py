@@ -129,6 +129,7 @@ class Run:
         """The time between each scan but the first and the one before."""
         return [after - before for before, after in pairwise(self.times_ns)]
 
+
 @dataclass(frozen=True)
 class Verdict:
     """The answer to a question.
@@ -145,10 +146,10 @@ class Verdict:
     """What the property names."""
     notes: tuple[str, ...] = field(default=())
     """What limits the answer: assumptions, values that are constants, statements that nothing reaches."""
+    is_kept: bool = False
+    """True if the proof was not made now, but kept on disk by an earlier call."""
 
     @property
     def is_good(self) -> bool:
         """True if the property holds for certain, or what was to be reached was reached."""
         return self.word in (PROVED, REACHED)
-
-

@@ -12,7 +12,7 @@ from fbvm.prove.bounded import Goal
 from fbvm.prove.encoding.clocks import Clock
 from fbvm.prove.encoding.summary import Summary
 from fbvm.prove.invariants import balanced
-from fbvm.prove.solver import SAT, Solver
+from fbvm.prove.solver import UNKNOWN, UNSAT, Solver
 from fbvm.prove.unrolling import from_power_on
 
 STEPS = (1, 4, 16, 64)
@@ -32,7 +32,7 @@ def unreached(summary: Summary, goal: Goal, clock: Clock, scans: int, expired: C
 
 def _unmet(summary: Summary, goal: Goal, clock: Clock, sites: list[int], scans: int,
            expired: Callable[[], bool]) -> list[int]:  # fmt: skip
-    """The sites of some that no run of so many scans reaches, as far as the solver tells."""
+    """The sites of some that no run of so many scans reaches; none if the time is over before that is known."""
     terms = summary.terms
     unrolling = from_power_on(summary, [goal.stop, goal.given, *(summary.reached[site] for site in sites)], clock)
     solver = Solver(expired)
@@ -47,7 +47,9 @@ def _unmet(summary: Summary, goal: Goal, clock: Clock, sites: list[int], scans: 
                 if site in waiting:
                     goals[site] = terms.or_(goals[site], term)
         done = depth
-        while goals and solver.ask(balanced(terms, list(goals.values()))) == SAT:
+        while goals and (answer := solver.ask(balanced(terms, list(goals.values())))) != UNSAT:
+            if answer == UNKNOWN:
+                return []
             values = solver.values(set(goals.values()))
             met = [site for site, term in goals.items() if values[term]]
             for site in met:

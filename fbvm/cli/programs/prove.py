@@ -26,12 +26,13 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove import equality
 from fbvm.prove.cycle import cycle_bounds, show_cycle
-from fbvm.prove.prover import Limits, prove
+from fbvm.prove.prover import Limits
 from fbvm.prove.pytest_text import pytest_text
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
 from fbvm.prove.ready import at_most_one, handshake, written_once
 from fbvm.prove.report import details, headline
 from fbvm.prove.runs import repeated
+from fbvm.prove.stored import proved_once
 from fbvm.run.time_limit import time_limit
 from fbvm.watch.paths import UnknownPlace
 from fbvm.watch.values import plain_value
@@ -96,6 +97,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
 
     Conditions are written as for `fbvm run --until`.  Inputs are free in each scan: %I, CIO that the program reads and never
     writes, VAR_INPUT of the PROGRAM.
+
+    Proofs are kept on disk until the program or the property changes; --no-cache makes them anew.
 
     Status 0 if all is proved or reached, 1 if a property is broken or undecided, 3 if the program has errors or cannot be
     followed."""
@@ -182,11 +185,11 @@ def _equality(pair: tuple[str, str], files: Sequence[Path], libraries: Sequence[
 
 
 def _answered(image: Image, question: Question, options: dict[str, Any]) -> Verdict:
-    """The answer to one question.  Ends the verb for one that cannot be answered."""
+    """The answer to one question, a proof from the cache.  Ends the verb for one that cannot be answered."""
     cycle_ns, longest_ns = options["cycle"]
     limits = Limits(cycle_ns, options["scans"], options["seed"], time_limit(options["budget_ns"]), longest_ns=longest_ns)
     with answering(image, str(question)), told(str(question)) as tell:
-        return prove(image, question, limits, tell)
+        return proved_once(image, question, limits, tell)
 
 
 def _print(image: Image, verdict: Verdict) -> None:
@@ -199,7 +202,8 @@ def _print(image: Image, verdict: Verdict) -> None:
 def _as_dict(verdict: Verdict) -> dict[str, object]:
     """One property for --json; the values of inputs by scan, only where they change."""
     found: dict[str, object] = {"kind": verdict.question.kind, "expression": verdict.question.text, "verdict": verdict.word,
-                                "how": verdict.how, "clear_scans": verdict.scans, "notes": list(verdict.notes)}  # fmt: skip
+                                "how": verdict.how, "clear_scans": verdict.scans, "notes": list(verdict.notes),
+                                "from_cache": verdict.is_kept}  # fmt: skip
     if run := verdict.run:
         found["run"] = {
             "scans": run.scans, "shortest": run.is_shortest, "trap": run.trap.code if run.trap else None,

@@ -64,7 +64,7 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      type=ExistingPath(file_okay=False),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
         click.option("--no-cache", is_flag=True, expose_value=False, callback=_switch_cache_off,
-                     help="Compile anew, and keep nothing of it on disk."),
+                     help="Compile anew, prove anew, and keep nothing of it on disk."),
         click.option("--memory", is_flag=True, expose_value=False, callback=_keep_in_context,
                      help="Take the memory window of a project of CX-Programmer as initial values of D, H, W and E."),
         click.option("--resource", metavar="NAME", expose_value=False, callback=_keep_in_context,

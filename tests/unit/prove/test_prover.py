@@ -9,9 +9,11 @@ from fbvm.code.compiler import compile_files, compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
-from fbvm.prove.prover import Limits, prove
+from fbvm.prove.prover import Limits, Prover, prove
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
 from fbvm.prove.runs import repeated
+from fbvm.prove.solver import UNKNOWN, Solver
+from fbvm.prove.unreached import unreached
 from fbvm.watch.paths import UnknownPlace
 
 FEW = Limits(simulated_scans=200, scans=120)
@@ -84,6 +86,14 @@ def test_without_a_proof_the_scans_without_a_run_are_told() -> None:
     verdict = asked(deep, NEVER, "Main.n = 100000", limits=Limits(simulated_scans=10, scans=40))
     assert (verdict.word, verdict.scans) == ("undecided", 40)
     assert verdict.how == "no run of 40 scans gets there, and no proof was found that none ever does"
+
+
+def test_statements_of_which_nothing_is_known_yet_are_not_said_to_be_unreached(monkeypatch: pytest.MonkeyPatch) -> None:
+    prover = Prover(program("IF In THEN n := 1; END_IF", "n : INT;"), Question(NEVER, "Main.n > 1"), Limits(), lambda said: None)
+    asked = prover.summary, prover.goal, prover.clock, 4, lambda: False
+    assert unreached(*asked) == []
+    monkeypatch.setattr(Solver, "ask", lambda *terms: UNKNOWN)
+    assert unreached(*asked) == []
 
 
 def test_no_time_at_all_is_undecided() -> None:
