@@ -42,6 +42,8 @@ class Dialect:
     programs_are_written: bool = False
     locals_are_written: bool = False
     initial_variables: bool = False
+    round_arrays: bool = False
+    nested_repetitions: bool = False
     lenient_texts: str = ""
     """How a text that is no literal is converted: "leading", "whole", or "" for a trap."""
     whole_powers: bool = False
@@ -125,6 +127,8 @@ QUESTIONS = {
                       "the number that the text begins with, else 0; under rusty 0 unless the whole text is one"),
     "initial_variables": ("VAR x : INT := y, where y is a variable", "an error",
                           "the value that y begins with; in a FUNCTION, and for VAR_TEMP, what y has when the body starts"),
+    "round_arrays": ("VAR a : ARRAY[0..3] OF INT := (1, 2, 3, 4): an array in parentheses", "an error", "[1, 2, 3, 4]"),
+    "nested_repetitions": ("[20(5(1))]: a repetition in a repetition", "an error", "100 values: row by row"),
     "whole_powers": ("2 ** 3, EXPT(2, 10) of constants, where an integer is needed", "an error that names the conversion",
                      "8, 1024: the value if it is whole; under codesys with a warning (S0793)"),
     "no_open_inputs": ("ARRAY [*] as VAR_INPUT of a FUNCTION",
@@ -239,7 +243,7 @@ _ROWS = (
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
-            generic_functions=True, times_are_numbers=True),
+            generic_functions=True, times_are_numbers=True, round_arrays=True, nested_repetitions=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

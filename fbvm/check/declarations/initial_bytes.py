@@ -52,11 +52,24 @@ def initial_bytes(scope: Scope, kind: Type, init: tree.Initial, default: bytes) 
         scope.project.dependencies.repeatable = False
         return references.placeholder(scope.facts, Start(references.named(init), init, kind, scope.source, scope.pou, scope.late))
     if isinstance(kind, ArrayType | StructType):
-        form = "[...]" if isinstance(kind, ArrayType) else "(name := value, ...)"
-        scope.error("S0705", init, f"an initial value of {kind} is written {form}")
-        return default
+        return _whole(scope, kind, init, default)
     value = constant(scope, init, kind)
     return default if value is None else encode(kind, value)
+
+
+def _whole(scope: Scope, kind: ArrayType | StructType, init: tree.Expr, default: bytes) -> bytes:
+    """The bytes of an array or structure whose initial value is written in one name: those of that variable."""
+    place = isinstance(init, tree.NameRef | tree.Member | tree.Index)
+    if place and scope.dialect.initial_variables and not (isinstance(kind, StructType) and kind.block):
+        if not scope.fit(init, kind, "S0705", "the initial value"):
+            return default
+        known = initializers.initial_value(scope, init)
+        if known is not None:
+            return known[1]
+    form = "[...]" if isinstance(kind, ArrayType) else "(name := value, ...)"
+    others = f"take {takers('initial_variables')}" if place and not scope.dialect.initial_variables else ""
+    scope.error("S0705", init, f"an initial value of {kind} is written {form}", others)
+    return default
 
 
 def _array(scope: Scope, kind: Type, init: tree.ArrayInit, default: bytes) -> bytes:

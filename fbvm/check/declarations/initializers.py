@@ -6,7 +6,7 @@ expression becomes an assignment in front of the body."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from fbvm.base.types import ArrayType, RefType, Type, fold, machine
 from fbvm.check.expressions import references
@@ -26,7 +26,7 @@ def replace_by_values(scope: Scope, expr: tree.Expr) -> bool:
     for place in _places(expr):
         if place in facts.constants:
             continue
-        found = _initial_value(scope, place)
+        found = initial_value(scope, place)
         if found is None or machine(found[0]) in ("", "ref"):
             return False
         known[place] = decode(*found)
@@ -37,8 +37,11 @@ def replace_by_values(scope: Scope, expr: tree.Expr) -> bool:
 
 
 def varies(scope: Scope, initial: tree.Initial) -> bool:
-    """True for an initial value that names a variable, or calls a function of the program's own."""
-    if not isinstance(initial, tree.Expr):
+    """True for an initial value that names a variable, or calls a function of the program's own.
+
+    An array or structure that is written out is none where statements do not take it."""
+    if not isinstance(initial, tree.Expr) or isinstance(initial, tree.ArrayInit | tree.StructInit) and \
+            not scope.dialect.written_out:
         return False
     for node in _nodes(initial):
         if isinstance(node, tree.NameRef):
@@ -68,19 +71,19 @@ def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
     return changed(pou.tree, body=(*assigned, *pou.tree.body))
 
 
-def _initial_value(scope: Scope, place: tree.Expr) -> tuple[Type, bytes] | None:
+def initial_value(scope: Scope, place: tree.Expr) -> tuple[Type, bytes] | None:
     """Type and initial bytes of a variable or a part of one; None if they are not known."""
     facts = scope.facts
     variable = facts.variables.get(place) or _of_instance(scope, place)
     if variable is not None:
         return None if variable.reference else (variable.type, variable.initial)
     if isinstance(place, tree.Member) and place in facts.fields:
-        outer, field = _initial_value(scope, place.of), facts.fields[place]
+        outer, field = initial_value(scope, place.of), facts.fields[place]
         if outer is None or field.reference or field.absolute or field.bit is not None:
             return None
         return field.type, outer[1][field.offset:field.offset + field.type.size]
     if isinstance(place, tree.Index):
-        outer = _initial_value(scope, place.of)
+        outer = initial_value(scope, place.of)
         subscripts = [facts.constants.get(subscript) for subscript in place.subscripts]
         if outer is None or not isinstance(outer[0], ArrayType) or len(subscripts) != len(outer[0].bounds):
             return None
@@ -129,7 +132,18 @@ def _nodes(expr: tree.Expr) -> Iterator[tree.Expr]:
         for subscript in expr.subscripts:
             yield from _nodes(subscript)
     else:
-        parts = (expr.operand,) if isinstance(expr, tree.Unary) else (expr.left, expr.right) if isinstance(expr, tree.Binary) \
-            else tuple(a.value for a in expr.arguments if a.value is not None) if isinstance(expr, tree.Call) else ()
-        for part in parts:
+        for part in _parts(expr):
             yield from _nodes(part)
+
+
+def _parts(expr: tree.Expr) -> Sequence[tree.Expr]:
+    """The operands, arguments or elements that an expression is made of."""
+    if isinstance(expr, tree.Unary):
+        return (expr.operand,)
+    if isinstance(expr, tree.Binary):
+        return expr.left, expr.right
+    if isinstance(expr, tree.Call):
+        return [argument.value for argument in expr.arguments if argument.value is not None]
+    if isinstance(expr, tree.ArrayInit):
+        return [part for item in expr.items for part in item if part is not None]
+    return [value for _, value in expr.fields] if isinstance(expr, tree.StructInit) else ()

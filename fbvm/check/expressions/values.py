@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from fbvm.base.types import Field, RefType, StructType, Type, families, fold
 from fbvm.syntax import tree
+from fbvm.syntax.st.expressions import REPEATED_LIMIT
 
 
 def flattened(init: tree.ArrayInit) -> tree.ArrayInit:
-    """`[[1, 2], [3, 4]]` as `[1, 2, 3, 4]`: the values of an array of several dimensions in memory order."""
+    """`[[1, 2], 2([3, 4])]` as `[1, 2, 3, 4, 3, 4]`: the values of an array of several dimensions in memory order."""
     items: list[tuple[tree.Expr | None, tree.Initial | None]] = []
     for repetition, value in init.items:
-        if isinstance(value, tree.ArrayInit) and repetition is None:
-            items.extend(flattened(value).items)
+        times = 1 if repetition is None else repetition.value if isinstance(repetition, tree.Literal) else None
+        rows = flattened(value).items if isinstance(value, tree.ArrayInit) else ()
+        if rows and isinstance(times, int) and times * len(rows) <= REPEATED_LIMIT:
+            items.extend(rows * times)
         else:
             items.append((repetition, value))
     return tree.ArrayInit(init.start, init.end, tuple(items))

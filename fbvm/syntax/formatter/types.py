@@ -232,6 +232,10 @@ class TypeLayout(StatementLayout):
     def array_bare_repeated(self, count: Token, opener: Token, values: list[Phrase] | None, closer: Token) -> Phrase:
         return Phrase(count.start, "[", self.array_repeated(count, opener, values, closer).doc, "]", level="list")
 
+    def array_round(self, opener: Token, bare: Phrase, closer: Token) -> Phrase:
+        """... and one in parentheses gets brackets for these."""
+        return Phrase(opener.start, self.leaf(opener, ""), bare.doc, self.closer(closer, ""), level="list")
+
     def array_item(self, value: Phrase) -> Phrase:
         return value
 

@@ -17,6 +17,7 @@ from fbvm.syntax.tree import (
     ConfigVar,
     ConfigVars,
     Expr,
+    Form,
     GlobalVars,
     Initial,
     Location,
@@ -93,8 +94,16 @@ class Declarations(Types):
         parts = [part for item in flat for part in item if part is not None]
         return ArrayInit(parts[0].start, parts[-1].end, flat) if parts else ArrayInit(comma.start, comma.end, flat)
 
-    def array_bare_repeated(self, count: Token, opener: Token, values: list[Initial] | None, closer: Token) -> ArrayInit:
-        return ArrayInit(count.start, closer.end, tuple(self.array_repeated(count, opener, values, closer)))
+    def array_bare_repeated(self, count: Token, opener: Token, items: list[list[Item]] | None, closer: Token) -> ArrayInit:
+        return ArrayInit(count.start, closer.end, tuple(self.array_repeated(count, opener, items, closer)))
+
+    def array_round(self, opener: Token, bare: ArrayInit, closer: Token) -> ArrayInit:
+        """`(1, 2, 3)`, which means [1, 2, 3]."""
+        self.forms.append(Form("round_arrays", opener.start, closer.end, (
+            "S0101", "the values of an array stand in parentheses", "write them in brackets: [1, 2, 3]")))
+        node = ArrayInit(opener.start, closer.end, bare.items)
+        self.deepen_over(node, [value for _, value in bare.items if value is not None])
+        return node
 
     # --- configuration ---
 

@@ -179,16 +179,23 @@ class Expressions(Builder):
     def array_item(self, value: Expr) -> list[Item]:
         return [(None, value)]
 
-    def array_repeated(self, count: Token, opener: Token, values: list[Expr] | None, closer: Token) -> list[Item]:
-        """`3(0)`; with several values in the parentheses they are written out, since each repetition has one value."""
+    def array_repeated(self, count: Token, opener: Token, items: list[list[Item]] | None, closer: Token) -> list[Item]:
+        """`3(0)`; with several values in the parentheses they are written out, since each repetition has one value.
+
+        A repetition in a repetition, `2(3(0), 1)`, is written out in the same way."""
         times = self.number(count)
-        if values is None or len(values) == 1:
-            return [(times, values[0] if values else None)]
-        if not isinstance(times.value, int) or times.value * len(values) > REPEATED_LIMIT:
+        group = [item for each in items or () for item in each]
+        nested = any(repetition is not None for repetition, _ in group)
+        if nested:
+            self.forms.append(Form("nested_repetitions", count.start, closer.end, (
+                "S0101", "a repetition stands in a repetition",
+                "write the elements of a row in brackets, 20([5(1)]), or multiply: 100(1)")))
+        elif len(group) < 2:
+            return [(times, group[0][1] if group else None)]
+        if not isinstance(times.value, int) or times.value * len(group) > REPEATED_LIMIT:
             self.report("S0108", times.start, times.end,
-                        f"`{count.text}` repetitions of {len(values)} values are too many")
+                        f"`{count.text}` repetitions of {len(group)} values are too many")
             return []
-        group: list[Item] = [(None, value) for value in values]
         return group * times.value
 
     def struct_init(self, opener: Token, fields: list[tuple[Name, Expr]], closer: Token) -> StructInit:
