@@ -379,8 +379,8 @@ def test_frames_are_saved_and_a_word_says_who_wrote_it(live: Any) -> None:
         page.click("#pcapng")
     assert Path(saved.value.path()).read_bytes()[:4] == bytes.fromhex("0a0d0d0a")
     page.click("[data-panel=memory]")
-    page.fill("#first", "10")
-    page.locator("#words button", has_text="005A").first.click()
+    page.fill("#first", "10")  # the press takes the focus from the field, and words are drawn while the button is down
+    page.locator("#words button", has_text="005A").first.click(delay=500)
     page.locator("#reason:not([hidden])").wait_for()
     page.click("[data-panel=times]")
     page.locator("#histogram rect").first.wait_for()

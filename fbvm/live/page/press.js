@@ -21,4 +21,6 @@ const press = (event) => {
 };
 addEventListener("pointerdown", press, true);
 addEventListener("keydown", (event) => event.key === " " && press(event), true);
-for (const name of ["pointerup", "pointercancel", "keyup", "blur"]) addEventListener(name, () => isPressed && setTimeout(release), true);
+const end = () => isPressed && setTimeout(release);
+for (const name of ["pointerup", "pointercancel", "keyup"]) addEventListener(name, end, true);
+addEventListener("blur", end); // of the window: the press itself takes the focus from a field
