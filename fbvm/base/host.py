@@ -143,6 +143,19 @@ def handling(numbers: Iterable[signal.Signals], handle: Handle) -> Iterator[None
 
 
 @contextmanager
+def interrupt_held() -> Iterator[None]:
+    """Lets Ctrl-C wait for the end of the `with` block, which must be short: what begins in it is not left half done.
+
+    Processes that are started in it hear Ctrl-C, unlike those of `signals_held`.  Does nothing outside the main thread."""
+    came: list[FrameType | None] = []
+    before = signal.getsignal(signal.SIGINT)
+    with handling([signal.SIGINT] if callable(before) else [], lambda number, frame: came.append(frame)):
+        yield
+    if came:
+        signal.raise_signal(signal.SIGINT)
+
+
+@contextmanager
 def signals_held() -> Iterator[None]:
     """Lets Ctrl-C and the signals that ask for the end wait until the `with` block is over.
 

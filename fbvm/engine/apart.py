@@ -6,6 +6,8 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
+from fbvm.base.children import child
+
 DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 """Ctrl-C at a terminal reaches all processes there; the one that asked for the work says when it ends."""
 
@@ -17,14 +19,8 @@ def run_apart(program: str, data: bytes, options: Sequence[str] = ()) -> bytes |
     `options` are those of the interpreter."""
     command = [sys.executable, *options, "-c", DEAF + program]
     try:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        with child(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+            made, _ = process.communicate(data)
     except (OSError, ValueError):
         return None
-    with process:
-        try:
-            made, _ = process.communicate(data)
-        except BaseException:
-            process.kill()
-            process.wait()
-            raise
     return made if process.returncode == 0 else None

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 
+from fbvm.base.children import child
+
 PLUGIN = "fbvm.testing.plugin"
 
 
@@ -17,4 +19,5 @@ def run_pytest(arguments: Sequence[str], cwd: Path | None = None, quiet: bool = 
     `cwd` is the folder in which it runs, this process's by itself; `quiet` drops what it prints."""
     installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
     command = [sys.executable, "-m", "pytest", *([] if installed else ["-p", PLUGIN]), *arguments]
-    return subprocess.run(command, cwd=cwd, check=False, stdout=subprocess.DEVNULL if quiet else None).returncode
+    with child(command, cwd=cwd, stdout=subprocess.DEVNULL if quiet else None) as process:
+        return process.wait()

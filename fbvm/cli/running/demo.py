@@ -24,6 +24,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from fbvm.base.children import child
 from fbvm.base.data import data_folder
 from fbvm.base.files import write_file
 from fbvm.base.host import can_end_others
@@ -180,7 +181,7 @@ def _failure(plc: Plc, reason: str) -> str:
 def _process(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """A command of fbvm that listens, in a process of its own; its port.  Raises OSError if it does not start."""
     command = [sys.executable, "-m", "fbvm", *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
             line = process.stdout.readline()

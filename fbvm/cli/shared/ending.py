@@ -69,17 +69,6 @@ def heard() -> Iterator[None]:
 
 
 @contextmanager
-def held() -> Iterator[None]:
-    """Lets Ctrl-C wait for the end of the `with` block, which must be short: what begins in it is not left half done."""
-    came: list[FrameType | None] = []
-    before = signal.getsignal(signal.SIGINT)
-    with handling([signal.SIGINT] if callable(before) else [], lambda number, frame: came.append(frame)):
-        yield
-    if came:
-        signal.raise_signal(signal.SIGINT)
-
-
-@contextmanager
 def loading() -> Iterator[None]:
     """For a `with` block that imports modules, before anything is written: asked to end, the process ends at once in it.
 

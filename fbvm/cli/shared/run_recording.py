@@ -13,7 +13,7 @@ import click
 
 import fbvm
 from fbvm.base.files import write_file
-from fbvm.cli.shared.ending import held
+from fbvm.base.host import interrupt_held
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.given_sources import sources_of
 from fbvm.cli.shared.terminal import named, say
@@ -94,7 +94,7 @@ class RunRecording:
     def add(self, name: str, plc: Plc, described: Described) -> None:
         """Records a PLC from its next scan on."""
         if self.recording:
-            with held():
+            with interrupt_held():
                 self.recording.add(name, plc, described)
 
     def tick(self) -> None:
@@ -119,7 +119,7 @@ def record_run(options: Mapping[str, Any], about: Mapping[str, object], in_memor
         for path in paths:
             with writing(path):
                 files.append(stack.enter_context(growing_file(path)))
-        with held():
+        with interrupt_held():
             about = {"began_ns": loop.epoch_ns(), "options": dict(about)}
             file = files[0] if len(files) == 1 else _Files(files)
             writer = RecordingWriter(file, fbvm.__version__, options["verify"], about) if files else None
@@ -127,7 +127,7 @@ def record_run(options: Mapping[str, Any], about: Mapping[str, object], in_memor
         try:
             yield made
         finally:
-            with held():
+            with interrupt_held():
                 assert made.recording
                 made.recording.close()
 
