@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from depth import times
 
 from fbvm.base.data import data_folder
-from fbvm.base.host import handling
+from fbvm.base.host import handling, interrupt_held
 from fbvm.cli.main import GROUP_OF, main
 from fbvm.cli.shared import ending
 
@@ -182,7 +182,7 @@ def test_other_signals_do_what_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_what_is_held_is_not_left_half_done() -> None:
     done = []
-    with pytest.raises(KeyboardInterrupt), ending.held():
+    with pytest.raises(KeyboardInterrupt), interrupt_held():
         signal.raise_signal(signal.SIGINT)
         done.append(1)
     assert done == [1]
