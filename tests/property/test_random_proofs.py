@@ -8,22 +8,22 @@ from random import Random
 
 import pytest
 from depth import times
+from random_runs import Broken, RandomRuns, with_drawing
 
 from fbvm.code.compiler import compile_text
-from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
-from fbvm.prove.encoding.cells import BIT, NUMBER, Cell
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, prove
-from fbvm.prove.question import NEVER, NO_TRAP, Question
-from fbvm.prove.runs import InputWriter, Judge, RandomInputs, repeated
+from fbvm.prove.question import NEVER, NO_TRAP, PROVED, Question, Verdict
+from fbvm.prove.runs import Judge, repeated
 
 pytestmark = pytest.mark.slow
 INPUTS = ("I0", "I1", "I2")
 FLAGS = ("F0", "F1", "F2", "F3")
 NUMBERS = ("N0", "N1")
 PROGRAMS, RUNS, SCANS = 12, 4, 60
-"""Programs, random runs of each that is proved, and scans of a run; 300 programs and more with --deep."""
+"""Programs, random runs of each, and scans of a run; 300 programs and 100,000 runs of each with --deep."""
+CYCLE_NS = 10_000_000
 
 FREE, LONGEST_NS = 3, 40_000_000
 """One program of so many is proved for any time from 10 ms to this between two scans."""
@@ -83,45 +83,58 @@ class Maker:
         return Question(NEVER, f"Main.{name} AND NOT ({other})")
 
 
-def broken_at_random(image: Image, question: Question, seed: int) -> bool:
-    """Whether random runs break a property."""
-    judge = Judge.of(image, question)
-    for number in range(RUNS * times(1)):
-        plc, random = Plc(image, engine="python"), Random(f"{seed} {number}")
-        area = image.layout.areas["I"].offset
-        writer = InputWriter(plc, [*(Cell(area, 1, BIT, bit) for bit in range(len(INPUTS))), Cell(area + 4, 2, NUMBER)])
-        values = RandomInputs(writer, random)
-        for _ in range(SCANS):
-            for cell in writer.cells:
-                if random.random() < 0.3:
-                    writer.write(cell, values.value(cell))
-            plc.scan()
-            if judge.met(plc):
-                return True
-            if plc.trap:
-                break
-    return False
+def broken_at_random(text: str, question: Question, scans: int, longest_ns: int) -> Broken | None:
+    """A random run of at most so many scans that breaks a property; with --deep of 100,000 runs, in machine code."""
+    runs = RandomRuns(with_drawing(text, INPUTS, "In", question.text.replace("Main.", "")), times(1) > 1, CYCLE_NS, longest_ns)
+    found = (runs.first_broken(number, scans, question.kind == NO_TRAP) for number in range(times(RUNS, 25_000)))
+    return next(filter(None, found), None)
 
 
-def test_verdicts_about_random_programs() -> None:
+def clear_scans(verdict: Verdict) -> int:
+    """In how many scans from power-on on no run breaks the property, by the verdict."""
+    if verdict.run is not None:
+        return verdict.run.scans - 1 if verdict.run.is_shortest else 0
+    return SCANS if verdict.word == PROVED else min(verdict.scans, SCANS)
+
+
+@pytest.mark.parametrize("first", range(0, times(PROGRAMS, 25), PROGRAMS))
+def test_verdicts_about_random_programs(first: int) -> None:
     words: dict[str, int] = {}
-    for seed in range(PROGRAMS * times(1, 25)):
+    for seed in range(first, first + PROGRAMS):
         maker = Maker(seed)
         text = maker.text()
         compilation = compile_text(text, lint=False)
         assert compilation.image is not None, f"{text}\n{[d.render() for d in compilation.diagnostics]}"
         image, question = compilation.image, maker.question()
+        longest_ns = LONGEST_NS if seed % FREE == 0 else 0
         try:
-            limits = Limits(scans=80, simulated_scans=60, longest_ns=LONGEST_NS if seed % FREE == 0 else 0)
+            limits = Limits(CYCLE_NS, scans=80, simulated_scans=60, longest_ns=longest_ns)
             verdict = prove(image, question, limits)  # raises for a run that the engine does not do
         except Refused as refused:
             assert "does not trap, for longer than" in refused.reason, text
             continue
         words[verdict.word] = words.get(verdict.word, 0) + 1
-        if verdict.word == "proved":
-            assert not broken_at_random(image, question, seed), f"{question}\n{text}"
+        if clear := clear_scans(verdict):
+            found = broken_at_random(text, question, clear, longest_ns)
+            assert found is None, f"{question}: {verdict.word} {verdict.how}, broken by {found}\n{text}"
         if verdict.run is not None:
-            plc = Plc(image, engine="python")
-            repeated(plc, verdict.run)
-            assert Judge.of(image, question).met(plc), f"{question}\n{text}"
+            for engine in ("python", "native"):
+                plc = Plc(image, engine=engine)
+                repeated(plc, verdict.run)
+                assert Judge.of(image, question).met(plc), f"{question} on {engine}\n{text}"
     assert words.get("proved", 0) >= PROGRAMS // 6 and words.get("broken", 0) >= PROGRAMS // 6, words
+
+
+def test_a_program_that_draws_its_inputs_breaks_what_can_be_broken() -> None:
+    head = Maker(0).text().split("END_VAR\n")[0]
+    text = f"{head}END_VAR\n    IF I0 AND NOT I1 AND In = 3 THEN N0 := N0 + 1; END_IF\nEND_PROGRAM\n"
+
+    def runs(broken: str, is_native: bool, longest_ns: int) -> list[Broken | None]:
+        made = RandomRuns(with_drawing(text, INPUTS, "In", broken), is_native, CYCLE_NS, longest_ns)
+        return [made.first_broken(seed, SCANS, False) for seed in range(6)]
+
+    for longest_ns in (0, LONGEST_NS):
+        some = runs("N0 > 2", False, longest_ns)
+        assert any(some) and all(each.scan > 2 for each in some if each)
+        assert runs("N0 > 2", True, longest_ns) == some
+        assert not any(runs("N0 < 0", True, longest_ns))
