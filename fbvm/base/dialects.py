@@ -56,6 +56,7 @@ class Dialect:
     unsigned_ltime: bool = False
     empty_bodies: bool = False
     in_outs_are_read: bool = False
+    in_outs_are_written: bool = False
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
@@ -155,6 +156,8 @@ QUESTIONS = {
                      "taken: up to 128 MiB, and 1 GiB together"),
     "empty_bodies": ("the call of a block that EXTENDS another and has no statement", "runs the body of its base",
                      "runs nothing"),
+    "in_outs_are_written": ("motor.speed := n; motor();, where speed is an in-out of the block", "errors",
+                            "n is copied into the instance, as for an input, and a call without the in-out works on that copy"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
                   "an error that names the conversion",
                   "cut to the width; without its fraction, the nearest number that there is; 1 and 0; as it is"),
@@ -227,7 +230,7 @@ _ROWS = (
             large_memory=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
-            no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, locals_are_read=True,
+            no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
             wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True),

@@ -41,6 +41,8 @@ def bind(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
         _named(scope, argument, pou, bound, given)
     empty = {name for name, node in given.items() if isinstance(node, tree.Argument) and node.value is None}
     missing = [v for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given.keys() - empty]
+    bound.kept += [v for v in missing if v.own is not None]
+    missing = [v for v in missing if v.own is None]
     if missing and not pou.has_failed_names:
         names = " and ".join(v.name for v in missing)
         scope.error("S0404", call, f"the {missing[0].role_of_parameter} {names} of {pou.name} is missing",

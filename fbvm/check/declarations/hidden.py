@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.base.types import BOOL
+from fbvm.base.types import BOOL, AnyType, OpenArrayType
 from fbvm.check.symbols.facts import Pou, Variable, is_block
 from fbvm.check.symbols.statement_lists import names_of_eno
 from fbvm.check.symbols.symbol_table import SymbolTable
@@ -18,6 +18,17 @@ def add_hidden(project: SymbolTable, pou: Pou) -> None:
         block = _instance(pou, name)
         if block is not None and block.owner is pou:
             block.eno = _flag(pou, block, "ENO")
+    if project.dialect.in_outs_are_written and pou.kind == "FUNCTION_BLOCK":
+        for variable in [v for v in pou.order if v.kind == "VAR_IN_OUT" and v.owner is pou]:
+            if not (variable.by_reference or is_block(variable.type) or isinstance(variable.type, OpenArrayType | AnyType)):
+                variable.own = Variable(own_name(variable.name), variable.type, "VAR", pou.source, variable.node, pou,
+                                        initial=variable.initial)
+                pou.order.append(variable.own)
+
+
+def own_name(name: str) -> str:
+    """The name of the hidden variable for values of an in-out: it has a space, so that no program can name it."""
+    return f"{name} own"
 
 
 def _instance(pou: Pou, name: str) -> Variable | None:

@@ -73,6 +73,8 @@ class Variable:
     """Of a variable that is called as a step of its POU, in a dialect that takes this: the flags of the step."""
     eno: Variable | None = None
     """Of an instance of whose last call `name.ENO` is read: the hidden variable that says whether it ran."""
+    own: Variable | None = None
+    """Of an in-out, in a dialect that takes values for it from outside: the hidden variable that holds these."""
     space: str = ""
     """The name of the list that declares a global variable; with `qualified` it must stand in front of its name."""
     qualified: bool = False
@@ -268,6 +270,8 @@ class PouCall:
     instance: tree.Expr | None
     inputs: list[tuple[Variable, tree.Expr]] = field(default_factory=list)
     in_outs: list[tuple[Variable, tree.Expr]] = field(default_factory=list)
+    kept: list[Variable] = field(default_factory=list)
+    """In-outs without an argument, which keep the value that they have had, in a dialect that takes such calls."""
     outputs: list[tuple[Variable, tree.Expr, bool]] = field(default_factory=list)
     enable: tree.Expr | None = None
     enabled: list[tuple[tree.Expr, bool]] = field(default_factory=list)

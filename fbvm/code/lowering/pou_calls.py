@@ -15,7 +15,7 @@ from fbvm.check.symbols.facts import PouCall, Variable
 from fbvm.code.builder.constants import FALSE, TRUE, zero
 from fbvm.code.builder.conversions import implicit
 from fbvm.code.builder.places import Place, is_aggregate
-from fbvm.code.lowering import dispatch, frame_stack, pointers
+from fbvm.code.lowering import dispatch, frame_stack, own_in_outs, pointers
 from fbvm.code.lowering.any_arguments import described
 from fbvm.code.lowering.arrays import bounds
 from fbvm.code.lowering.context import BodyContext
@@ -207,6 +207,9 @@ def _inputs(callee: Callee, site: int) -> None:
             _bind(body, variable, place, expr, node)
         else:
             body.write(place, node, site)
+    for variable in called.kept:
+        assert variable.own is not None
+        own_in_outs.bind(body, callee.slot(variable), callee.slot(variable.own), site)
     if called.pou.is_routine:
         given = {id(v) for v, _ in called.inputs}
         for variable in called.pou.parameters("VAR_INPUT"):
@@ -243,6 +246,7 @@ def _outputs(callee: Callee, outputs: list[tuple[Variable, tree.Expr, bool]], si
         source = callee.slot(variable)
         if source.type is not (kind := followed(source.type)):
             source = Place((("ref", source.load(), site), 0, ()), kind)
+        own_in_outs.written(body, target)
         place = body.place(target)
         if is_aggregate(source.type):
             body.copy(place, source, site)

@@ -8,7 +8,7 @@ from fbvm.base.types import BOOL, machine
 from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.builder.places import is_aggregate
 from fbvm.code.image import RungPicture
-from fbvm.code.lowering import byte_order, dispatch, pointers, pou_calls
+from fbvm.code.lowering import byte_order, dispatch, own_in_outs, pointers, pou_calls
 from fbvm.code.lowering.context import EXIT, BodyContext, StatementRules
 from fbvm.code.operations import Block, Node
 from fbvm.code.pictures.sfc import sfc_picture
@@ -54,6 +54,7 @@ def _assign_one(body: BodyContext, target: tree.Expr, value: tree.Expr, site: in
         assert isinstance(called, StandardCall)
         byte_order.assign(body, target, called, site)
         return
+    own_in_outs.written(body, target)
     place = body.reusable(body.place(target))
     if is_aggregate(kind):
         body.copy(place, body.aggregate(value), site)
