@@ -80,6 +80,7 @@ class Dialect:
     bits_by_name: bool = False
     generic_functions: bool = False
     own_in_outs: bool = False
+    places_for_all: bool = False
     wrong_bcd_is_zero: bool = False
     negative_is_zero: bool = False
     any_width_at: bool = False
@@ -194,6 +195,8 @@ QUESTIONS = {
     "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
     "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
                     "a variable of the program, with a warning (S0193)"),
+    "places_for_all": ("VAR_CONFIG p.count AT %MW0 : INT, where count is not declared AT %M*", "an error",
+                       "count lies there, with a warning (S0193)"),
     "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another "
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
@@ -246,7 +249,7 @@ _ROWS = (
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
-            generic_functions=True, times_are_numbers=True, round_arrays=True, nested_repetitions=True),
+            generic_functions=True, times_are_numbers=True, places_for_all=True, round_arrays=True, nested_repetitions=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

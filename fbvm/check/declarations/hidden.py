@@ -7,6 +7,9 @@ from fbvm.check.symbols.facts import Pou, Variable, is_block
 from fbvm.check.symbols.statement_lists import names_of_eno
 from fbvm.check.symbols.symbol_table import SymbolTable
 
+_PLACED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
+"""Sections whose variables VAR_CONFIG may give a place, whatever their declaration says, in a dialect that takes this."""
+
 
 def add_hidden(project: SymbolTable, pou: Pou) -> None:
     """Declare for instances of a POU whether a task of its own runs them, and whether their last call has."""
@@ -21,13 +24,23 @@ def add_hidden(project: SymbolTable, pou: Pou) -> None:
     if project.dialect.in_outs_are_written and pou.kind == "FUNCTION_BLOCK":
         for variable in [v for v in pou.order if v.kind == "VAR_IN_OUT" and v.owner is pou]:
             if not (variable.by_reference or is_block(variable.type) or isinstance(variable.type, OpenArrayType | AnyType)):
-                variable.own = Variable(own_name(variable.name), variable.type, "VAR", pou.source, variable.node, pou,
-                                        initial=variable.initial)
-                pou.order.append(variable.own)
+                _add_own(pou, variable)
+    if project.dialect.places_for_all and not pou.is_routine and not pou.source.library:
+        for variable in [v for v in pou.order if v.kind in _PLACED and v.owner is pou and v.place == "self"]:
+            if not (variable.reference or variable.constant or is_block(variable.type)) and project.completes(variable.name):
+                variable.open = variable.reference = True
+                _add_own(pou, variable)
+
+
+def _add_own(pou: Pou, variable: Variable) -> None:
+    """Declare the variable that holds the value of another one, which is a reference, until it gets another place."""
+    kind, name = variable.type, own_name(variable.name)
+    variable.own = Variable(name, kind, "VAR", pou.source, variable.node, pou, initial=variable.initial)
+    pou.order.append(variable.own)
 
 
 def own_name(name: str) -> str:
-    """The name of the hidden variable for values of an in-out: it has a space, so that no program can name it."""
+    """The name of the hidden variable for the values of another one: it has a space, so that no program can name it."""
     return f"{name} own"
 
 

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.base.areas import Address, AddressError, parse_address
+from fbvm.base.areas import PORTABLE_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
+from fbvm.check.declarations.hidden import own_name
 from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.locations import completes, example, location_of
 from fbvm.check.declarations.specs import resolve
@@ -34,7 +36,8 @@ class VarConfig:
     def __init__(self, context: Context) -> None:
         self.context = context
         self.report = context.report
-        self.completed: list[Completed] = []
+        self.completed: dict[tuple[object, ...], Completed] = {}
+        """What the rows say, by the root and the steps of the variable."""
         self.accesses: list[AccessPath] = []
         self._given: dict[tuple[object, ...], tuple[Source, int]] = {}
         """Where a variable got its place, or its value."""
@@ -79,6 +82,9 @@ class VarConfig:
             if address is None:
                 return
         initial = initial_bytes(scope, spot.type, row.initial, resolved[1]) if row.initial is not None else None
+        variable = self._declaration(spot)
+        if variable is not None and variable.open and variable.explicit and initial is None:
+            initial = variable.initial
         self._complete(Completed(spot, address, initial), row, source)
 
     def _address(self, row: tree.ConfigVar, location: tree.Location, spot: Spot, source: Source) -> Address | None:
@@ -87,7 +93,7 @@ class VarConfig:
         variable = self._declaration(spot)
         if variable is None or not variable.open:
             self.report.add("S0604", source, location, "only a variable AT %I*, %Q* or %M* takes a place from VAR_CONFIG",
-                            "declare it  AT %I*")
+                            f"declare it  AT %I*, or take {takers('places_for_all')}")
             return None
         if is_open(location, spot.type):
             self.report.add("S0604", source, location, f"VAR_CONFIG gives the whole address, and {location.text} is none",
@@ -95,29 +101,43 @@ class VarConfig:
             return None
         shown = tree.VarDecl(row.start, row.end, (), location, row.spec, None)
         address = location_of(self.context, shown, spot.type, source)
+        if address is not None and variable.own is not None:
+            self.report.add("S0193", source, location, f"{variable.name} is not declared AT %I*, %Q* or %M*, and lies here",
+                            f"declare it  AT %{address.area if address.area in PORTABLE_AREAS else 'M'}*")
+            return address
         return address if address is not None and completes(self.context, address, variable, location, source) else None
 
     def _declaration(self, spot: Spot) -> Variable | None:
         """The variable of a block or program that a path leads to; None for a member of a structure, and for an element."""
+        holder = self._holder(spot)
+        step = spot.steps[-1] if spot.steps else None
+        if holder is None or not holder.block or not isinstance(step, Field):
+            return None
+        return self.context.block_of(holder).variables.get(fold(step.name))
+
+    def _holder(self, spot: Spot) -> StructType | None:
+        """The structure or instance whose member a path leads to."""
         if spot.root is None or not spot.steps or not isinstance(spot.steps[-1], Field):
             return None
         holder = spot.root.type
         for step in spot.steps[:-1]:
             holder = step.type if isinstance(step, Field) else holder.element if isinstance(holder, ArrayType) else holder
-        block = self.context.block_of(holder) if isinstance(holder, StructType) and holder.block else None
-        return block.variables.get(fold(spot.steps[-1].name)) if block is not None else None
+        return holder if isinstance(holder, StructType) else None
 
     def _complete(self, row: Completed, node: tree.ConfigVar, source: Source) -> None:
         """Keep what a row says, unless a row before it has given the same variable an address, or a value."""
-        for what, given in (("place", row.address), ("value", row.initial)):
-            key = what, row.spot.root, _key(row.spot)
-            if given is not None and key in self._given:
+        variable = _identity(row.spot)
+        for what, written in (("place", node.location), ("value", node.initial)):
+            key = what, *variable
+            if written is not None and key in self._given:
                 self.report.add("S0202", source, node.path, f"this variable has got its {what} already", "",
                                 (*self._given[key], "by this row"))
                 return
-            if given is not None:
+            if written is not None:
                 self._given[key] = source, node.start
-        self.completed.append(row)
+        before = self.completed.get(variable, row)
+        initial = row.initial if node.initial is not None or before.initial is None else before.initial
+        self.completed[variable] = Completed(row.spot, row.address or before.address, initial)
 
     def _access(self, row: tree.Access, source: Source, program: Spot | None = None) -> None:
         spot = self._spot(row.path, source, program)
@@ -214,29 +234,52 @@ class VarConfig:
     # --- what is left out -------------------------------------------------------------------------------------------
 
     def _left_out(self) -> None:
-        """Report instances with a variable AT %I* for which no VAR_CONFIG gives an address."""
+        """Report instances with a variable AT %I* for which no VAR_CONFIG gives an address; keep other variables in place."""
         for root in self.context.global_order:
-            for path, key, variable in () if root.reference else self._open_in(root.type, root.name, ()):
-                if (root, key) not in self._placed:
+            for path, spot, variable in () if root.reference else self._open_in(Spot(root, (), root.type), root.name):
+                if variable.own is not None:
+                    self._keep(spot, variable)
+                elif (root, _key(spot)) not in self._placed:
                     self.report.add("S0801", variable.source, variable.node, f"no VAR_CONFIG says where {path} lies",
                                     f"write  {path} AT {example(variable)} : {variable.type};  or the whole address here")
 
-    def _open_in(self, kind: Type, path: str, key: tuple[object, ...]) -> Iterator[tuple[str, tuple[object, ...], Variable]]:
+    def _keep(self, spot: Spot, variable: Variable) -> None:
+        """Let a variable that could have a place, and has none, be a variable of its instance."""
+        key = _identity(spot)
+        row = self.completed.get(key, Completed(spot, None, None))
+        holder = self._holder(spot)
+        if row.address is None and holder is not None:
+            own = holder.fields[fold(own_name(variable.name))]
+            self.completed[key] = Completed(spot, None, row.initial, Spot(spot.root, (*spot.steps[:-1], own), own.type))
+
+    def _open_in(self, spot: Spot, path: str) -> Iterator[tuple[str, Spot, Variable]]:
+        """The variables inside another one that VAR_CONFIG gives a place."""
+        kind = spot.type
         if not self._holds_open(kind):
             return
         if isinstance(kind, ArrayType):
             for index in range(kind.count):
-                yield from self._open_in(kind.element, f"{path}[{kind.bounds[0][0] + index}]", (*key, index))
+                yield from self._open_in(_inner(spot, index, kind.element), f"{path}[{kind.bounds[0][0] + index}]")
         elif isinstance(kind, StructType) and not kind.block:
             for field in kind.fields.values():
-                yield from self._open_in(field.type, f"{path}.{field.name}", (*key, fold(field.name)))
+                yield from self._open_in(_inner(spot, field, field.type), f"{path}.{field.name}")
         elif isinstance(kind, StructType):
             for variable in self.context.block_of(kind).order:
-                inner, step = f"{path}.{variable.name}", (*key, fold(variable.name))
+                if not variable.open and (variable.place != "self" or variable.reference):
+                    continue
+                there, inner = _inner(spot, kind.fields[fold(variable.name)], variable.type), f"{path}.{variable.name}"
                 if variable.open:
-                    yield inner, step, variable
-                elif variable.place == "self" and not variable.reference:
-                    yield from self._open_in(variable.type, inner, step)
+                    yield inner, there, variable
+                else:
+                    yield from self._open_in(there, inner)
+
+
+def _inner(spot: Spot, step: Field | int, kind: Type) -> Spot:
+    return Spot(spot.root, (*spot.steps, step), kind)
+
+
+def _identity(spot: Spot) -> tuple[object, ...]:
+    return spot.root, str(spot.address), _key(spot)
 
 
 def _key(spot: Spot) -> tuple[object, ...]:

@@ -23,11 +23,14 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Completed:
-    """What VAR_CONFIG says about a variable: its address, or its initial bytes."""
+    """What VAR_CONFIG says about a variable: its address, or its initial bytes.
+
+    A variable that could have a place, and has none, lies at `own`, a variable of its instance."""
 
     spot: Spot
     address: Address | None
     initial: bytes | None
+    own: Spot | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,7 +73,7 @@ def lay_out(checker: Checker) -> Placement:
     _place_located(list(dict.fromkeys(located)), placement)
     for pou in checker.bodies:
         _complete_type(pou)
-    for row in checker.var_config.completed:
+    for row in checker.var_config.completed.values():
         _apply_config(row, slots, placement)
     placement.objects = replace(placement.objects, extents=_numbered(checker, slots, placement.stack))
     placement.initial += _runs(slots)
@@ -137,8 +137,10 @@ def _at(address: Address, placement: Placement) -> tuple[int, int | None]:
 def _apply_config(row: Completed, slots: bytearray, placement: Placement) -> None:
     """Put what VAR_CONFIG says into the initial bytes: a reference to the place, and the first value there."""
     offset, bit = _offset_of(row.spot, placement)
-    if row.address is not None:
-        there, bit = _at(row.address, placement)
+    place = _at(row.address, placement) if row.address is not None else \
+        (_offset_of(row.own, placement)[0], None) if row.own is not None else None
+    if place is not None:
+        there, bit = place
         reference = BUFFER_OBJECT << OBJECT_SHIFT | there << OFFSET_SHIFT | (WHOLE_BYTES if bit is None else bit)
         slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + 8] = reference.to_bytes(8, "little")
         offset = there
