@@ -87,6 +87,7 @@ class Dialect:
     steps_apart: bool = False
     times_are_numbers: bool = False
     short_names: bool = False
+    own_time: bool = False
     locals_hide_results: bool = False
 
 
@@ -200,6 +201,7 @@ QUESTIONS = {
     "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another "
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
+    "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
     "any_width_at": ("x AT %IW4 : DINT, x AT %ML2 : DWORD: an address of another size than the type", "an error",
                      "x begins there, with a warning (S0193)"),
     "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
@@ -224,7 +226,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
-                   padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True)
+                   padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
+                   own_time=True)
 _ROWS = (
     STANDARD,
     _CODESYS,
@@ -249,7 +252,8 @@ _ROWS = (
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
-            generic_functions=True, times_are_numbers=True, places_for_all=True, round_arrays=True, nested_repetitions=True),
+            generic_functions=True, times_are_numbers=True, places_for_all=True, own_time=True,
+            round_arrays=True, nested_repetitions=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

@@ -39,6 +39,11 @@ def bind(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
         _positional(scope, call, positional, named, pou, bound, given)
     for argument in named:
         _named(scope, argument, pou, bound, given)
+    _leave_out(scope, call, pou, bound, given)
+
+
+def _leave_out(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall, given: dict[str, tree.Node]) -> None:
+    """Note the in-outs without an argument that keep their value, and report the others."""
     empty = {name for name, node in given.items() if isinstance(node, tree.Argument) and node.value is None}
     missing = [v for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given.keys() - empty]
     bound.kept += [v for v in missing if v.own is not None]

@@ -45,7 +45,8 @@ def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -
     if name is None or variable is not None and variable.kind != "RESULT" or \
             isinstance(callee, tree.Member) and isinstance(qualified.member(scope, callee), Variable):
         return _instance(scope, call, as_value)
-    pou = scope.project.pou(name, scope.source)
+    unwritten = call.start == call.end  # of charts and rungs: they mean the standard function, whatever the program declares
+    pou = scope.project.pou(name, scope.source) if not (unwritten and standard.is_known(fold(name))) else None
     if pou is not None and pou.is_function:
         return _function(scope, call, pou, want)
     if isinstance(callee, tree.NameRef) and names.program(scope, callee):

@@ -21,15 +21,24 @@ def add_hidden(project: SymbolTable, pou: Pou) -> None:
         block = _instance(pou, name)
         if block is not None and block.owner is pou:
             block.eno = _flag(pou, block, "ENO")
-    if project.dialect.in_outs_are_written and pou.kind == "FUNCTION_BLOCK":
-        for variable in [v for v in pou.order if v.kind == "VAR_IN_OUT" and v.owner is pou]:
-            if not (variable.by_reference or is_block(variable.type) or isinstance(variable.type, OpenArrayType | AnyType)):
-                _add_own(pou, variable)
-    if project.dialect.places_for_all and not pou.is_routine and not pou.source.library:
-        for variable in [v for v in pou.order if v.kind in _PLACED and v.owner is pou and v.place == "self"]:
-            if not (variable.reference or variable.constant or is_block(variable.type)) and project.completes(variable.name):
-                variable.open = variable.reference = True
-                _add_own(pou, variable)
+    for variable in [v for v in pou.order if not pou.is_routine and v.owner is pou and not is_block(v.type)]:
+        if project.dialect.in_outs_are_written and _is_in_out(pou, variable):
+            _add_own(pou, variable)
+        elif project.dialect.places_for_all and _is_placed(project, pou, variable):
+            variable.open = variable.reference = True
+            _add_own(pou, variable)
+
+
+def _is_in_out(pou: Pou, variable: Variable) -> bool:
+    """True for an in-out whose values an instance can hold."""
+    return pou.kind == "FUNCTION_BLOCK" and variable.kind == "VAR_IN_OUT" and not variable.by_reference and \
+        not isinstance(variable.type, OpenArrayType | AnyType)
+
+
+def _is_placed(project: SymbolTable, pou: Pou, variable: Variable) -> bool:
+    """True for a variable of the user's to which VAR_CONFIG may give a place, though it is not declared AT %I*."""
+    return variable.kind in _PLACED and variable.place == "self" and not (variable.reference or variable.constant) and \
+        not pou.source.library and project.completes(variable.name)
 
 
 def _add_own(pou: Pou, variable: Variable) -> None:

@@ -124,7 +124,7 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     if entry is not None:
         return scope.context.declared_type(folded, scope.source)
     pou = scope.project.pou(folded, scope.source)
-    if pou is not None:
+    if pou is not None and not (pou.is_function and folded in ELEMENTARY):
         return _block(scope, pou, spec)
     kind = BOOL if folded == "BIT" and scope.pou is not None and scope.pou.kind == "FUNCTION_BLOCK" else elementary_type(folded)
     if kind is not None:
@@ -314,7 +314,7 @@ def _enumeration(scope: Scope, spec: tree.EnumSpec, name: str) -> Resolved | Non
     shown: dict[int, str] = {}
     following = 0
     for member, written in spec.members:
-        refuse_reserved(scope.project.report, scope.source, member, scope.dialect)
+        refuse_reserved(scope.project.report, scope.source, member, scope.dialect, "member")
         value = integer(scope, written, members) if written is not None else following
         if value is None:
             return None

@@ -69,7 +69,7 @@ def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, sec
                   resolved: Resolved) -> Variable:
     """One variable as declared, with its location but without a place."""
     report = context.report
-    refuse_reserved(report, source, name, context.project.dialect)
+    refuse_reserved(report, source, name, context.project.dialect, section.kind)
     kind, initial = resolved
     words = {fold(q.text) for q in section.qualifiers}
     made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,

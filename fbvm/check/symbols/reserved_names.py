@@ -13,20 +13,22 @@ RESERVED = frozenset(ELEMENTARY) | {"STRING", "WSTRING", "TOD", "LTOD", "DT", "L
 _TAKEN = {
     "names_of_edition_2": (("LTIME", "LDT", "LTOD", "LDATE", "LDATE_AND_TIME", "LTIME_OF_DAY", "CHAR", "WCHAR"),
                            "a type of the third edition"),
+    "own_time": (("TIME",), "a type and a standard function"),
     "short_names": (("DT", "TOD", "LDT", "LTOD"), "the short name of a type"),
 }
 """By switch of a dialect, the words that programs may declare then, and what these are: types that the second edition does not
 have, and short names of types."""
 
 
-def refuse_reserved(report: Report, source: Source, name: tree.Name, dialect: Dialect) -> None:
+def refuse_reserved(report: Report, source: Source, name: tree.Name, dialect: Dialect, what: str) -> None:
     """Report a declaration under the name of an elementary type.
 
-    Members of structures may have one: they stand behind a point."""
+    Members of structures may have one: they stand behind a point.  `what` is declared: a POU, a type, a section of variables."""
     if fold(name.text) not in RESERVED:
         return
-    switches = {switch: what for switch, (words, what) in _TAKEN.items() if fold(name.text) in words}
-    taken = [what for switch, what in switches.items() if getattr(dialect, switch)]
+    switches = {switch: meant for switch, (words, meant) in _TAKEN.items()
+                if fold(name.text) in words and (switch != "own_time" or what == "POU")}
+    taken = [meant for switch, meant in switches.items() if getattr(dialect, switch)]
     if not taken:
         report.add("S0101", source, name, f"`{name.text}` is a reserved word and cannot be a name",
                    "".join(("choose another name", *(f", or take {takers(switch)}" for switch in switches))))

@@ -215,7 +215,7 @@ class SymbolTable:
             full = full.partition(".")[2]
 
     def _twice(self, key: tuple[str, str], name: tree.Name, source: Source, what: str) -> bool:
-        refuse_reserved(self.report, source, name, self.dialect)
+        refuse_reserved(self.report, source, name, self.dialect, what)
         other = self.pous.get(key) or self.types.get(key)
         if other is None:
             return False
