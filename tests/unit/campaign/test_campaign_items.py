@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from fbvm.campaign.items.bench import ItemsBench
+from fbvm.campaign.project_copies import copy_project, files_of
 from fbvm.cli.main import main
 from fbvm.net.faults import fault
 from fbvm.run.varied import Conditions, PowerCut, VariedRun, Written
@@ -97,6 +98,16 @@ def test_conditions_are_watched_behind_the_scans_of_a_test(project: Path) -> Non
 def test_what_tests_cannot_have_is_refused(project: Path, arguments: tuple[str, ...], said: str) -> None:
     status, text = fbvm(*arguments)
     assert (status, said in text) == (2, True), text
+
+
+def test_what_tools_have_made_is_no_part_of_a_project_that_is_copied(project: Path) -> None:
+    for name in ("env/pyvenv.cfg", "env/lib/a.py", ".git/config", "src/__pycache__/a.pyc"):
+        (project / name).parent.mkdir(parents=True, exist_ok=True)
+        (project / name).write_text("")
+    (project / "pyvenv.cfg").write_text("")  # the project is an environment itself
+    copy_project(project, project / "build")
+    assert {path.as_posix() for path in files_of(project / "build")} == {
+        "pyvenv.cfg", "pytest.ini", "src/Counter.st", "tests/test_counter.py", "tests/test_st.st"}
 
 
 def test_results_of_tests_belong_to_the_files_that_they_read(project: Path) -> None:

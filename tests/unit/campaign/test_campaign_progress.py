@@ -48,6 +48,14 @@ def test_rates_are_of_this_call_and_failures_are_grouped_by_the_first_run() -> N
                                              "runs": 2, "first": 21}]  # fmt: skip
 
 
+def test_seconds_and_rates_are_told_to_a_tenth() -> None:
+    progress, clock = after_40_of_100()
+    clock.now_s = 3.26
+    progress.add([Result(40)])
+    told = progress.as_dict()
+    assert (told["elapsed_s"], told["rate"], told["present_rate"], told["left_s"]) == (3.3, 9.5, 9.5, 6.2)
+
+
 def test_without_a_second_result_nothing_is_said_of_what_is_left() -> None:
     assert (Progress(100, Clock()).left_s, Progress(100, Clock()).as_dict()["rate"]) == (None, 0)
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fbvm.base.diagnostics import Source
 from fbvm.campaign.axes import axis_from_text
-from fbvm.campaign.plan import Axis, FaultRule, Moments, Plan, PowerRule
+from fbvm.campaign.execution import Result
+from fbvm.campaign.judge import NEVER, Failure
+from fbvm.campaign.plan import EXACT, REAL, Axis, FaultRule, Moments, Plan, PowerRule
 from fbvm.campaign.plan_file import Written, any_faults, read_plan_file
-from fbvm.campaign.shrinking import Part, least
-from fbvm.campaign.variants import draw
+from fbvm.campaign.shrinking import Part, least, shrink
+from fbvm.campaign.variants import STEP_NS, Cut, NamedFault, Variant, draw
 from fbvm.net.faults import NAMED
 from fbvm.run.project import Project
 
@@ -80,6 +83,31 @@ def test_the_fewest_parts_that_fail_are_found() -> None:
     assert len(tried) < 40
 
 
+class FailsIf:
+    """Executes no runs: those for which the rule holds fail."""
+
+    def __init__(self, rule: Callable[[Variant], bool]) -> None:
+        self.rule = rule
+
+    def result(self, variant: Variant) -> Result:
+        return Result(variant.number, failure=Failure(NEVER, "a") if self.rule(variant) else None)
+
+
+def slow_for(lasts_ns: int) -> NamedFault:
+    return NamedFault("slow", replace(NAMED["slow"].fault, from_ns=S, until_ns=S + lasts_ns))
+
+
+def test_a_failing_run_keeps_what_it_fails_by_and_faults_get_as_short_as_they_may() -> None:
+    """Halves of whole steps: 8 ms, 4, 2, 1."""
+    run = Variant(0, 1, (1, 2), (slow_for(8 * STEP_NS), slow_for(S)), (Cut("", S, S),), REAL)
+    with_fault = FailsIf(lambda variant: variant.faults[:1] != () and variant.values[1] == 2)
+    shrunk = shrink(with_fault, run, with_fault.result(run))
+    assert shrunk.variant == Variant(0, 1, (0, 2), (slow_for(STEP_NS),), (), EXACT)
+    assert shrunk.result.failure == Failure(NEVER, "a")
+    with_cut = FailsIf(lambda variant: bool(variant.cuts) and variant.timing == REAL)
+    assert shrink(with_cut, run, with_cut.result(run)).variant == Variant(0, 1, (0, 0), (), run.cuts, REAL)
+
+
 FILE = """[campaign]
 project = "fbvm.toml"
 runs = 100
@@ -115,6 +143,7 @@ def test_a_campaign_file_is_read(tmp_path: Path) -> None:
     (rule,) = found.faults
     assert ([kind for kind, _ in rule.kinds], rule.choices, rule.moments.chance_percent) == (
         ["slow", "silent"], {"latency_ns": (20_000_000, 80_000_000)}, 30)
+    assert rule.moments.lasts_ns == (S // 100, 2 * S), "if nobody says it"
     assert found.cuts[0].moments.begins_ns == (2 * S, 2 * S)
     assert found.judging.responses[0].within_ns == S // 10
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,9 @@ from click.testing import CliRunner
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.base.version import VERSION
-from fbvm.campaign.fleet.shard import GO_ON, OVER, STOP, Figures, Shard, figures, run_shard
+from fbvm.campaign.fleet import shard
+from fbvm.campaign.fleet.places import in_cluster
+from fbvm.campaign.fleet.shard import GO_ON, OVER, RUNNING, STOP, Figures, Shard, figures, run_shard
 from fbvm.campaign.planning import images_of
 from fbvm.campaign.work import packed
 from fbvm.cli.main import main
@@ -96,13 +100,13 @@ def test_doors_that_cannot_count_up_are_refused(change: tuple[str, str], said: s
 
 
 class Line:
-    """The line of a part: what it is told, and what it tells."""
+    """The line of a part: what it is told, and what it tells.  It is told to stop behind its last figures."""
 
     def __init__(self, *told: object) -> None:
         self.told, self.said = list(told), list[Figures]()
 
     def poll(self, wait_s: float = 0.0) -> bool:
-        return bool(self.told)
+        return bool(self.told) and (self.told[0] != STOP or self.said[-1:] != [] and self.said[-1].state == OVER)
 
     def recv(self) -> object:
         return self.told.pop(0)
@@ -119,7 +123,51 @@ def test_a_part_tells_its_figures_and_waits_for_the_stop(folder: Path) -> None:
     last = line.said[-1]
     assert (last.state, last.plcs, last.scans, dict(last.ended)) == (OVER, 6, 600, {"time": 6})
     run_shard(Shard(1, part, packed(images), "0.0.1", 1), line)
-    assert line.said[-1].state == "failed" and "not 0.0.1" in line.said[-1].message
+    assert (line.said[-1].state, line.said[-1].traps) == ("failed", 0) and "not 0.0.1" in line.said[-1].message
+
+
+class Silent(Line):
+    """A line at whose other end nobody is any more."""
+
+    polls = 0
+
+    def poll(self, wait_s: float = 0.0) -> bool:
+        self.polls += 1
+        assert self.polls < 1000, "the part waits for ever"
+        return False
+
+
+def test_a_part_that_hears_nothing_ends(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shard, "UNHEARD_NS", -1)
+    [part] = shards_of(project_of(), 1)
+    line = Silent()
+    run_shard(Shard(0, part, packed(images_of(part)[0]), VERSION), line)
+    assert (line.said[-1].state, line.polls) == (OVER, 1)
+
+
+class Workers:
+    """The client of a cluster with two workers, of which the second has gone away."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[str, object]] = []
+
+    def scheduler_info(self, n_workers: int) -> dict[str, dict[str, object]]:
+        return {"workers": {"w2": {}, "w1": {}}}
+
+    def run(self, work: Callable[..., object], *of: object, workers: object = None, on_error: str = "raise") -> object:
+        self.told.append((work.__name__, workers))
+        return {"w1": {0: Figures(0, RUNNING, 3), 2: Figures(2, OVER, 1)}}
+
+
+def test_parts_in_a_cluster_are_told_by_their_workers() -> None:
+    [part] = shards_of(project_of(), 1)
+    workers = Workers()
+    with in_cluster(nullcontext(workers), lambda count: [Shard(n, part, (), "") for n in range(count + 1)]) as places:  # type: ignore[arg-type]
+        found = {number: (where, each.state, each.plcs, each.message) for number, (where, each) in places.figures().items()}
+        places.stop()
+    assert found == {0: ("w1", RUNNING, 3, ""), 1: ("w2", "failed", 0, "its worker has gone away"), 2: ("w1", OVER, 1, "")}
+    assert [each for each in workers.told if each[0] == "_begin"] == [("_begin", ["w1"]), ("_begin", ["w2"]), ("_begin", ["w1"])]
+    assert [name for name, _ in workers.told[3:]] == ["_figures", "_stop", "_end"]
 
 
 @pytest.mark.slow

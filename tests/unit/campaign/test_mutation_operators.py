@@ -19,6 +19,8 @@ def lines(body: str, head: str = HEAD, without: str = "VRO") -> set[str]:
 
 
 STATEMENTS = {
+    "n := 0;": {"CRO n := 1;", "SDL ;;"},
+    "n := INT#-1;": {"CRO n := INT#0;", "CRO n := INT#-2;", "SDL ;;"},
     "n := n + 1;": {"ARO n := n - 1;", "CRO n := n + 0;", "CRO n := n + 2;", "SDL ;;"},
     "a := b AND NOT c;": {"LRO a := b OR NOT c;", "NIO a := NOT b AND NOT c;", "NIO a := b AND (c);", "SDL ;;"},
     "a := n <= 3;": {"ROR a := n < 3;", "ROR a := n > 3;", "CRO a := n <= 2;", "CRO a := n <= 4;", "SDL ;;"},
