@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from twincat_files import write_tested_solution
@@ -10,9 +12,11 @@ from twincat_files import write_tested_solution
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_text
+from fbvm.code.image import Site
 from fbvm.testing.suites import results
-from fbvm.testing.suites.program import find_suites
-from fbvm.testing.suites.results import SuiteRun, run_suites
+from fbvm.testing.suites.items import OTHERS, SuiteItem, SuiteTestFailed
+from fbvm.testing.suites.program import FoundTest, find_suites
+from fbvm.testing.suites.results import Failure, SuiteRun, SuiteTestResult, run_suites
 from fbvm.testing.suites.xunit import write_xunit
 
 pytest_plugins = ["pytester"]
@@ -65,6 +69,34 @@ def test_the_line_of_a_failure_is_that_of_the_assertion_with_its_message() -> No
     assert one.asserts == (("five", 5), ("four", 6))
     assert one.line_of("EXP: 5, ACT: 4, MSG: four") == 6
     assert one.line_of("EXP: 5, ACT: 4, MSG: six") is None
+
+
+def item(suite: str, test: FoundTest, **parts: object) -> SuiteItem:
+    """A test of a suite apart from pytest's session."""
+    made = SuiteItem.__new__(SuiteItem)
+    made.__dict__.update(suite=suite, test=test)
+    made.parent, made.session = SimpleNamespace(subject=None), SimpleNamespace(items=[])  # type: ignore[assignment]
+    return made
+
+
+def test_a_failure_is_told_at_its_statement_or_that_of_its_message_or_its_test() -> None:
+    [suite] = find_suites([Source("a.st", SUITE + PROGRAM.format("a : FB_A_Test;"))])
+    known = Failure("EXP: 5, ACT: 4, MSG: four", 3, 30_000_000, Site("b.st", "Helper", 9, 1))
+    failures = [replace(known, site=None), known, replace(known, text="MSG: made up")]
+    failures[2].site = None
+    assert item("PRG_TEST.a", suite.tests[0])._said(SuiteTestFailed("PRG_TEST.a", "one", failures, "")).splitlines() == [
+        "a.st:6: in PRG_TEST.a, test one, scan 3 (30ms)", ">   ", "E   EXP: 5, ACT: 4, MSG: four",
+        "b.st:9: in PRG_TEST.a, test one, scan 3 (30ms)", ">   ", "E   EXP: 5, ACT: 4, MSG: four",
+        "a.st:4: in PRG_TEST.a, test one, scan 3 (30ms)", "E   MSG: made up"]  # fmt: skip
+
+
+def test_tests_whose_names_are_made_up_by_the_program_are_one_of_pytest() -> None:
+    [suite] = find_suites([Source("a.st", SUITE + PROGRAM.format("a : FB_A_Test;"))])
+    others = item("PRG_TEST.a", FoundTest(OTHERS, "a.st", 1))
+    others.session.items += [item("PRG_TEST.a", suite.tests[0]), item("PRG_TEST.b", suite.tests[1])]
+    own, own_two, foreign = (SuiteTestResult(True, False, False, 1, 0.0) for _ in range(3))
+    found = {("PRG_TEST.a", "one"): own, ("PRG_TEST.a", "two"): own_two, ("PRG_TEST.b", "two"): foreign}
+    assert others._results(SimpleNamespace(results=found)) == [("two", own_two)]  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

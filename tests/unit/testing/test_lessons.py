@@ -135,6 +135,13 @@ def test_a_class(tmp_path: Path) -> None:
         assert opened.at(4).read("CIO 100.00") is True
 
 
+def test_a_class_in_which_nobody_has_begun(tmp_path: Path) -> None:
+    (tmp_path / "class" / "anna").mkdir(parents=True)
+    results = check_class(tmp_path / "class", tmp_path / "out")
+    assert results == {"anna": {}}
+    assert "anna" in report(results, lessons(), tmp_path / "out") and (tmp_path / "out").is_dir()
+
+
 def test_predictions_are_read(tmp_path: Path) -> None:
     test = str(tmp_path / "test_lesson.py")
     with pytest.raises(AssertionError, match="cannot be read"):

@@ -183,15 +183,16 @@ def test_a_program_with_stubs_on_a_network(project: pytest.Pytester) -> None:
 
         def test_reads(plc, network):
             network.place(Peer("192.168.250.1", 502), ModbusPeer())
-            main = plc("main.st", etn21="192.168.250.21", network=network)
+            main = plc("line.st", etn21="192.168.250.21", network=network)
             main.until("Link.ENO", max="5s")
             assert main.Main.Seconds == 3
 
         def test_without_the_link(plc):
-            main = plc("main.st", stubs={"MTCP_ETN_Connect": "ENO := EN;"}).scan()
+            main = plc("line.st", stubs={"MTCP_ETN_Connect": "ENO := EN;"}).scan()
             assert main.Link.ENO and main["Main.Link.ENO"]
     """)
-    (project.path / "main.st").write_text("""\
+    (project.path / "line.st").write_text("""\
+FUNCTION_BLOCK Spare VAR n : INT; END_VAR n := 1; END_FUNCTION_BLOCK
 PROGRAM Main
 VAR Link : MTCP_ETN_Connect; Seconds : INT := 3; END_VAR
     Link(EN := TRUE, Connect := TRUE, IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1);
