@@ -211,8 +211,11 @@ QUESTIONS = {
                     "Init is the variable, Init.X and Init.T are the flags of the step, with a warning (S0193)"),
     "locals_hide_results": ("FUNCTION Test with VAR Test: a local variable named as the function", "an error",
                             "the variable, and the function returns the first value of its type, with a warning (S0193)"),
-    "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts",
-                  "as the standard's bodies compute it", "blocks of its own"),
+    "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts; "
+                  "REAL_TO_STRING(100.0), TIME_TO_STRING(T#1s); functions beyond the standard",
+                  "as the standard's bodies compute it; '100.0', 'T#1s'; none",
+                  "blocks and functions of its own; under matiec '100', 'T#0d0h0m1s'; LEFT_EXT and its like and ROUND "
+                  "under rusty, TIME_TO_US under strucpp"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
 }
 """For each switch: what compilers disagree about, the answer without it, and with it."""
@@ -241,11 +244,12 @@ _ROWS = (
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
             wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
-            ("codesys/blocks", "matiec/additional"),
+            ("codesys/blocks", "matiec/additional", "strucpp"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
             constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True),
-    Dialect("rusty", "programs for RuSTy", reals_of_other_widths=True, loop_ends_each_pass=True, loop_counters_wrap=True,
+    Dialect("rusty", "programs for RuSTy", ("rusty",), reals_of_other_widths=True, loop_ends_each_pass=True,
+            loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,

@@ -12,7 +12,7 @@ from fbvm.check.expressions.assignability import assignable, converted_by_dialec
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import warn_of_written_counter, writable
 from fbvm.check.symbols.facts import Guard
-from fbvm.check.symbols.vendor_names import comma_hint
+from fbvm.check.symbols.vendor_names import comma_hint, format_hint
 from fbvm.syntax import tree
 
 MIXED = "a call names all of its parameters or none"
@@ -72,7 +72,8 @@ class Arguments:
         """True if every parameter has a value; one that is named without a value has none."""
         least = len(self.names)
         if len(given) > least and not self.repeats:
-            self.error("S0402", self.call, self._takes(len(given)), comma_hint(self.scope.text(self.call)))
+            self.error("S0402", self.call, self._takes(len(given)),
+                       comma_hint(self.scope.text(self.call)) or format_hint(callee(self.call), len(given)))
             return False
         count = max(least, 1 + max(given, default=0)) if least else 0
         missing = [self._name(i) for i in islice((i for i in range(count) if i not in values), NAMED)]

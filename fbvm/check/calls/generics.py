@@ -119,12 +119,16 @@ def _types(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> dict[s
 
 
 def _arguments(scope: Scope, call: tree.Call, pou: Pou) -> Iterator[tuple[str, Type | None, tree.Expr, bool]]:
-    """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter."""
+    """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter.
+
+    A text that takes an output may be shorter or longer, as in assignments."""
     names = variables(pou.tree)
     as_is = passed_as_is(pou, scope.project)
     for name, value, section in _given(call, pou):
         if name in names and name not in as_is:
-            yield names[name], scope.infer(value), value, section != "VAR_INPUT"
+            kind = scope.infer(value)
+            free = section == "VAR_OUTPUT" and isinstance(kind, StringType)
+            yield names[name], kind, value, section != "VAR_INPUT" and not free
 
 
 def _settled(scope: Scope, call: tree.Call, pou: Pou, name: str, kind: Type | None, want: Type | None) -> Type | None:

@@ -23,7 +23,7 @@ FUNCTIONS = {
     **{name: f"write TO_{name}(x)" for name in (*ELEMENTARY, "STRING", "WSTRING", "TOD", "DT", "LTOD", "LDT")},
     "SWITCH": "a choice among values is CASE x OF 1: .. END_CASE", "POW": "write a ** b, or EXPT(a, b)",
     "POWER": "write a ** b, or EXPT(a, b)", "FABS": "write ABS", "SQR": "write x * x", "LOG10": "write LOG",
-    "ROUND": "a conversion rounds: REAL_TO_DINT(x)", "FLOOR": "TRUNC(x) drops the fraction",
+    "FLOOR": "TRUNC(x) drops the fraction",
     "CEIL": "TRUNC(x) drops the fraction", "FLOAT": "write TO_REAL(x)",
     "BOOL": "compare it: x <> 0", "STR": "write TO_STRING(x)", "STRLEN": "write LEN", "STRCAT": "write CONCAT",
     "STRCMP": "compare texts with =", "STRCPY": "assign it: a := b", "SUBSTR": "write MID(text, length, position)",
@@ -37,9 +37,15 @@ TYPES = {
     "LONGREAL": "LREAL", "CARDINAL": "UDINT", "QWORD": "LWORD", "TEXT": "STRING",
 }
 """Names of elementary types, and ours."""
-_BY_DIALECT = (r"PID|DERIVATIVE|RAMP|RTC|SEMA|LOGGER|LOGLEVEL|HMI_(?:NODE|BOOL|[US]?INT|U?[DL]INT|REAL|STRING)|"
-               r"python_(?:eval|poll|gear)|csv_read_by_(?:string|int)|csv_reload")
-"""Types and blocks of `fblib/matiec`, which only a dialect brings."""
+_BY_DIALECT = (
+    (r"PID|DERIVATIVE|RAMP|RTC|SEMA", "a block of Beremiz and OpenPLC: --dialect matiec or strucpp brings it"),
+    (r"LOGGER|LOGLEVEL|HMI_(?:NODE|BOOL|[US]?INT|U?[DL]INT|REAL|STRING)|python_(?:eval|poll|gear)|csv_read_by_(?:string|int)|"
+     r"csv_reload", "a block of Beremiz and OpenPLC: --dialect matiec brings it"),
+    (r"(?:LEFT|RIGHT|MID|INSERT|DELETE|REPLACE|CONCAT)_EXT", "a function of RuSTy: --dialect rusty brings it"),
+    (r"ROUND", "a function of RuSTy, which --dialect rusty brings; a conversion rounds, too: REAL_TO_DINT(x)"),
+    (r"TIME_TO_US", "a function of STruC++: --dialect strucpp brings it"),
+)
+"""Patterns of the names of types, blocks and functions that only a dialect brings, and what they are."""
 _LIBRARIES = (
     (r"MC_\w+|AXIS_REF\w*|_MC_\w+", "PLCopen's motion control (Tc2_MC2, SM3_Basic and their like)"),
     (r"ADS(?:READ|WRITE|RDWRT|RDSTATE|WRTCTL|LOG)\w*|FB_(?:File|EOF|SimpleAdsLogEvent)\w*|T_AmsNetId\w*|T_AmsPort|"
@@ -71,12 +77,20 @@ def duration(name: str) -> str:
 
 def library_of(name: str) -> str:
     """A hint for an unknown name that comes from a library of a vendor; "" for any other."""
-    if re.fullmatch(_BY_DIALECT, name, re.IGNORECASE):
-        return "it is a block of Beremiz and OpenPLC: --dialect matiec brings it"
+    for pattern, what in _BY_DIALECT:
+        if re.fullmatch(pattern, name, re.IGNORECASE):
+            return f"it is {what}"
     for pattern, library in _LIBRARIES:
         if re.fullmatch(pattern, name.rpartition(".")[2] if "." in name else name, re.IGNORECASE):
             return f"it comes from {library}, which fbvm does not bring: give its source, or one of your own, with the files"
     return ""
+
+
+def format_hint(name: str, given: int) -> str:
+    """A hint for BYTE_TO_STRING(b, '%02X'); "" for other calls."""
+    if given != 2 or not re.fullmatch(r"\w+_TO_STRING", name, re.IGNORECASE):
+        return ""
+    return "the format is one of PC WORX, in no dialect here: leave it out, or write BYTE_TO_HEXSTR(x, 2, FALSE) or its like"
 
 
 _COMMA = re.compile(r"(?<![\w.#,\[])([0-9]+),([0-9]+)(?![\w#,\]])")
