@@ -56,7 +56,7 @@ class Desk:
         protocol = self.server.protocol
         protocol.handle_message(protocol.structure_message({"jsonrpc": "2.0", "method": method, "params": params}))
 
-    async def _until(self, done: Callable[[], bool]) -> None:
+    async def until(self, done: Callable[[], bool]) -> None:
         async def wait() -> None:
             while not done():
                 self._news.clear()
@@ -70,7 +70,7 @@ class Desk:
         protocol = self.server.protocol
         protocol.handle_message(protocol.structure_message(
             {"jsonrpc": "2.0", "id": number, "method": method, "params": params}))
-        await self._until(lambda: number in self._answers)
+        await self.until(lambda: number in self._answers)
         return self._answers.pop(number)
 
     async def ask(self, method: str, **params: Any) -> Any:
@@ -118,7 +118,7 @@ class Desk:
 
     async def shows(self, name: str, *codes: str) -> None:
         """Wait until a file shows these diagnostics."""
-        await self._until(lambda: self.codes(name) == list(codes))
+        await self.until(lambda: self.codes(name) == list(codes))
 
     async def checked(self) -> None:
         """Wait until everything is checked."""

@@ -8,6 +8,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.check.spelling import OUTSIDE
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.formatter.layout import WIDTH, shifted
 
@@ -366,3 +367,14 @@ def test_a_pragma_without_end_in_what_reads_as_an_instruction_list_is_left_as_it
     text = f"FUNCTION_BLOCK A\n{declared}    b := R;\nEND_FUNCTION_BLOCK\n"
     same, wrong = formatted(Source("a.st", text))
     assert same == text and wrong
+
+
+def test_names_are_spelled_as_declared_also_those_of_libraries_and_of_enumerations_in_a_variable() -> None:
+    loose = "PROGRAM p VAR t : ton; c : (Red, Green); END_VAR t(); c := RED; END_PROGRAM"
+    text, wrong = formatted(Source("a.st", loose), OUTSIDE)
+    assert wrong == [] and "    t : TON;\n" in text and "    c := Red;\n" in text
+
+
+def test_all_comments_in_front_of_a_semicolon_are_kept() -> None:
+    assert body("x := 1 // one\n// two\n// three\n; // four\ny := 2;") == (
+        "x := 1;  // one\n// two\n// three\n// four\ny := 2;\n")

@@ -69,6 +69,20 @@ DRAWINGS = {
         ├──┤↑├────┤↓├───┤ UP ├──────(↑)──┤
         │               └────┘           │
     """),
+    "boxes whose names begin as those of contacts": ("LD a\nANDW D1 D2 D3\nORW D1 D2 D3", """
+        │   a         ┌──────┐ │
+        ├──┤ ├─┬──────┤ ANDW │ │
+        │      │      │ D1   │ │
+        │      │      │ D2   │ │
+        │      │      │ D3   │ │
+        │      │      └──────┘ │
+        │      │       ┌─────┐ │
+        │      └───────┤ ORW │ │
+        │              │ D1  │ │
+        │              │ D2  │ │
+        │              │ D3  │ │
+        │              └─────┘ │
+    """),
     "a box with two inputs": ("LD a\nLD b\nLD c\nANDLD\nCNT 5 #10", """
         │   a          ┌─────┐ │
         ├──┤ ├─────────┤ CNT │ │
