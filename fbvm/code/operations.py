@@ -3,7 +3,7 @@
 Code is plain data: nested tuples whose first item names the operation.  *Expressions* are `(name, type, *operands)` and
 have no effect but a trap; *statements* are `(name, *operands)`.  `type` is a machine type:
 
-    b            BOOL, 0 or 1 (a byte <> 0 is 1)  f32 f64   REAL, LREAL (NaN is stored canonical)
+    b            BOOL, 0 or 1 (a byte <> 0 is 1)  f32 f64   REAL, LREAL (a computed NaN is canonical)
     i8 .. i64    signed, two's complement         s8  s16   STRING, WSTRING: characters without the ending 0
     u8 .. u64    unsigned, bit strings            ref       a reference (64 bits: object << 40 | offset << 8 | bit)
 

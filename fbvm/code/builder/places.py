@@ -11,6 +11,9 @@ from fbvm.code.operations import SIZES, Address, Node
 Detail = tuple[object, Address, int]
 """What the observation of a read or write carries: machine type, address, and the bit or WHOLE_BYTES."""
 
+_BITS = {"f32": "u32", "f64": "u64"}
+"""By machine type of a float: the one of its bits."""
+
 
 @dataclass(slots=True)
 class Place:
@@ -74,6 +77,9 @@ class Place:
             return ("store_bit", self.address, self.bit, value)
         if form == "b" and self.is_reference:
             return ("store_flag", self.address, value)
+        if form in _BITS and value[0] in ("load", "load_raw"):  # a REAL is copied as a structure is: no look at NaN
+            form = _BITS[form]
+            value = (value[0], form, value[2])
         return ("store" if self.is_aligned(SIZES[form]) else "store_raw", form, self.address, value)
 
     def reference(self) -> Node:

@@ -1,7 +1,7 @@
 """REAL and LREAL as the bits of IEEE 754: what can be said of them exactly without arithmetic.
 
-Read as numbers of sign and magnitude the bits are in the order of the values; NaN is in no order, and the zeros are equal.  NaN
-is stored canonical, so that the same bits are the same value."""
+Read as numbers of sign and magnitude the bits are in the order of the values; NaN is in no order, and the zeros are equal.  A NaN
+that is computed is canonical, so that the same bits are the same value."""
 
 from __future__ import annotations
 
@@ -40,18 +40,22 @@ def _is_set(terms: Terms, a: Term) -> Term:
 
 
 def negated(terms: Terms, a: Term) -> Term:
-    """-a; of NaN itself."""
-    return terms.ite(is_nan(terms, a), a, terms.bitwise("bvxor", a, terms.constant(a.width, 1 << a.width - 1)))
+    """-a."""
+    return terms.ite(is_nan(terms, a), _nan(terms, a.width), terms.bitwise("bvxor", a, terms.constant(a.width, 1 << a.width - 1)))
+
+
+def _nan(terms: Terms, width: int) -> Term:
+    """The canonical NaN."""
+    return terms.constant(width, ((1 << width - 1) - 1) >> MANTISSA_BITS[width] - 1 << MANTISSA_BITS[width] - 1)
 
 
 def magnitude(terms: Terms, a: Term) -> Term:
     """The value without its sign."""
-    return terms.extend(terms.extract(a, 0, a.width - 1), a.width, False)
+    return terms.ite(is_nan(terms, a), _nan(terms, a.width), terms.extend(terms.extract(a, 0, a.width - 1), a.width, False))
 
 
 def extreme(terms: Terms, a: Term, b: Term, least: bool) -> Term:
     """The lesser or the greater of two, a if they are equal, NaN if one is NaN."""
-    nan = terms.constant(a.width, ((1 << a.width - 1) - 1) >> MANTISSA_BITS[a.width] - 1 << MANTISSA_BITS[a.width] - 1)
     wrong = terms.or_(is_nan(terms, a), is_nan(terms, b))
     first = less(terms, a, b, True) if least else less(terms, b, a, True)
-    return terms.ite(wrong, nan, terms.ite(first, a, b))
+    return terms.ite(wrong, _nan(terms, a.width), terms.ite(first, a, b))
