@@ -1,4 +1,7 @@
-"""Charges to the step budget in machine code, and the question whether a run may go on (see `fbvm.engine.allowance`)."""
+"""Charges to the step budget in machine code, and the question whether a run may go on (see `fbvm.engine.allowance`).
+
+`@ask` is called so rarely that it keeps all registers itself (`preserve_mostcc`): else each body would save some at its
+beginning, for calls that hardly ever take place."""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from fbvm.engine.native.emit.context import FIELDS
 from fbvm.engine.native.emit.writer import Writer
 
 ASK = f"""
-define internal i64 @ask(ptr %c, i64 %left) #7 {{
+define internal preserve_mostcc i64 @ask(ptr %c, i64 %left) #7 {{
 entry:
 %ask_at = getelementptr inbounds i8, ptr %c, i64 {FIELDS["ask"]}
 %function = load ptr, ptr %ask_at
@@ -34,7 +37,7 @@ def charge(w: Writer, count: int, site: int) -> None:
     asking, going = w.label("x"), w.label()
     w.unlikely(w.new(f"icmp slt i64 {left}, {w.new('load i64, ptr ' + w.field('least'))}"), asking, going)
     with w.aside(asking):
-        least, ending = w.new(f"call i64 @ask(ptr %c, i64 {left}) #7"), w.label("x")
+        least, ending = w.new(f"call preserve_mostcc i64 @ask(ptr %c, i64 {left}) #7"), w.label("x")
         w.emit(f"br i1 {w.new(f'icmp slt i64 {left}, {least}')}, label %{ending}, label %{going}")
         w.emit(f"{ending}:")
         w.end("R0104", site)
