@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from drawings import plc as running
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -147,12 +148,28 @@ def test_an_import_names_the_dialect_of_its_sources(tmp_path: Path) -> None:
     assert "these sources are written for --dialect matiec: the header names Beremiz" in done.output
 
 
-def test_texts_get_the_quotes_that_their_tool_leaves_out() -> None:
-    given = (("a", "42 pcs"), ("b", "&quot;it's&quot;"), ("c", "'done'"), ("d", "Name"))
-    declared = "".join(variable(name, "<string/>", value) for name, value in given)
-    made = import_xml(project(f"<localVars>{declared}</localVars>", "a := b;"))
-    values = [line.split(" := ")[1] for line in made.files["Main.st"].splitlines() if "STRING" in line]
-    assert values == ["'42 pcs';", "'it$'s';", "'done';", "Name;"]
+@pytest.mark.parametrize(("family", "value", "kind", "text"), [
+    ("CODESYS", "42 pcs", "string", "'42 pcs'"), ("CODESYS", "&quot;it's&quot;", "string", "'it$'s'"),
+    ("CODESYS", "'done'", "string", "'done'"), ("CODESYS", "Name", "string", "Name"), ("CODESYS", "42 pcs", "wstring", '"42 pcs"'),
+    ("Beremiz", "42 pcs", "string", "'42 pcs'"), ("Beremiz", "&quot;it's&quot;", "string", "'\"it$'s\"'"),
+    ("Beremiz", "'done'", "string", "'done'"), ("Beremiz", "Name", "string", "'Name'"), ("Beremiz", "STRING#'a'", "string", "STRING#'a'"),
+    ("Beremiz", "Name", "wstring", '"Name"'), ("Beremiz", "&quot;done&quot;", "wstring", '"done"'),
+])
+def test_texts_get_the_quotes_that_their_tool_leaves_out(family: str, value: str, kind: str, text: str) -> None:
+    header = f'<fileHeader companyName="" productName="{family}"/>'
+    made = import_xml(project(f"<localVars>{variable('a', f'<{kind}/>', value)}</localVars>", ";", header=header))
+    [line] = [line for line in made.files["Main.st"].splitlines() if "STRING" in line]
+    assert line.split(" := ")[1] == f"{text};"
+
+
+@pytest.mark.parametrize(("family", "length"), [("Beremiz", 5), ("CODESYS", 3)])
+def test_double_quotes_of_a_string_are_characters_where_its_tool_has_them_so(family: str, length: int) -> None:
+    header = f'<fileHeader companyName="" productName="{family}"/>'
+    declared = variable("a", "<string/>", "&quot;abc&quot;") + variable("n", "<INT/>", "0")
+    made = import_xml(project(f"<localVars>{declared}</localVars>", "n := LEN(a);", header=header))
+    machine = running(made)
+    machine.scan()
+    assert machine.read("Main.n") == length
 
 
 @pytest.mark.slow

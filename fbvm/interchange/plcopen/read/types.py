@@ -12,6 +12,7 @@ _LATER = frozenset(("LTIME", "LDATE", "LDT", "LTOD", "CHAR", "WCHAR"))
 """Types of edition 3, which some documents have in the same way; they are read and not written."""
 _CONSTANT = re.compile(r"[^\W\d]\w*|W?STRING#.*")
 """What a text may begin with that is no literal: the name of a constant; or a literal that names its type."""
+_TEXT = re.compile(r"(HMI_)?STRING(\[.*\])?")
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})(\.\d{1,9})?")
 _DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
@@ -79,8 +80,8 @@ _WRITERS = {"array": _array, "derived": _derived, "enum": _enum, "struct": _stru
 
 
 def value_text(holder: Element | None, kind: str = "", family: str = "") -> str:
-    """The value in `initialValue` and its like; "" if there is none.  What a STRING begins with gets the quotes that it lacks:
-    some tools leave them out, or write those of a WSTRING; Beremiz knows no names of constants there."""
+    """The value in `initialValue` and its like; "" if there is none.  What a STRING begins with gets the quotes that it lacks
+    (`quoted`)."""
     inner = next((part for part in holder.children if part.name.endswith("Value")), None) if holder else None
     if inner is None:
         return ""
@@ -94,11 +95,23 @@ def value_text(holder: Element | None, kind: str = "", family: str = "") -> str:
         fields = [f"{v.get('member')} := {value_text(v)}" for v in inner.all("value")]
         return f"({', '.join(fields)})" if fields else ""
     text = inner.get("value").strip()
-    if not re.fullmatch(r"(HMI_)?STRING(\[.*\])?", kind) or not text or text[0] == "'" or (
-            family != "beremiz" and _CONSTANT.fullmatch(text)):
+    quote = "'" if _TEXT.fullmatch(kind) else '"' if kind.startswith("WSTRING") else ""
+    return quoted(text, quote, family) if quote and text else text
+
+
+def quoted(text: str, quote: str, family: str) -> str:
+    """What a STRING or WSTRING begins with, between its quotes.  Beremiz puts quotes around whatever has none of its own kind:
+    in `"abc"` of a STRING, the double quotes are characters of the text on its PLC.  Other tools may name a constant, and
+    double quotes of a STRING can only be meant as its quotes, since a STRING takes no literal of a WSTRING.
+
+    >>> print(quoted('"abc"', "'", "beremiz"), quoted('"abc"', "'", "codesys"))
+    '"abc"' 'abc'
+    """
+    if quote in (text[0], text[-1]) or (family != "beremiz" and _CONSTANT.fullmatch(text)):
         return text
-    text = text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
-    return "'" + text.replace("'", "$'") + "'"
+    if family != "beremiz" and len(text) > 1 and text[0] == text[-1] and text[0] in "'\"":
+        text = text[1:-1]
+    return quote + text.replace(quote, f"${quote}") + quote
 
 
 def location(element: Element) -> str:
