@@ -31,8 +31,9 @@ DIALECT, ORDER = "matiec", "document"
 GENERATE = """
 import builtins, os, sys
 from types import ModuleType
+from lxml import etree
 
-home, document, text = sys.argv[1:4]
+home, document, text, *libraries = sys.argv[1:]
 sys.path.insert(0, home)
 os.chdir(home)
 import fake_wx
@@ -52,12 +53,44 @@ for name in ("controls", "controls.CustomToolTip", "dialogs"):
 builtins._ = lambda text: text
 from PLCControler import PLCControler
 
-controller = PLCControler()
+
+
+class Controller(PLCControler):
+    variables = []
+
+    def AddConfNodeTypesList(self, libraries):
+        self.ConfNodeTypes.extend(libraries)
+        for library in libraries:
+            for pou in library["types"].getpous():
+                found = pou.getblockInfos()
+                self.TotalTypesDict.setdefault(found["name"], []).append((library["name"], found))
+
+    def GetConfNodeGlobalInstances(self):
+        return self.variables
+
+
+types = []
+for library in libraries:
+    one = Controller()
+    one.OpenXMLFile(library)
+    one.AddConfNodeTypesList(types)
+    types.append({"name": library, "types": one.Project})
+controller = Controller()
+controller.AddConfNodeTypesList(types)
 controller.OpenXMLFile(document)
+for place, _, names in os.walk(os.path.dirname(document)):
+    for name in names if "@" in place else ():
+        if name.endswith(".xml"):
+            tree = etree.parse(os.path.join(place, name))
+            controller.variables += [(one.get("name"), one.get("type"), one.get("initial", ""))
+                                     for one in tree.iterfind("./{*}variables/{*}variable")]
 result = controller.GenerateProgram(text)
 print(result[1:], file=sys.stderr)
 """
-"""A program for PYTHON that has Beremiz write the text of a document, without its windows."""
+"""A program for PYTHON that has Beremiz write the text of a document, without its windows: with the types of its libraries, and
+with the variables that extensions beside the document bring along."""
+LIBRARIES = ("NativeLib.xml", "py_ext/pous.xml", "svghmi/pous.xml")
+"""Documents of Beremiz's own libraries, each after those that it needs."""
 
 
 class Judge:
@@ -87,7 +120,8 @@ class Judge:
     def _judge(self, image: Image, document: Path, name: str, again: str) -> None:
         text = self.folder / "generated.st"
         text.unlink(missing_ok=True)
-        done = subprocess.run([self.python, "-c", GENERATE, str(self.home), str(document.resolve()), str(text)],
+        libraries = [str(self.home / library) for library in LIBRARIES]
+        done = subprocess.run([self.python, "-c", GENERATE, str(self.home), str(document.resolve()), str(text), *libraries],
                               capture_output=True, text=True, timeout=120, check=False)
         said = "" if text.exists() else (done.stderr.strip().splitlines() or ["nothing"])[-1][:100]
         if not self.made.note(f"generated{again}", name, said):
