@@ -150,9 +150,11 @@ def test_an_import_names_the_dialect_of_its_sources(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("family", "value", "kind", "text"), [
     ("CODESYS", "42 pcs", "string", "'42 pcs'"), ("CODESYS", "&quot;it's&quot;", "string", "'it$'s'"),
-    ("CODESYS", "'done'", "string", "'done'"), ("CODESYS", "Name", "string", "Name"), ("CODESYS", "42 pcs", "wstring", '"42 pcs"'),
+    ("CODESYS", "'done'", "string", "'done'"),
+    ("CODESYS", "Name", "string", "Name"), ("CODESYS", "42 pcs", "wstring", '"42 pcs"'),
     ("Beremiz", "42 pcs", "string", "'42 pcs'"), ("Beremiz", "&quot;it's&quot;", "string", "'\"it$'s\"'"),
-    ("Beremiz", "'done'", "string", "'done'"), ("Beremiz", "Name", "string", "'Name'"), ("Beremiz", "STRING#'a'", "string", "STRING#'a'"),
+    ("Beremiz", "'done'", "string", "'done'"),
+    ("Beremiz", "Name", "string", "'Name'"), ("Beremiz", "STRING#'a'", "string", "STRING#'a'"),
     ("Beremiz", "Name", "wstring", '"Name"'), ("Beremiz", "&quot;done&quot;", "wstring", '"done"'),
 ])
 def test_texts_get_the_quotes_that_their_tool_leaves_out(family: str, value: str, kind: str, text: str) -> None:
