@@ -68,13 +68,15 @@ class Chart:
         diagram = read_diagram(self.reading, body, chart=True)
         if len(body.children) > LARGEST:
             raise NotImportable(body, f"the chart has more than {LARGEST} elements", "")
-        arrows = [self._arrow(transition) for transition in body.all("transition")]
+        arrows = [arrow for transition in body.all("transition") if (arrow := self._arrow(transition)) is not None]
         blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
         self.conditions.compute(diagram)
-        ways = [line for arrow in sorted(arrows, key=_order(arrows)) for line in self._transition(arrow, diagram)]
+        generates = self.reading.producer.generates
+        tested = self._met(body, arrows) if generates else sorted(arrows, key=_order(arrows))
+        ways = [line for arrow in tested for line in self._transition(arrow, diagram)]
         compute = self._free(COMPUTE) if self.conditions.statements else ""
         begin = next(step for step in steps if step.get("initialStep") == "true")
-        if self.reading.producer.generates:
+        if generates:
             steps = self._generated(steps, arrows)
         lines = [line for step in steps
                  for line in self._step(step, blocks.get(step.get("localId")), compute if step is begin else "")]
@@ -95,6 +97,48 @@ class Chart:
                 found[name] = by_name[name]
                 todo += reversed([target for arrow in arrows if name in arrow.sources for target in arrow.targets])
         return [*found.values(), *(step for step in steps if self._name(step) not in found)]
+
+    def _met(self, body: Element, arrows: list[Arrow]) -> list[Arrow]:
+        """The transitions in the order in which the generator of Beremiz meets them, which is that of their tests: it goes
+        through the elements as they are written, and from each against the wires first."""
+        by_element = {arrow.element: arrow for arrow in arrows}
+        by_name = {self._name(step): step for step in body.all("step")}
+        seen: set[Element] = set()
+        met: list[Arrow] = []
+
+        def visit(element: Element) -> Iterator[Element]:
+            """The elements that come before one."""
+            seen.add(element)
+            arrow = by_element.get(element)
+            if arrow is None:
+                yield from self._leading(element)
+            else:
+                yield from (by_name[name] for name in arrow.sources)
+                met.append(arrow)
+
+        for element in body.children:
+            todo = [visit(element)] if element.name in ("step", "transition", "jumpStep") and element not in seen else []
+            while todo:
+                before = next(todo[-1], None)
+                if before is None:
+                    todo.pop()
+                elif before not in seen:
+                    todo.append(visit(before))
+        return met
+
+    def _leading(self, element: Element) -> list[Element]:
+        """The transitions that lead to a step or a jump, in the order of the wires."""
+        found: list[Element] = []
+        todo, seen = [element], set()
+        while todo:
+            for reference in _references(todo.pop(0)):
+                other = self.known.get(reference)
+                if other is not None and other.name == "transition":
+                    found.append(other)
+                elif other is not None and other.name in PASSING and reference not in seen:
+                    seen.add(reference)
+                    todo.append(other)
+        return found
 
     def _rename(self, steps: list[Element]) -> None:
         """Give other names to steps that are called like a variable, an action, or a step of another chart of the POU: in
@@ -209,9 +253,14 @@ class Chart:
 
     # --- transitions ---
 
-    def _arrow(self, transition: Element) -> Arrow:
+    def _arrow(self, transition: Element) -> Arrow | None:
+        """Where a transition leads; None if its tool leaves it out."""
         sources = self._above(transition)
         targets = self._below(transition)
+        if not sources and self.reading.producer.generates:
+            self.reading.report("X0292", transition, f"no step stands above transition {transition.get('localId')}: Beremiz and "
+                                "OpenPLC Editor leave it out", "wire it to the step that it leaves")
+            return None
         for found, where in ((sources, "above"), (targets, "below")):
             if not found:
                 raise NotImportable(transition, f"no step stands {where} transition {transition.get('localId')}", "")

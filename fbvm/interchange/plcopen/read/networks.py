@@ -108,11 +108,12 @@ def _generated(free: list[Object], groups: list[list[Object]], scope: Scope, ord
     made, cut = sequence(free, order)
     place = {item: at for at, item in enumerate(made)}
     known = accesses(free, scope)
+    effects = {item: _with_leaves(item, known) for item in free}
     for group in groups:
         group.sort(key=place.__getitem__)
     groups.sort(key=lambda group: place[group[0]])
     found = []
-    for group in (one for mixed in _mixed(groups, place) for one in _parted(mixed, place, known)):
+    for group in (one for mixed in _mixed(groups, place) for one in _parted(mixed, place, effects)):
         loops = {(item, wire) for item, wire in cut if item in set(group)}
         if len(group) > LARGEST or len(loops) > MOST_LOOPS:
             found.append(_refused(group))
@@ -155,6 +156,14 @@ def _parted(mixed: list[list[Object]], place: dict[Object, int], known: dict[Obj
 def _interfere(first: list[Object], second: list[Object], place: dict[Object, int], known: dict[Object, Access]) -> bool:
     """Whether it matters that all of `first` is evaluated in front of all of `second`."""
     return any(place[early] > place[late] and known[early].conflicts(known[late]) for early in first for late in second)
+
+
+def _with_leaves(item: Object, known: dict[Object, Access]) -> Access:
+    """What an object reads and writes, with the variables that a generator reads anew where it writes the object."""
+    if item.kind not in SINKS:
+        return known[item]
+    leaves = (leaf for leaf in _leaves(item) if leaf in known and (leaf.kind != "block" or leaf.instance))
+    return Access(known[item].reads.union(*(known[leaf].reads for leaf in leaves)), known[item].writes)
 
 
 def _rereads(group: list[Object], known: dict[Object, Access]) -> bool:
