@@ -274,3 +274,25 @@ def test_a_condition_that_ends_with_a_semicolon(text: str) -> None:
                    value(9, text), declared="a b x")
     assert beside.errors == []
     assert states(beside, "x", ["a=1 b=1", "b=0"]) == ["0", "1"]
+
+
+FORKED = pou(step(1, "s", "9", first=True) + node("selectionDivergence", 2, "1") + transition(3, "2", inline("go"), at="90,0")
+             + step(4, "right", "3") + transition(5, "2", inline("go"), at="10,0") + step(6, "left", "5")
+             + transition(7, "4", inline("back")) + transition(8, "6", inline("back"))
+             + node("selectionConvergence", 9, "7 8") + actions(10, "4", does("x")) + actions(11, "6", does("y")),
+             "go back x y", language="SFC")
+
+
+@each_of(("order", "seen"), [("document", ["0 0", "1 0"]), ("network", ["0 0", "0 1"])])
+def test_a_selection_of_beremiz_is_tested_in_the_order_in_which_its_generator_meets_it(order: str, seen: list[str]) -> None:
+    assert states(import_xml(document(FORKED), order=order), "x y", ["", "go=1"]) == seen
+
+
+@each_of(("order", "found"), [("document", ["X0292"]), ("network", ["X0203"])])
+def test_a_transition_that_no_step_leads_to_is_left_out_as_beremiz_does(order: str, found: list[str]) -> None:
+    text = pou(step(1, "s", first=True) + transition(2, "1", inline("go")) + step(3, "t", "2") + actions(4, "3", does("x"))
+               + transition(5, "", inline("go")) + jump(6, "5", "s"), "go x", language="SFC")
+    made = import_xml(document(text), order=order)
+    assert [code for code in codes(made) if code != "X0190"] == found
+    if not made.errors:
+        assert states(made, "x", ["", "go=1", ""]) == ["0", "1", "1"]

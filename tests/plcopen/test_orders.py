@@ -8,10 +8,12 @@ from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, 
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.code.compiler import compile_sources
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
 from fbvm.interchange.plcopen.write.exporting import export_xml
+from fbvm.machine.plc import Plc
 
 UNKNOWN = '<fileHeader companyName="Unknown" productName="Unnamed" productVersion="1"/>'
 
@@ -223,3 +225,29 @@ def test_what_is_exported_is_evaluated_in_its_order_by_each_generator() -> None:
         runs.append(seen)
     assert all(seen == runs[0] for seen in runs)
     assert len({str(row) for row in runs[0]}) > 3
+
+
+BETWEEN = pou(RAIL + contact(2, "1", "a") + contact(3, "1", "b") + coil(4, "2", "x") + coil(5, "3", "a") + coil(6, "2", "y"),
+             "a b x y")
+"""A contact in front of two coils, between which another network writes what it reads."""
+
+
+@each_of(("order", "y"), [("document", True), ("network", False)])
+def test_a_contact_is_read_anew_for_each_coil_although_another_network_stands_between(order: str, y: bool) -> None:
+    machine = plc(import_xml(document(BETWEEN), order=order))
+    machine.write("Main.b", True)
+    machine.scan()
+    assert (machine.read("Main.x"), machine.read("Main.y")) == (False, y)
+
+
+@each_of(("order", "x"), [("document", True), ("network", False)])
+def test_a_falling_edge_of_beremiz_is_its_f_trig_also_in_the_first_scan(order: str, x: bool) -> None:
+    made = import_xml(document(pou(RAIL + contact(2, "1", "a", 'edge="falling"') + coil(3, "2", "x"), "a x")), order=order)
+    sources = [Source(name, text) for name, text in made.files.items()]
+    image = compile_sources(sources, "Main", dialect="matiec", lint=False).image
+    assert image is not None
+    machine = Plc(image)
+    machine.scan()
+    assert machine.read("Main.x") is x
+    machine.scan()
+    assert machine.read("Main.x") is False

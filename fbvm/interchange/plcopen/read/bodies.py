@@ -62,8 +62,8 @@ class Bodies:
         self._check_jumps(diagram)
         ours = any(item.mnemonic for item in diagram.objects)
         found = self._networks(diagram)
-        rungs = [rung_steps(network, self.scope, ours) if body.language == "LD" and not network.broken else None
-                 for network in found]
+        rungs = [rung_steps(network, self.scope, ours) if body.language == "LD" and not network.broken
+                 and not (self.reading.producer.generates and _falls(network)) else None for network in found]
         among = divided(rungs)
         lines: list[str] = []
         in_ladder = False
@@ -151,3 +151,9 @@ def _text(text: str) -> list[str]:
     while lines and not lines[-1].strip():
         lines.pop()
     return [line.rstrip() for line in lines]
+
+
+def _falls(network: Network) -> bool:
+    """Whether a network has a falling edge: to Beremiz that is an F_TRIG, whose first call can have an edge, and a rung's has
+    none."""
+    return any("falling" in (item.edge, *(pin.edge for pin in item.pins)) for item in network.objects)
