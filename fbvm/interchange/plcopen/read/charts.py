@@ -68,15 +68,13 @@ class Chart:
         diagram = read_diagram(self.reading, body, chart=True)
         if len(body.children) > LARGEST:
             raise NotImportable(body, f"the chart has more than {LARGEST} elements", "")
-        arrows = [arrow for transition in body.all("transition") if (arrow := self._arrow(transition)) is not None]
+        arrows = self._arrows(body)
         blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
         self.conditions.compute(diagram)
-        generates = self.reading.producer.generates
-        tested = self._met(body, arrows) if generates else sorted(arrows, key=_order(arrows))
-        ways = [line for arrow in tested for line in self._transition(arrow, diagram)]
+        ways = [line for arrow in self._tested(body, arrows) for line in self._transition(arrow, diagram)]
         compute = self._free(COMPUTE) if self.conditions.statements else ""
         begin = next(step for step in steps if step.get("initialStep") == "true")
-        if generates:
+        if self.reading.producer.generates:
             steps = self._generated(steps, arrows)
         lines = [line for step in steps
                  for line in self._step(step, blocks.get(step.get("localId")), compute if step is begin else "")]
@@ -97,6 +95,10 @@ class Chart:
                 found[name] = by_name[name]
                 todo += reversed([target for arrow in arrows if name in arrow.sources for target in arrow.targets])
         return [*found.values(), *(step for step in steps if self._name(step) not in found)]
+
+    def _tested(self, body: Element, arrows: list[Arrow]) -> list[Arrow]:
+        """The transitions in the order of their tests."""
+        return self._met(body, arrows) if self.reading.producer.generates else sorted(arrows, key=_order(arrows))
 
     def _met(self, body: Element, arrows: list[Arrow]) -> list[Arrow]:
         """The transitions in the order in which the generator of Beremiz meets them, which is that of their tests: it goes
@@ -252,6 +254,9 @@ class Chart:
         return name
 
     # --- transitions ---
+
+    def _arrows(self, body: Element) -> list[Arrow]:
+        return [arrow for transition in body.all("transition") if (arrow := self._arrow(transition)) is not None]
 
     def _arrow(self, transition: Element) -> Arrow | None:
         """Where a transition leads; None if its tool leaves it out."""
