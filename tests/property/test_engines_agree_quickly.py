@@ -101,6 +101,13 @@ FOR k := 0 TO 1 DO c[k](up := toggle XOR k = 1); END_FOR
 on(IN := n MOD 10 < 6, PT := T#30ms); off(IN := on.Q, PT := T#20ms); cu(CU := off.Q, R := n = 17, PV := 2);
 k := 0; WHILE k < n DO k := k + 2; IF k > 9 THEN EXIT; END_IF END_WHILE
 REPEAT k := k - 1; UNTIL k <= 0 END_REPEAT
+FOR k := 0 TO 9 DO
+    FOR calls := 0 TO 2 DO total := total + 1; END_FOR
+    WHILE calls > 1 DO calls := calls - 1; END_WHILE
+    REPEAT calls := calls + 1; UNTIL calls > 3 END_REPEAT
+    IF k = n MOD 5 THEN EXIT; ELSIF k = 2 THEN CONTINUE; END_IF
+    total := total + 100;
+END_FOR
 sub := n; w := SHL(w, 1) OR INT_TO_WORD(n); %W3.2 := cu.Q; %D102 := w;
 END_PROGRAM
 """,
@@ -168,3 +175,56 @@ def test_traps_are_equal(level: int) -> None:
         assert traps[0] is not None and traps[0].code == wanted, text
         assert repr(traps[1]) == repr(traps[0]), text
         assert compare(*(plc.memory.snapshot() for plc in plcs)) == [], text
+
+
+READ = """
+PROGRAM Main
+VAR
+    k : INT; t : STRING[40]; d : DINT; u : USINT; w : WORD; l : LREAL; r : REAL; b : BOOL; span : TIME; long : LTIME; day : DATE;
+    clock : TIME_OF_DAY; stamp : DATE_AND_TIME; back : STRING[40];
+END_VAR
+CASE k OF
+    0: d := STRING_TO_DINT(t); back := DINT_TO_STRING(d);
+    1: u := STRING_TO_USINT(t); back := USINT_TO_STRING(u);
+    2: w := STRING_TO_WORD(t); back := WORD_TO_STRING(w);
+    3: l := STRING_TO_LREAL(t); back := LREAL_TO_STRING(l);
+    4: r := STRING_TO_REAL(t); back := REAL_TO_STRING(r);
+    5: b := STRING_TO_BOOL(t); back := BOOL_TO_STRING(b);
+    6: span := STRING_TO_TIME(t); back := TIME_TO_STRING(span);
+    7: long := STRING_TO_LTIME(t); back := LTIME_TO_STRING(long);
+    8: day := STRING_TO_DATE(t); back := DATE_TO_STRING(day);
+    9: clock := STRING_TO_TOD(t); back := TOD_TO_STRING(clock);
+    10: stamp := STRING_TO_DT(t); back := DT_TO_STRING(stamp);
+END_CASE
+END_PROGRAM
+"""
+TEXTS = {
+    "0": "0 7 -7 +7 007 1_000 12__3 _1 2147483647 2147483648 -2147483648 -2147483649 16#7F_FF 16#fg 2#1010 2#12 8#17 8#18 DINT#5 INT#-5 "
+         "1.5 1.0 2E3 x 99999999999999999999 16#FFFFFFFFF",
+    "1": "255 256 -1 USINT#16#FF 16#100 2#1111_1111",
+    "2": "65535 65536 -1 16#FFFF WORD#16#A5 8#177777 8#200000",
+    "3": "1.5 -0.25 1e3 1.5E-3 2_5.0 .5 5. 1e 1.5E+400 -INF NaN inf 16#10 LREAL#2.5 3 12345678901234567890",
+    "4": "1.5 1.1 3.5E38 1E-46 REAL#0.1 7",
+    "5": "TRUE false 1 0 2 BOOL#TRUE BOOL#1 yes",
+    "6": "T#1s T#1m30s500ms TIME#1.5s t#-2d3h T#1d25h T#90m T#1s2m T#1ms1us T#5 T#1_0s T# 1s T#24d20h31m23s648ms T#0.5ms",
+    "7": "LTIME#1us500ns LT#1d T#1h2m3s4ms5us6ns LTIME#-1ns LTIME#1.0005ms LTIME#106751d23h47m16s854ms775us807ns LTIME#1d1d",
+    "8": "D#2024-02-29 D#2023-02-29 DATE#1970-01-01 D#1969-12-31 D#2024-13-01 D#2024-1-5 D#2024-04-31 2024-05-06 D#2000-02-29 D#2100-02-29",
+    "9": "TOD#12:34:56 TOD#23:59:59.999 TOD#24:00:00 TOD#12:60:00 TIME_OF_DAY#1:2:3.5 TOD#12:34",
+    "10": "DT#2024-02-29-23:59:59 DT#2024-02-29-24:00:00 DATE_AND_TIME#2001-01-01-1:2:3.25 DT#2024-02-30-1:1:1 DT#2024-01-01",
+}
+
+
+@LEVELS
+def test_texts_are_read_and_written_alike(level: int) -> None:
+    image, read = image_of(READ), 0
+    for kind, texts in TEXTS.items():
+        for text in (*texts.split(), ""):
+            plcs, traps = both(image, level), []
+            for plc in plcs:
+                plc.write("Main.k", int(kind))
+                plc.write("Main.t", text)
+                traps.append(plc.scan())
+            assert repr(traps[1]) == repr(traps[0]), (kind, text)
+            assert compare(*(plc.memory.snapshot() for plc in plcs)) == [], (kind, text)
+            read += traps[0] is None
+    assert read > 40
