@@ -160,6 +160,83 @@ def test_the_integral_sums_value_times_milliseconds_until_it_is_beyond_real() ->
 # --- Util: signals ------------------------------------------------------------------------------------------------------
 
 
+def test_the_derivative_is_of_four_values_and_their_times() -> None:
+    pins = "IN TM RESET -> OUT"
+    calls = [(0, 5.0, 10, False), *((0, 5.0 + 2.0 * n, 10, False) for n in range(1, 5)), (0, 7.0, 10, True), (0, 8.0, 5, False)]
+    # 6/30, (12 + 2)/70, (18 + 2)/100, as far as the line goes back; then 3 / 15
+    assert outputs("DERIVATIVE", pins, *calls) == pytest.approx([0.0, 0.2, 0.2, 0.2, 0.2, 0.0, 0.2], abs=1e-6)
+
+
+def test_a_controller_of_p_and_d_with_limits() -> None:
+    pins = "ACTUAL SET_POINT KP TV Y_MANUAL Y_OFFSET Y_MIN Y_MAX MANUAL RESET -> Y LIMITS_ACTIVE"
+    rest = (2.0, 0.5, 7.0, 1.0)
+    calls = [(100, 0.0, 10.0, *rest, 0.0, 0.0, False, False), (200, 1.0, 10.0, *rest, 0.0, 0.0, False, False),
+             (300, 1.0, 10.0, *rest, 0.0, 15.0, False, False), (400, 8.0, 10.0, *rest, 0.0, 15.0, False, False),
+             (500, 8.0, 10.0, *rest, 0.0, 15.0, True, False), (600, 8.0, 10.0, *rest, 0.0, 15.0, False, True),
+             (700, 8.0, 10.0, *rest, 0.0, 15.0, False, False)]  # fmt: skip
+    assert outputs("PD", pins, *calls) == [
+        (21.0, False), (9.0, False), (15.0, True), (0.0, True), (7.0, False), (1.0, False), (5.0, False)]  # fmt: skip
+
+
+PID_PINS = "ACTUAL SET_POINT KP TN TV Y_MANUAL Y_OFFSET Y_MIN Y_MAX MANUAL RESET"
+
+
+def test_a_pid_sums_the_error_over_the_time_between_its_calls_assumed() -> None:
+    calls = [(at, 0.0, 4.0, 2.0, 8.0, 0.0, 9.0, 1.0, 0.0, 0.0, manual, reset)
+             for at, manual, reset in ((1000, 0, 0), (2000, 0, 0), (4000, 0, 0), (5000, 1, 0), (6000, 0, 0), (7000, 0, 1))]
+    assert outputs("PID", f"{PID_PINS} -> Y", *calls) == [9.0, 10.0, 12.0, 9.0, 9.0, 1.0]
+
+
+def test_parameters_of_a_pid_are_read_where_it_begins() -> None:
+    def call(gain: float, cycle: float, reset: bool = False) -> tuple[Any, ...]:
+        return (0, 0.0, 4.0, gain, 8.0, 1.0, 9.0, 1.0, 0.0, 0.0, False, reset, cycle)
+
+    calls = [call(2.0, 1.0, True), call(2.0, 1.0), call(5.0, 1.0), call(5.0, 1.0, True), call(5.0, 1.0)]
+    assert outputs("PID_FIXCYCLE", f"{PID_PINS} CYCLE -> Y", *calls) == [1.0, 9.0, 10.0, 1.0, 21.0]
+
+
+def test_the_sum_of_a_pid_does_not_grow_beyond_a_limit_assumed() -> None:
+    def call(actual: float) -> tuple[Any, ...]:
+        return (0, actual, 4.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 10.0, False, False, 1.0)
+
+    calls = [call(0.0)] * 6 + [call(5.0)] * 2
+    assert outputs("PID_FIXCYCLE", f"{PID_PINS} CYCLE -> Y LIMITS_ACTIVE OVERFLOW", *calls) == [
+        (4.0, False, False), (8.0, False, False), (10.0, True, False), (10.0, True, False), (10.0, True, False),
+        (10.0, True, False), (6.0, False, False), (5.0, False, False)]  # fmt: skip
+
+
+def test_the_sum_of_a_pid_overflows_until_it_is_reset() -> None:
+    calls = [(0, 0.0, 3e38, 1.0, 1.0, 0.0, 0.0, 0.0, -1.0, 1.0, False, reset, cycle)
+             for reset, cycle in ((True, 1.0), (False, 1.0), (False, 1.0))]
+    free = [(*call[:8], 0.0, 0.0, *call[10:]) for call in calls]
+    assert outputs("PID_FIXCYCLE", f"{PID_PINS} CYCLE -> OVERFLOW", *free, (*free[1][:-1], 2.0), free[0]) == [
+        False, False, False, True, False]  # fmt: skip
+
+
+@pytest.mark.slow
+@each_of(("mode", "values"), [
+    ("TRIANGLE", [-100, 0, 100, 0, -100, 0]), ("TRIANGLE_POS", [0, 50, 100, 50, 0, 50]),
+    ("SAWTOOTH_RISE", [-100, -50, 0, 50, -100, -50]), ("SAWTOOTH_FALL", [100, 50, 0, -50, 100, 50]),
+    ("RECTANGLE", [-100, -100, 100, 100, -100, -100]), ("SINE", [0, 100, 0, -100, 0, 100]),
+    ("COSINE", [100, 0, -100, 0, 100, 0]),
+])  # fmt: skip
+def test_a_generator_of_periodic_values_by_calls_and_by_time_assumed(mode: str, values: list[int]) -> None:
+    for by_time, head in (("FALSE", "CYCLES := 4"), ("TRUE", "PERIOD := T#4s")):
+        plc = Plc(image_of(f"VAR g : GEN; r : BOOL; END_VAR\n"
+                           f"g(MODE := GEN_MODE#{mode}, BASE := {by_time}, {head}, AMPLITUDE := 100, RESET := r);"))
+        found = []
+        for at in range(6):
+            assert plc.scan(at * 1000 * MS) is None
+            found.append(plc.read("Main.g.OUT"))
+        assert found == values
+        plc.write("Main.r", True)
+        plc.scan(7000 * MS)
+        assert plc.read("Main.g.OUT") == 0
+        plc.write("Main.r", False)
+        plc.scan(9500 * MS)
+        assert plc.read("Main.g.OUT") == values[0]
+
+
 def test_blink_begins_high_and_stays_when_it_is_disabled() -> None:
     low, high = 20 * MS, 30 * MS
     calls = [(at, at < 90 or at >= 110, low, high) for at in range(0, 150, 10)]
