@@ -14,7 +14,7 @@ from fbvm.code.lowering.context import BodyContext, Rules
 from fbvm.code.lowering.program import Program
 from fbvm.code.lowering.step_costs import step_cost, with_costs
 from fbvm.code.operations import Node
-from fbvm.code.pictures.st_rungs import NoRung, st_rung
+from fbvm.code.pictures.st_rungs import NoRung, st_rung, with_coils
 from fbvm.syntax import tree
 from fbvm.syntax.tree import il, ladder, sfc
 
@@ -79,12 +79,15 @@ def _detect(body: BodyContext, edge: Edge) -> None:
 
 
 def _draw(body: BodyContext, block: tree.Block) -> None:
-    """Record pictures of statements of Structured Text as rungs, and which expressions are observed for their contacts."""
-    drawn_already = tree.Empty | ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList
-    for number, statement in enumerate((one for one in block if not isinstance(one, drawn_already)), 1):
+    """Record pictures of statements of Structured Text, and of those that instruction lists stand for, as rungs, and which
+    expressions are observed for their contacts."""
+    drawn_already = tree.Empty | ladder.Ladder | ladder.Rung | sfc.Sfc
+    statements = [each for one in block for each in (one.body if isinstance(one, il.InstructionList) else (one,))]
+    groups = with_coils([one for one in statements if not isinstance(one, drawn_already)])
+    for number, (statement, *coils) in enumerate(groups, 1):
         site, steps, comment = body.site(statement), (), ""  # type: int, tuple[tuple[int, str, str, tuple[str, ...]], ...], str
         try:
-            rung = st_rung(statement, body.facts, body.pou.source.text)
+            rung = st_rung(statement, body.facts, body.pou.source.text, coils)
             steps = tuple((body.site(part or statement), *step) for part, step in rung.steps)
             body.contacts |= rung.marks
         except NoRung as reason:

@@ -5,6 +5,7 @@ part."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from fbvm.base.types import BOOL
@@ -19,6 +20,8 @@ MOST_CONTACTS = 60
 """Contacts of one rung; each XOR doubles those of its operands."""
 _CHAINS = {"AND": False, "AND_THEN": False, "OR": True, "OR_ELSE": True}
 """Operators that join contacts: True for branches side by side, False for one behind the other."""
+_COILS = {":=": " ", "S=": "S", "R=": "R"}
+"""Signs of assignments, and the marks of coils that do the same."""
 _LEAVES = (tree.NameRef, tree.Member, tree.Index, tree.Direct, tree.Part, tree.Literal, tree.Deref)
 _NAMES = {"If": "IF", "For": "FOR", "While": "WHILE", "Repeat": "REPEAT", "Case": "CASE", "Return": "RETURN", "Exit": "EXIT",
           "Assign": "this assignment", "CallStatement": "this call"}
@@ -42,17 +45,46 @@ class StRung(NamedTuple):
     marks: dict[tree.Expr, list[Mark]]
 
 
-def st_rung(statement: tree.Statement, facts: Facts, text: str) -> StRung:
+def with_coils(statements: Sequence[tree.Statement]) -> list[list[tree.Statement]]:
+    """Statements in groups, each of which is a rung: one that keeps the current result of an instruction list, with those behind
+    it that store this."""
+    groups: list[list[tree.Statement]] = []
+    for statement in statements:
+        first = groups[-1][0] if groups else None
+        if first is not None and isinstance(statement, tree.Assign) and _keeps(first) == _stored_result(statement.value) != "":
+            groups[-1].append(statement)
+        else:
+            groups.append([statement])
+    return groups
+
+
+def _keeps(statement: tree.Statement) -> str:
+    """The hidden variable in which a statement keeps the current result; "" if it keeps none."""
+    name = _text_of(statement.targets[0]) if isinstance(statement, tree.Assign) and len(statement.targets) == 1 else ""
+    return name if name.startswith("$CR") else ""
+
+
+def _stored_result(value: tree.Expr) -> str:
+    """The variable that is stored, as it is or inverted."""
+    return _text_of(value.operand if isinstance(value, tree.Unary) and value.op == "NOT" else value)
+
+
+def _text_of(expr: tree.Expr) -> str:
+    return expr.text if isinstance(expr, tree.NameRef) else ""
+
+
+def st_rung(statement: tree.Statement, facts: Facts, text: str, coils: Sequence[tree.Statement] = ()) -> StRung:
     """A statement as a rung.
 
     statement: a statement that the checker has found right.
+    coils: assignments of what it keeps, if it keeps the current result of an instruction list.
     facts: what the checker found out about it.
     text: the source text, of which operands are shown as they are written.
 
     Raises NoRung if it cannot be drawn."""
     reader = _Reader(facts, text)
     try:
-        made = reader.rung(statement)
+        made = reader.rung(statement, coils)
         diagram([step for _, step in made.steps])
     except Undrawable:
         raise NoRung(_NAMES.get(type(statement).__name__, "this statement")) from None
@@ -65,8 +97,8 @@ class _Reader:
         self.shown: dict[int, tuple[tree.Expr, bool]] = {}
         """By identity of a contact, coil or box the expression whose value it shows, and whether negated."""
 
-    def rung(self, statement: tree.Statement) -> StRung:
-        bar = Point(Series(), [self._point(statement)])
+    def rung(self, statement: tree.Statement, coils: Sequence[tree.Statement]) -> StRung:
+        bar = Point(Series(), [self._stored(statement, coils) if coils else self._point(statement)])
         coded = steps(bar)
         marks: dict[tree.Expr, list[Mark]] = {}
         for number, step in enumerate(coded):
@@ -85,13 +117,24 @@ class _Reader:
             return self._call(statement.call)
         raise NoRung(_NAMES.get(type(statement).__name__, "this statement"))
 
+    def _stored(self, statement: tree.Statement, coils: Sequence[tree.Statement]) -> Point:
+        """Contacts with several coils: what is kept, and the assignments of it."""
+        assert isinstance(statement, tree.Assign)
+        outs: list[Coil | Box | Point] = []
+        for each in coils:
+            assert isinstance(each, tree.Assign)
+            if each.op not in _COILS or any(self.facts.types.get(target) != BOOL for target in each.targets):
+                raise NoRung("an assignment that is not of BOOL")
+            mark = "/" if isinstance(each.value, tree.Unary) else _COILS[each.op]
+            outs += [self._coil(mark, target, statement.value) for target in each.targets]
+        return Point(self.condition(statement.value), outs)
+
     # --- statements -------------------------------------------------------------------------------------------------
 
     def _assignment(self, node: tree.Assign) -> Point:
-        marks = {":=": " ", "S=": "S", "R=": "R"}
-        if node.op not in marks or any(self.facts.types.get(part) != BOOL for part in (*node.targets, node.value)):
+        if node.op not in _COILS or any(self.facts.types.get(part) != BOOL for part in (*node.targets, node.value)):
             raise NoRung("an assignment that is not of BOOL")
-        return Point(self.condition(node.value), [self._coil(marks[node.op], target, node.value) for target in node.targets])
+        return Point(self.condition(node.value), [self._coil(_COILS[node.op], target, node.value) for target in node.targets])
 
     def _coil(self, mark: str, target: tree.Expr, power: tree.Expr) -> Coil:
         coil = Coil(-1, mark, (self.written(target),))
@@ -180,7 +223,10 @@ class _Reader:
         return Series([contact])
 
     def written(self, expr: tree.Node) -> str:
-        """An expression as it is written, on one line."""
+        """An expression as it is written, on one line.  Raises NoRung for a variable that is not written: jumps and current
+        results have such."""
+        if isinstance(expr, tree.NameRef) and self.text[expr.start:expr.end].upper() != expr.text.upper():
+            raise NoRung("a jump, or a current result that is used again")
         return " ".join(self.text[expr.start:expr.end].split())
 
 

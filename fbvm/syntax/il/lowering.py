@@ -122,17 +122,20 @@ class ListLowering:
             raise InstructionError(f"there is no current result for {each.name}", "the first instruction is LD")
         return self.result
 
-    def _kept(self, each: Instruction, needed: bool) -> Expr:
-        """The current result for a statement; kept in a temporary first if it is needed behind the statement, too."""
+    def _kept(self, each: Instruction, needed: bool, target: Expr | None = None) -> Expr:
+        """The current result for a statement; kept in a temporary first if it is needed behind the statement, too.
+
+        What is made of constants alone has the type of the `target` that it is stored in."""
         result = self._current(each)
         if needed and not isinstance(result, tree.Literal) and not self._is_temporary(result):
-            result = self.result = self._temporary(each, result, f"$CR{len(self.temporaries) + 1}")
+            result = self.result = self._temporary(each, result, f"$CR{len(self.temporaries) + 1}",
+                                                    target if target is not None and _is_untyped(result) else result)
             self.operations = 0
         return result
 
-    def _temporary(self, each: Instruction, value: Expr, name: str) -> Expr:
-        """Assign a value to a new temporary; returns the temporary."""
-        spec = TypeOf(each.start, each.end, value)
+    def _temporary(self, each: Instruction, value: Expr, name: str, typed: Expr) -> Expr:
+        """Assign a value to a new temporary of the type of `typed`; returns the temporary."""
+        spec = TypeOf(each.start, each.end, typed)
         self.temporaries.append(tree.VarDecl(each.start, each.end, (Name(each.start, each.end, name),), None, spec, None))
         self._assign(each, NameRef(each.start, each.end, name), ":=", value)
         return NameRef(each.start, each.end, name)
@@ -164,7 +167,7 @@ class ListLowering:
 
     def _store(self, each: Instruction, operator: Operator, needed: bool) -> None:
         target = self._operand(each)
-        value = self._kept(each, needed)
+        value = self._kept(each, needed, None if operator.negated else target)
         self._assign(each, target, ":=", self._inverse(each, value) if operator.negated else value)
 
     def _set(self, each: Instruction, operator: Operator, needed: bool) -> None:
@@ -327,6 +330,15 @@ class ListLowering:
             spec = TypeOf(each.start, each.end, value)
             self.temporaries.append(tree.VarDecl(each.start, each.end, (Name(each.start, each.end, name),), None, spec, None))
         return [tree.Assign(each.start, each.end, (NameRef(each.start, each.end, name),), ":=", value)]
+
+
+def _is_untyped(expr: Expr) -> bool:
+    """True for numbers without a type in front, and what operators make of them."""
+    if isinstance(expr, tree.Binary):
+        return _is_untyped(expr.left) and _is_untyped(expr.right)
+    if isinstance(expr, tree.Unary):
+        return _is_untyped(expr.operand)
+    return isinstance(expr, tree.Literal) and expr.type_name is None and expr.kind in ("int", "real")
 
 
 class _Refusal(ErrorRecovery):

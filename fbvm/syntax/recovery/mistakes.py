@@ -274,6 +274,10 @@ def _ladder(automaton: Automaton, token: Token, following: list[Token]) -> Repai
                   f"rungs stand {where}between LADDER and END_LADDER", cut=True, silent=token.start)
 
 
+_NEED_RESULT = INSTRUCTION_LIST - {"LD", "LDN", "JMP", "CAL", "RET"}
+"""Operators that need a current result."""
+
+
 def _instruction_list(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`LD a` at the beginning of a line, and a `;` somewhere: an instruction list with statements or `;` in it."""
     word = automaton.before
@@ -284,6 +288,9 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
         return None
     while token.type not in BODY_ENDS and token.type != "$END":
         token = automaton.next()
+    if word.text.upper() in _NEED_RESULT and not line:
+        return Repair([token], word.start, word.end, f"there is no current result for {word.text}",
+                      "an instruction list begins with LD", cut=True, silent=token.start)
     return Repair([token], word.start, word.end, "an instruction list has no `;` and no statements of Structured Text",
                   "each instruction stands on a line of its own, without `;`", cut=True, silent=token.start)
 

@@ -73,6 +73,30 @@ def test_what_is_no_rung_is_named_with_its_line_and_the_rest_is_drawn(body: str)
     assert steps(f"{body}\na := b;") == [REFUSED[body], "LD b; OUT a"]
 
 
+LISTS = {
+    "LD b\nOR( c\nAND d\n)\nORN e\nST a": ["LD b; LD c; AND d; ORLD; ORNOT e; OUT a"],
+    "LD b\nANDN c\nS a\nST d\nSTN e\nR f": ["LD b; ANDNOT c; SET a; OUT d; OUTNOT e; RSET f"],
+    "LD n\nGT 5\nAND( m\nEQ 1\n)\nST a\nLD b\nST c": ["LD> n 5; AND= m 1; OUT a", "LD b; OUT c"],
+    "LD a\nST b\nCAL t(IN := b, PT := T#1s)\nLD t.Q\nST c": ["LD a; OUT b", "LD b; CALL TON t IN:= PT:=T#1s", "LD t.Q; OUT c"],
+    "LD n\nADD 1\nST m\nLD a\nJMPC x\nLD b\nST c\nx: LD d\nST e": [
+        "in line 3 is not drawn: an assignment that is not of BOOL",
+        "in line 6 is not drawn: a jump, or a current result that is used again",
+        "in line 8 is not drawn: an IF that does more than setting and resetting",
+        "in line 10 is not drawn: a jump, or a current result that is used again", "LD d; OUT e"],
+}
+
+
+@pytest.mark.slow
+@each_of("body", LISTS)
+def test_an_instruction_list_is_drawn_as_the_rungs_that_it_stands_for(body: str) -> None:
+    assert steps(body) == LISTS[body]
+
+
+def test_power_at_several_coils_is_what_the_current_result_was() -> None:
+    (made,) = executed("LD b\nANDN c\nST b\nSTN d", {"b": True, "c": True})
+    assert made.states == {0: [True], 1: [False], 2: [False], 3: [False]}
+
+
 def executed(body: str, on: dict[str, object]) -> list[RungExecution]:
     plc = Plc(image(body))
     power = PowerFlow(plc.image.rungs, lambda scan: True)

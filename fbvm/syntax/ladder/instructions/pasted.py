@@ -13,7 +13,9 @@ LOOK, SURE = 600, 2
 
 
 def ladder_lines(text: str, at: int) -> bool:
-    """Whether the line at an offset and those below it are ladder: only instructions, one of which no other language has."""
+    """Whether the line at an offset and those below it are ladder: only instructions, one of which no other language has.
+
+    Functions may be called as instructions, LIMIT and SQRT are: an operator of the instruction list behind them tells."""
     start = text.rfind("\n", 0, at) + 1
     lines, own = 0, False
     for line in text[start:start + LOOK].split("\n"):
@@ -22,6 +24,7 @@ def ladder_lines(text: str, at: int) -> bool:
         code = line.strip().lstrip("@%!")
         found = instruction_set().pattern.match(code)
         if found is None or code[found.end():found.end() + 1] not in ("", " ", "\t", "(") or ":=" in code or ";" in code:
+            own = own and code.split()[0].upper() not in INSTRUCTION_LIST
             break
         lines += 1
         name = spelling(found[0])
