@@ -23,12 +23,23 @@ DOCUMENTS = Path(__file__).parents[2] / "plcopen" / "documents"
     ("CONFIGURATION Config0 RESOURCE Res0 ON PLC END_RESOURCE END_CONFIGURATION", "matiec"),
     ("PROGRAM Main VAR c : RTC; END_VAR END_PROGRAM", "matiec"),
     ("{external} FUNCTION f : INT END_FUNCTION", "rusty"),
+    ("CONFIGURATION config RESOURCE resource1 ON PLC END_RESOURCE END_CONFIGURATION", "matiec"),
+    ("TEST 'the lamp is on'\nEND_TEST", "strucpp"),
+    ("PROGRAM Main VAR k : SMC_TRAFO; END_VAR END_PROGRAM", "codesys"),
     ("PROGRAM Main // POINTER TO\nVAR s : STRING := '{attribute'; (* RESOURCE Res0 ON PLC *) END_VAR END_PROGRAM", "standard"),
 ])
 def test_constructs_tell_the_dialect(text: str, dialect: str) -> None:
     found = guessed([], [Source("main.st", text)])
     assert found.dialect == dialect
     assert ("main.st" in found.because) == (dialect != "standard")
+
+
+@each_of(("name", "dialect"), [("LIB/FILL.EXP", "codesys"), ("plc/pous/programs/main.st", "matiec"),
+                            ("plc/programs/main.st", "standard")])
+def test_names_of_files_tell_the_dialect(name: str, dialect: str) -> None:
+    found = guessed([], [Source(name, "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM")])
+    assert found.dialect == dialect
+    assert (f"the file {name}" in found.because) == (dialect != "standard")
 
 
 def test_the_tool_that_wrote_a_document_counts_more_than_constructs() -> None:
