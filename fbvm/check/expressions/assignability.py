@@ -211,6 +211,8 @@ def conversion_hint(kind: Type, target: Type) -> str:
     if isinstance(source, StructType) and source.block:
         outputs = [field.name for field in source.fields.values() if field.kind == "VAR_OUTPUT"]
         return f"name an output of the instance: {' or '.join(outputs[:4])}" if outputs else ""
+    if isinstance(source, StringType) and isinstance(wanted, EnumType):
+        return f"no function makes a member of a text: compare it, and assign a member, such as {wanted}#{_first_of(wanted)}"
     if not all(isinstance(t, Elementary | StringType | EnumType) for t in (source, wanted)) or \
             source == wanted or not convertible("TO", source, wanted):
         return ""
@@ -218,6 +220,10 @@ def conversion_hint(kind: Type, target: Type) -> str:
     if isinstance(source, EnumType):
         return f"write TO_{names[1]}(...)"
     return f"write {names[0]}_TO_{names[1]}(...)"
+
+
+def _first_of(kind: EnumType) -> str:
+    return next(iter(kind.shown.values()))
 
 
 def _reference_hint(source: Type, wanted: Type) -> str:
@@ -258,7 +264,7 @@ def literal_hint(value: Value | None, kind: Type) -> str:
     if isinstance(kind, EnumType):
         number = kind.members.get(fold(value)) if isinstance(value, str) else value
         same = kind.shown.get(number) if isinstance(number, int) else None
-        return f"name a member, such as {kind}#{same or next(iter(kind.shown.values()))}"
+        return f"name a member, such as {kind}#{same or _first_of(kind)}"
     time_ms = value if isinstance(value, int) and value > 0 and not isinstance(value, bool) else 500
     for name, written in (("DURATION", f"a duration is written T#{time_ms}ms"), ("DATE", f"a literal is written {_dated(kind)}")):
         if f"ANY_{name}" in families(kind):
