@@ -46,6 +46,8 @@ def place(text: str) -> Place:
     ("CIO 1509.15", "CIO 1509.15", "BOOL", AREAS["CIO"].offset + 3019, 7),
     ("cio1509.15", "CIO 1509.15", "BOOL", AREAS["CIO"].offset + 3019, 7),
     ("%MW10", "%MW10", "WORD", AREAS["M"].offset + 20, None),
+    ("%MD3", "%MD3", "DWORD", AREAS["M"].offset + 12, None),
+    ("%MB3", "%MB3", "BYTE", AREAS["M"].offset + 3, None),
     ("%IX0.3", "%IX0.3", "BOOL", AREAS["I"].offset, 3),
     ("%ML1", "%ML1", "LWORD", AREAS["M"].offset + 8, None),
     ("CF102", "CF102", "BOOL", AREAS["CF"].offset + 12, 6),
@@ -58,6 +60,12 @@ def test_text_names_a_place(text: str, name: str, type_name: str, offset: int, b
 def test_a_way_through_a_reference_is_kept() -> None:
     found = place("Main.shared.y")
     assert (found.offset, found.hops, found.type.name) == (180224 + 88, (4,), "DINT")
+
+
+def test_what_the_compiler_has_added_is_known() -> None:
+    added = {"Main.conn.ENO": False, "CIO 1509.15": False, "Main.a[1, 0].y": False}
+    assert {text: place(text).is_generated for text in added} == added
+    assert [Place(name, t.INT, 0).is_generated for name in ("Main.$edge", "Main.pump ENO")] == [True, True]
 
 
 def test_constants_are_known() -> None:

@@ -11,11 +11,23 @@ from fbvm.base.memory import Memory
 from fbvm.base.types import EnumType, Field, StructType, SubrangeType, Type
 from fbvm.watch import places
 from fbvm.watch.paths import Place, UnknownPlace
-from fbvm.watch.values import conform, in_hexadecimal, literal, nearest_real, parse_time_ns, parse_value, show, show_time
+from fbvm.watch.values import (
+    conform,
+    in_hexadecimal,
+    literal,
+    nearest_real,
+    parse_time_ns,
+    parse_value,
+    plain_value,
+    show,
+    show_time,
+)
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
 LEVEL = SubrangeType("Level", 2, 2, t.INT, 0, 100)
 CHAR, WCHAR, WIDE = t.ELEMENTARY["CHAR"], t.ELEMENTARY["WCHAR"], t.string(3, wide=True)
+PINS = StructType("Block", 16, 8, {name.upper(): Field(name, t.INT, at, section) for at, (name, section) in enumerate(
+    [("out", "VAR_OUTPUT"), ("own", "VAR"), ("both", "VAR_IN_OUT"), ("in", "VAR_INPUT")])}, block=True)
 PAIR = StructType("Pair", 16, 8, {"N": Field("n", t.INT, 0), "S": Field("s", t.string(5), 2)})
 
 
@@ -70,6 +82,7 @@ def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) 
 @each_of(("kind", "value", "message"), [
     (t.INT, 32768, "x: 32768 is out of range of INT, which holds -32768..32767"),
     (t.WORD, -1, "x: -1 is out of range of WORD, which holds 0..65535"),
+    (t.BYTE, -128, "which holds 0..255; for these bits write 128 or 16#80"), (t.BYTE, -129, "x: -129 is out of range of BYTE"),
     (LEVEL, 101, "x: 101 is out of range of Level, which holds 0..100"),
     (t.REAL, 1e39, "x: 1e+39 is out of range of REAL"),
     (t.LREAL, 10**400, "out of range of LREAL"),
@@ -126,7 +139,9 @@ def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) ->
     (t.array(((0, 1),), t.BOOL), [True, False], "[TRUE, FALSE]"), (PAIR, {"n": 1, "s": "x"}, "(n := 1, s := 'x')"),
     (t.NULL, None, "NULL"), (t.string(), "it's $5\n\x01", "'it$'s $$5$L$01'"), (CHAR, "a", "'a'"), (CHAR, "\0", "'$00'"),
     (t.DATE, 1_749_686_400_000_000_000, "D#2025-06-12"), (t.DT, 1_749_738_615_000_000_000, "DT#2025-06-12-14:30:15"),
-    (t.TOD, 52_215_000_000_000, "TOD#14:30:15"), (WCHAR, "\u20ac", '"\u20ac"'), (WIDE, 'a"\x07', '"a$"$0007"'),
+    (t.TOD, 52_215_000_000_000, "TOD#14:30:15"),
+    (PINS, {"out": 3, "own": 4, "both": 2, "in": 1}, "(in := 1, both := 2, out := 3, own := 4)"),
+    (WCHAR, "\u20ac", '"\u20ac"'), (WIDE, 'a"\x07', '"a$"$0007"'),
 ])  # fmt: skip
 def test_values_are_shown(kind: Type, value: object, text: str) -> None:
     assert show(kind, value) == text  # type: ignore[arg-type]
@@ -134,6 +149,14 @@ def test_values_are_shown(kind: Type, value: object, text: str) -> None:
 
 def test_bit_strings_are_shown_in_hexadecimal_on_request() -> None:
     assert [show(kind, 255, hexadecimal=True) for kind in (t.WORD, t.BYTE, t.INT)] == ["16#00FF", "16#FF", "255"]
+
+
+@each_of(("kind", "value", "plain"), [
+    (t.REAL, 0.10000000149011612, 0.1), (t.LREAL, 0.1, 0.1), (t.REAL, math.inf, "inf"), (t.LREAL, -math.inf, "-inf"),
+    (t.LREAL, math.nan, "nan"), (PAIR, {"n": 1}, {"n": 1}), (t.array(((0, 1),), t.REAL), [math.inf, 0.5], ["inf", 0.5]),
+])  # fmt: skip
+def test_values_become_those_of_json(kind: Type, value: object, plain: object) -> None:
+    assert plain_value(kind, value) == plain  # type: ignore[arg-type]
 
 
 # --- in memory --------------------------------------------------------------------------------------------------------
