@@ -54,7 +54,7 @@ class Place:
     @property
     def is_generated(self) -> bool:
         """True for a variable that the compiler has added, such as the memory of an edge in a rung, or `pump ENO`."""
-        return "$" in self.name or not self.area and " " in self.name
+        return "$" in self.name or not self.area and _OF_WORDS.search(self.name) is not None
 
     def inner(self, name: str, type_: Type, distance: int, bit: int | None = None) -> Place:
         """The part of this place that begins `distance` bytes behind its start."""
@@ -78,6 +78,8 @@ _NAMES = re.compile(r"\s*([^\W\d]\w*)(?:\s*\.\s*([^\W\d]\w*))?")
 _FIRST = re.compile(r"\s*([^\W\d]\w*)")
 _SPACED = re.compile(r"\s*[A-Z]\w*\s+\d+(\.\d+)?\s*", re.I)
 """`D 10`: a name with a space before a number is an address, whatever is called D."""
+_OF_WORDS = re.compile(r"\w \w")
+"""A space within a name, as the compiler writes them; between subscripts it stands behind a comma."""
 _ADDRESS_TYPES = {8: BYTE, 16: WORD, 32: DWORD, 64: LWORD}
 
 

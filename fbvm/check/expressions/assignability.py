@@ -211,6 +211,11 @@ def conversion_hint(kind: Type, target: Type) -> str:
     if isinstance(source, StructType) and source.block:
         outputs = [field.name for field in source.fields.values() if field.kind == "VAR_OUTPUT"]
         return f"name an output of the instance: {' or '.join(outputs[:4])}" if outputs else ""
+    return _function_hint(source, wanted)
+
+
+def _function_hint(source: Type, wanted: Type) -> str:
+    """The conversion function to write; "" if there is none."""
     if isinstance(source, StringType) and isinstance(wanted, EnumType):
         return f"no function makes a member of a text: compare it, and assign a member, such as {wanted}#{_first_of(wanted)}"
     if not all(isinstance(t, Elementary | StringType | EnumType) for t in (source, wanted)) or \

@@ -27,7 +27,7 @@ def plc() -> Plc:
 
 
 @pytest.mark.parametrize("name", ["Main.a", "Main.pairs[1].high[2]", "Main.pairs[0].low", "Main.t.ET", "Main.flag", "D7",
-                                  "CIO 3.12", "CIO 3.02", "T3", "T0003"])
+                                  "CIO 3.12", "CIO 3.02", "T3"])
 def test_a_byte_has_the_name_of_the_single_value_in_it(plc: Plc, name: str) -> None:
     names, place = Names.of(plc.image, plc.memory.areas), plc.find(name)
     found = names.at(place.offset, place.bit)
