@@ -8,9 +8,9 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import NOW
-from fbvm.base.arithmetic import width
+from fbvm.base.arithmetic import limits, width
 from fbvm.code.operations import BUFFER_OBJECT, INTEGERS, OBJECT_SHIFT, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
-from fbvm.engine.python.writer import Expressions, Rows, bare
+from fbvm.engine.python.writer import ARITHMETIC, Expressions, Rows, bare
 from fbvm.engine.ranges import constant_integer, is_float, mask, may_trap, never_wraps, value_range
 
 SIGNS = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^",
@@ -132,6 +132,12 @@ def _compare(name: str) -> Callable[..., str]:
     return lambda e, machine, kind, a, b: f"({e.value(a)} {SIGNS[name]} {e.value(b)})"
 
 
+_USUAL_SHIFTS = {"shift_left": "<<", "shift_right": ">>"}
+"""Python's operators where 0 to less than the width is shifted by; all else is seen to by the functions."""
+LONGEST_TWICE = 40
+"""Characters of an expression that may be written twice, of which one is executed."""
+
+
 def _shift(name: str) -> Callable[..., str]:
     def emit(e: Expressions, machine: str, a: Node, n: Node, site: int) -> str:
         count = constant_integer(n)
@@ -140,6 +146,13 @@ def _shift(name: str) -> Callable[..., str]:
                 return e.bring(f"({e.loose(a)} << {count})", machine)
             if name == "shift_right" and (count == 0 or value_range(a)[0] >= 0):
                 return f"({e.value(a)} >> {count})" if count else e.value(a)
+        if name in _USUAL_SHIFTS and not (may_trap(a) and may_trap(n)) and (name == "shift_left" or value_range(a)[0] >= 0):
+            first, by = e.once(e.value(n))
+            shifted = bare(e.value(a))
+            if len(shifted) <= LONGEST_TWICE:
+                usual = f"(({shifted}) {_USUAL_SHIFTS[name]} {by})"
+                usual = e.bring(usual, machine) if name == "shift_left" else usual
+                return f"({usual} if 0 <= {first} < {width(machine)} else {name}({shifted}, {by}, {machine!r}, {site}))"
         return f"{name}({bare(e.value(a))}, {bare(e.value(n))}, {machine!r}, {site})"
 
     return emit
@@ -153,6 +166,19 @@ def _call(function: str) -> Callable[..., str]:
         return f"{function}({', '.join(texts)})"
 
     return emit
+
+
+def _nearest(e: Expressions, machine: str, kind: str, a: Node, site: int) -> str:
+    """Python's `round` where the number fits: halves go to the even neighbour, which the least number of a type is."""
+    first, v = e.once(e.value(a))
+    low, high = limits(machine)
+    return f"(round({v}) if {low - 0.5!r} <= {first} < {high + 0.5!r} else nearest({v}, {machine!r}, {site}))"
+
+
+def _truncate(e: Expressions, machine: str, kind: str, a: Node, site: int) -> str:
+    first, v = e.once(e.value(a))
+    low, high = limits(machine)
+    return f"(int({v}) if {float(low - 1)!r} < {first} < {float(high + 1)!r} else truncate({v}, {machine!r}, {site}))"
 
 
 def _to_integer(function: str) -> Callable[..., str]:
@@ -192,6 +218,10 @@ def _check(e: Expressions, machine: str, a: Node, low: int, high: int, code: str
     least, greatest = value_range(a)
     if low <= least and greatest <= high:
         return e.value(a)
+    lowest, highest = limits(machine)
+    if a[0] in ARITHMETIC and lowest <= low and high <= highest:  # a number within needs no wrap
+        first, v = e.once(e.loose(a))
+        return f"({v} if {low} <= {first} <= {high} else wrapped({v}, {machine!r}, {low}, {high}, {code!r}, {site}))"
     first, v = e.once(e.value(a))
     return f"({v} if {low} <= {first} <= {high} else stop({code!r}, {site}, {v}, {low}, {high}))"
 
@@ -280,7 +310,7 @@ VALUES: dict[str, Callable[..., str]] = {
     "shl": _shift("shift_left"), "shr": _shift("shift_right"),
     "rol": _shift("rotate_left"), "ror": _shift("rotate_right"),
     **{name: _compare(name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
-    "convert": _convert, "nearest": _to_integer("nearest"), "truncate": _to_integer("truncate"), "bits": _bits,
+    "convert": _convert, "nearest": _nearest, "truncate": _truncate, "bits": _bits,
     "is_set": lambda e, machine, kind, a: f"({e.value(a)} != 0)",
     "select": _select, "mux": _mux, "min": _extreme("<=", "lesser"), "max": _extreme(">=", "greater"),
     "check": _check, "within": _within,

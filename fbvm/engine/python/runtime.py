@@ -35,6 +35,11 @@ def stop(code: str, site: int, *values: Any) -> Any:
     raise Stop(code, site, *values)
 
 
+def wrapped(number: int, machine: str, low: int, high: int, code: str, site: int) -> int:
+    """A number brought into its type, which has to lie within low..high."""
+    return within(arithmetic.wrap(number, machine), low, high, code, site)
+
+
 def within(value: int, low: int, high: int, code: str, site: int) -> int:
     if not low <= value <= high:
         raise Stop(code, site, value, low, high)
@@ -87,7 +92,8 @@ def bit_behind(reference: int, n: int) -> int:
 _PURE: dict[str, Any] = {
     "Observation": Observation, "NAN": arithmetic.NAN, "INF": arithmetic.INF, "stop": stop, "bisect": bisect_right,
     "quotient": quotient, "remainder": remainder, "divide": arithmetic.divide, "power": arithmetic.power,
-    "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux, "within": within,
+    "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux,
+    "within": within, "wrapped": wrapped,
     "single": arithmetic.single, "single_of_integer": arithmetic.single_of_integer, "bits": arithmetic.bits,
     "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": texts.enum_text,
     "from_leading": texts.from_leading,

@@ -13,7 +13,7 @@ from typing import Any
 from fbvm.base.areas import BUDGET, DUE
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
-from fbvm.engine.case_tables import case_table
+from fbvm.engine.case_tables import case_table, single_values
 from fbvm.engine.observation import NO_SITE
 from fbvm.engine.python.expressions import ROWS, flag_operands, view
 from fbvm.engine.python.writer import Expressions, bare, plus
@@ -271,8 +271,11 @@ def _case(w: BodyWriter, machine: str, a: Node, rows: tuple[tuple[Any, Block], .
         return
     blocks = [block for _, block in rows] + [otherwise]
     starts, numbers = case_table([labels for labels, _ in rows])
-    table, find = w.constant(starts), w.constant(numbers)
-    w.line(f"{name} = {find}[bisect({table}, {name})]")
+    single = single_values(starts, numbers, len(rows))
+    if single is not None:
+        w.line(f"{name} = {w.constant(single.get)}({name}, {len(rows)})")
+    else:
+        w.line(f"{name} = {w.constant(numbers)}[bisect({w.constant(starts)}, {name})]")
 
     def choose(first: int, last: int) -> None:
         if first == last:

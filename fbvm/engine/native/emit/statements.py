@@ -7,17 +7,13 @@ from typing import Any
 
 from fbvm.base.areas import DUE
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
-from fbvm.engine.case_tables import case_table
+from fbvm.engine.case_tables import FEW_VALUES, case_table
 from fbvm.engine.native.emit.expressions import flag_mask, place
 from fbvm.engine.native.emit.step_charges import charge
 from fbvm.engine.native.emit.stop_checks import observe
 from fbvm.engine.native.emit.texts import in_bytes, keep
 from fbvm.engine.native.emit.writer import TRAPPED, Writer, ir, signed, stored
 from fbvm.engine.ranges import is_float
-
-FEW_VALUES = 8
-"""Values up to which a range of a CASE is taken value by value."""
-
 
 # --- stores ---------------------------------------------------------------------------------------------------------
 
