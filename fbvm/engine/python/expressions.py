@@ -219,7 +219,7 @@ def _check(e: Expressions, machine: str, a: Node, low: int, high: int, code: str
     if low <= least and greatest <= high:
         return e.value(a)
     lowest, highest = limits(machine)
-    if a[0] in ARITHMETIC and lowest <= low and high <= highest:  # a number within needs no wrap
+    if a[0] in ARITHMETIC and lowest <= low and high <= highest and not never_wraps(a):  # a number within needs no wrap
         first, v = e.once(e.loose(a))
         return f"({v} if {low} <= {first} <= {high} else wrapped({v}, {machine!r}, {low}, {high}, {code!r}, {site}))"
     first, v = e.once(e.value(a))

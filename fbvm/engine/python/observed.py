@@ -16,6 +16,8 @@ from fbvm.engine.python.writer import bare
 class ObservedWriter(BodyWriter):
     """Writes one body that tells observations."""
 
+    may_hold_budget = False
+
     def block(self, block: Block) -> None:
         nodes: list[Node | None] = [*block, None]
         for number, node in enumerate(block):

@@ -13,6 +13,7 @@ from typing import Any
 from fbvm.base.areas import BUDGET, DUE
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
+from fbvm.code.shapes import is_address, statements
 from fbvm.engine.case_tables import case_table, single_values
 from fbvm.engine.observation import NO_SITE
 from fbvm.engine.python.expressions import ROWS, flag_operands, view
@@ -39,7 +40,11 @@ def function_name(number: int, body: Body) -> str:
 class BodyWriter(Expressions):
     """Writes one body of the plain build, which drops observations.
 
-    `tail` is the tail of the innermost loop of the current function, None outside of any."""
+    `tail` is the tail of the innermost loop of the current function, None outside of any.  `holds_budget` is True for a body
+    whose variable n has the step budget, too, so that a charge need not read it from memory."""
+
+    may_hold_budget = True
+    """Whether nobody changes the memory while a body is executed."""
 
     def __init__(self, image: Image, constants: dict[str, Any], base: int | None) -> None:
         super().__init__(ROWS, constants, base)
@@ -48,6 +53,7 @@ class BodyWriter(Expressions):
         self.indent = 1
         self.loops = 0
         self.tail: Block | None = None
+        self.holds_budget = False
         self.outlined = False
         self.leaves: set[int] = set()
         self.assigned: set[int] = set()
@@ -58,9 +64,12 @@ class BodyWriter(Expressions):
     def write(self, number: int) -> list[str]:
         """The lines of the Python function of the body of that number."""
         body = self.image.bodies[number]
+        self.holds_budget = self.may_hold_budget and _may_hold_budget(body)
         self.block(body.code)
         self.flush()
         lines = [f"def {function_name(number, body)}(b1):"]
+        if self.holds_budget:
+            lines.append(f"    n = i64[{BUDGET // 8}]")
         lines += [f"    b{size} = b1 >> {size.bit_length() - 1}" for size in (2, 4, 8) if size in self.bases]
         if self.shared:
             lines.append("    " + "".join(f"t{number} = " for number in sorted(self.shared)) + "None")
@@ -134,10 +143,9 @@ class BodyWriter(Expressions):
         shared = [f"    nonlocal {', '.join(f't{number}' for number in sorted(assigned))}"] if assigned else []
         self.routines.append([f"def {name}():", *shared, *self.ended(lines)])
         call = self.calling(f"{name}()")
-        if not leaves:
-            self.line(call)
-            return
-        self.line(f"r = {call}")
+        self.line(f"r = {call}" if leaves else call)
+        if self.holds_budget and not self.outlined:
+            self.line(f"n = i64[{BUDGET // 8}]")
         for code, leave in ((EXIT, _exit), (NEXT, _next), (RETURN, _return)):
             if code in leaves:
                 self.line(f"if r == {code}:")
@@ -160,6 +168,16 @@ class BodyWriter(Expressions):
         if otherwise:
             self.line("else:")
             self.suite(lambda: self.block(otherwise))
+
+
+def _may_hold_budget(body: Body) -> bool:
+    """True for a body with several charges, but no calls and no stores behind references, which might change the budget."""
+    nodes = list(statements(body.code))
+    return sum(node[0] == "charge" for node in nodes) > 1 and not any(map(_may_change_budget, nodes))
+
+
+def _may_change_budget(node: Node) -> bool:
+    return node[0] in ("call", "mark") or any(is_address(part) and isinstance(part[0], tuple) for part in node[1:3])
 
 
 def _empty(lines: list[str]) -> bool:
@@ -339,7 +357,8 @@ def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
 
 
 def _charge(w: BodyWriter, count: int, site: int) -> None:
-    w.line(f"i64[{BUDGET // 8}] = n = i64[{BUDGET // 8}] - {count}")
+    held = "n" if w.holds_budget and not w.outlined else f"i64[{BUDGET // 8}]"
+    w.line(f"i64[{BUDGET // 8}] = n = {held} - {count}")
     w.line(f"if n < least: ask(n, {site})")
 
 
