@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from typing import Any
 
 from fbvm.campaign.plan import CYCLE, EXACT, PHASE, REAL, SETTINGS, TIMING, VALUE, Axis
@@ -39,14 +40,18 @@ def _range(first: Any, last: Any, step: Any) -> Iterator[Any]:
 
 def _counted(first: Any, last: Any, step: Any) -> Iterator[Any]:
     numbers = first, last, step
-    if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in numbers) or step <= 0 or last < first:
+    if not all(_is_number(each) for each in numbers) or step <= 0 or last < first:
         raise ValueError(f"{first!r} to {last!r} by {step!r} is no range of numbers or times")
-    count = int((last - first) / step + 1e-9) + 1
-    if count > MOST_VALUES:
+    steps = (last - first) // step  # of any size: floats would not hold it
+    if steps >= MOST_VALUES:
         raise ValueError(f"a range has {MOST_VALUES:,} values at most")
-    for number in range(count):
+    for number in range(int((last - first) / step + 1e-9) + 1):
         value = first + number * step
         yield round(value, 12) if isinstance(value, float) else value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) or isinstance(value, float) and isfinite(value)
 
 
 def axis_from_text(written: str) -> Axis:

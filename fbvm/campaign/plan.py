@@ -15,6 +15,8 @@ SETTINGS = (CYCLE, PHASE, TIMING)
 """What an axis varies beside variables: the cycle time, how much later than the others a PLC begins, how units answer."""
 EXACT, REAL = "exact", "real"
 """Units answer after fixed numbers of scans, or late and out of step by the seed of the run."""
+MOST_RUNS = 10_000_000
+"""Runs of a campaign, whose results are held in memory."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from fbvm.base.dialects import DIALECTS
 from fbvm.base.files import SETTINGS_BYTES
 from fbvm.base.toml import TomlError, load_toml
 from fbvm.campaign.axes import axis_of
-from fbvm.campaign.plan import EXACT, REAL, SETTINGS, Axis, FaultRule, Golden, Judging, Moments, PowerRule, Response
+from fbvm.campaign.plan import EXACT, MOST_RUNS, REAL, SETTINGS, Axis, FaultRule, Golden, Judging, Moments, PowerRule, Response
 from fbvm.net.faults import NAMED, NO_FAULT
 from fbvm.run.fault_rows import FAULT, FIELDS
 from fbvm.run.project_reader import (
@@ -55,7 +55,6 @@ from fbvm.run.project_reader import (
 from fbvm.syntax.text import read
 
 FILE = "campaign.toml"
-MOST_RUNS = 100_000_000
 MOST_TIMES = 1000
 """How often a rule may happen in one run."""
 LASTS_NS = (10_000_000, 2_000_000_000)
@@ -200,15 +199,21 @@ def _kind_of(choices: Iterable[str]) -> str:
 
 def any_faults(count: int, for_ns: int) -> FaultRule:
     """So many faults of any kind, at any time of a run that takes `for_ns`.  None of them loses or doubles a part of a
-    stream, which TCP itself never does."""
+    stream, which TCP itself never does.  Raises ValueError for too many."""
     kinds = tuple((name, kind.fault) for name, kind in NAMED.items()
                   if not kind.fault.lose_percent and not kind.fault.duplicate_percent)  # fmt: skip
-    return FaultRule(Moments((0, for_ns), LASTS_NS, count), kinds)
+    return FaultRule(Moments((0, for_ns), LASTS_NS, _times(count)), kinds)
 
 
 def any_cuts(count: int, for_ns: int) -> PowerRule:
-    """So many power cuts of any of the PLCs, at any time of a run that takes `for_ns`."""
-    return PowerRule(Moments((0, for_ns), LASTS_NS, count), ())
+    """So many power cuts of any of the PLCs, at any time of a run that takes `for_ns`.  Raises ValueError for too many."""
+    return PowerRule(Moments((0, for_ns), LASTS_NS, _times(count)), ())
+
+
+def _times(count: int) -> int:
+    if count > MOST_TIMES:
+        raise ValueError(f"{count:,} faults or power cuts are too many: a run has {MOST_TIMES:,} of each at most")
+    return count
 
 
 # --- axes -------------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import Any
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.campaign.execution import Wrong
 from fbvm.campaign.judge import Judge
-from fbvm.campaign.plan import VALUE, Axis, Plan
+from fbvm.campaign.plan import MOST_RUNS, VALUE, Axis, Plan
 from fbvm.campaign.plan_file import Written
 from fbvm.code.image import Image
 from fbvm.interchange.formats.given import usual_dialect
@@ -75,6 +75,7 @@ def plan_of(written: Written, project: Project, images: Mapping[str, Image]) -> 
         tuple(_located(axis, list(plcs)) for axis in written.axes), written.faults, cuts,
         replace(written.judging, goldens=goldens), about["show"],
     )  # fmt: skip
+    check_count(plan)
     for axis in plan.axes:
         for value in axis.values if axis.what == VALUE else ():
             _check(axis, value, plcs[axis.plc].runs[0].plc)
@@ -83,6 +84,13 @@ def plan_of(written: Written, project: Project, images: Mapping[str, Image]) -> 
     except (ConditionError, UnknownPlace, TypeError) as error:
         raise Unfit(str(error)) from None
     return plan
+
+
+def check_count(plan: Plan) -> None:
+    """Raises Unfit for more runs than can be done."""
+    if plan.count > MOST_RUNS:
+        what = f"{plan.runs:,} runs" if plan.runs else f"{plan.combinations:,} combinations of the values"
+        raise Unfit(f"{what} are too many: a campaign or a sweep has {MOST_RUNS:,} runs at most")
 
 
 def _known(names: Sequence[str], there: Sequence[str]) -> tuple[str, ...]:

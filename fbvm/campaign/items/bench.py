@@ -13,7 +13,7 @@ from fbvm.base.version import VERSION
 from fbvm.campaign.items.execution import ItemsExecution, ItemsSession
 from fbvm.campaign.plan import Plan
 from fbvm.campaign.plan_file import Written
-from fbvm.campaign.planning import Unfit
+from fbvm.campaign.planning import Unfit, check_count
 from fbvm.campaign.project_copies import files_of
 from fbvm.campaign.shrinking import Shrunk, shrink
 from fbvm.campaign.variants import Variant, draw
@@ -79,8 +79,10 @@ def plan_of_tests(written: Written, tests: Sequence[str]) -> Plan:
     axes = tuple(replace(axis, path=axis.path or axis.name) for axis in written.axes)
     cuts = tuple(replace(rule, plcs=rule.plcs or ("",)) for rule in written.cuts)
     nothing = Project(Source(FILE, ""), "loop", 0, None, None, (), (), frozenset(), (), ())
-    return Plan(nothing, about["seed"], about["runs"], about["timing"], about["for"], axes, written.faults, cuts,
+    plan = Plan(nothing, about["seed"], about["runs"], about["timing"], about["for"], axes, written.faults, cuts,
                 written.judging, about["show"], tuple(tests))  # fmt: skip
+    check_count(plan)
+    return plan
 
 
 def _of_programs(written: Written) -> Iterator[str]:

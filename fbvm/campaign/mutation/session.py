@@ -116,17 +116,32 @@ def sample(mutants: Sequence[Mutant], most: int, seed: int) -> list[Mutant]:
 def changed_lines(folder: Path, revision: str, names: Sequence[str]) -> dict[str, set[int]]:
     """The lines of files that differ from a revision of Git, by file.  Raises NotPossible."""
     found = {}
+    _check_revision(folder, revision)
     for name in names:
         command = ["git", "diff", "--no-color", "--no-ext-diff", "-U0", "--end-of-options", revision, "--", name]
-        try:
-            said = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", check=False)
-        except OSError as error:
-            raise NotPossible(f"git cannot be started: {error}") from None
-        if said.returncode:
-            raise NotPossible(f"git: {said.stderr.strip() or f'there is no {revision}'}")
-        hunks = _HUNK.findall(said.stdout)
+        hunks = _HUNK.findall(_git(command, folder))
         found[name] = {int(first) + more for first, count in hunks for more in range(int(count or 1))}
     return found
+
+
+def _check_revision(folder: Path, revision: str) -> None:
+    """Raises NotPossible for one that the repository does not have: `git diff` answers that by all of its options."""
+    _git(["git", "rev-parse", "--git-dir"], folder)
+    try:
+        _git(["git", "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}"], folder)
+    except NotPossible:
+        raise NotPossible(f"--since {revision}: the repository has no such revision") from None
+
+
+def _git(command: Sequence[str], folder: Path) -> str:
+    """What git answers.  Raises NotPossible."""
+    try:
+        said = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", check=False)
+    except OSError as error:
+        raise NotPossible(f"git cannot be started: {error}") from None
+    if said.returncode:
+        raise NotPossible(f"git: {said.stderr.strip()}")
+    return said.stdout
 
 
 # --- trying them ------------------------------------------------------------------------------------------------------

@@ -220,7 +220,7 @@ def _print(outcome: Outcome, recordings: dict[int, Path]) -> None:
     good = done - outcome.failing
     cut = f" of {outcome.plan.count:,}" if done < outcome.plan.count else ""
     said = f", {outcome.failing:,} failed in {len(groups):,} group{'s' * (len(groups) != 1)}" if groups else ""
-    say(f"{done:,}{cut} runs: {good:,} good{said}", bold=True)
+    say(f"{done:,}{cut} run{'s' * (outcome.plan.count != 1)}: {good:,} good{said}", bold=True)
 
 
 def _about(outcome: Outcome, group: Group, recordings: dict[int, Path]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import AbstractContextManager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -13,8 +14,18 @@ if TYPE_CHECKING:
 
     from fbvm.campaign.cluster import Cluster
 
+_ADDRESS = re.compile(r"local|(tcp|tls|wss?)://[^/\s]+:\d+")
+
+
+def _address(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    """The address, if it is one: Dask waits for half a minute before it says that of another text."""
+    if value is not None and not _ADDRESS.fullmatch(value):
+        raise click.BadParameter(f"{value!r} is no scheduler: write local, or an address such as tcp://192.168.1.5:8786")
+    return value
+
+
 cluster_option = click.option(
-    "--cluster", metavar="local|tcp://HOST:PORT",
+    "--cluster", metavar="local|tcp://HOST:PORT", callback=_address,
     help="Have Dask do the work: in processes of this machine, or by the workers of a scheduler.")  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fbvm.cli.projects.cluster import client_of, cluster_option
-from fbvm.cli.projects.planned_runs import processes, refuse
+from fbvm.cli.projects.planned_runs import MOST_PROCESSES, jobs_option, processes, refuse
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import time_ns
@@ -41,9 +41,9 @@ Told = Mapping[int, "tuple[str, Figures]"]
 @click.argument("project", required=False, type=SourcePath())
 @click.option("--net", type=click.Choice(["loop", "tcp"]), help="The network, in place of the project's.")
 @click.option("--for", "for_ns", type=time_ns, metavar="TIME", help="How long the PLCs run; until Ctrl-C by itself.")
-@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes; as many as there are processors by itself.")
+@jobs_option
 @cluster_option
-@click.option("--shards", type=click.IntRange(min=1), metavar="N",
+@click.option("--shards", type=click.IntRange(1, MOST_PROCESSES), metavar="N",
               help="Parts of the fleet; on a cluster as many as it has workers by itself, else as many as --jobs.")
 @click.option("--doors", "doors_file", type=OUTPUT, metavar="FILE",
               help="Write where each unit can be reached, as CSV, when all parts run.")
@@ -85,6 +85,7 @@ def _places(file: Path | None, options: dict[str, Any]) -> AbstractContextManage
     from fbvm.run.shards import shards_of
 
     project, for_ns = _project(file, options)
+    _check_shards(project, options["shards"])
     found, said = images_of(project)
     for diagnostic in said:
         show_diagnostic(diagnostic)
@@ -98,6 +99,13 @@ def _places(file: Path | None, options: dict[str, Any]) -> AbstractContextManage
 
     jobs = processes(options["jobs"])
     return in_cluster(client_of(options["cluster"], jobs), shards) if options["cluster"] else here(shards(jobs))
+
+
+def _check_shards(project: Project, shards: int | None) -> None:
+    plcs = sum(row.count or 1 for row in project.plcs)
+    if shards and shards > plcs:
+        raise click.UsageError(f"--shards {shards}: there {'is' if plcs == 1 else 'are'} {plcs:,} PLC{'s' * (plcs != 1)}; "
+                               "a part has one at least")  # fmt: skip
 
 
 def _project(file: Path | None, options: dict[str, Any]) -> tuple[Project, int | None]:

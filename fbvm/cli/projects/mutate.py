@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fbvm.cli.projects.cluster import cluster_of, cluster_option
+from fbvm.cli.projects.planned_runs import MOST_SEED, jobs_option, processes
 from fbvm.cli.shared import status
 from fbvm.cli.shared.options import CYCLE_NS, moment_ns, time_ns
 from fbvm.cli.shared.progress import show_progress
@@ -29,8 +31,8 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.argument("files", nargs=-1, type=_FILE, metavar="[FILE]...")
 @click.option("--since", metavar="REVISION", help="Only lines that differ from this revision of Git.")
 @click.option("--sample", type=click.IntRange(min=1), metavar="N", help="Try N mutants, drawn by --seed.")
-@click.option("--seed", type=int, default=0, metavar="N", help="What --sample draws with.")
-@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes; as many as there are processors by itself.")
+@click.option("--seed", type=click.IntRange(0, MOST_SEED), default=0, metavar="N", help="What --sample draws with.")
+@jobs_option
 @click.option("--limit", "limit_ns", type=time_ns, default=0, metavar="TIME",
               help="How long the tests may take with a mutant; ten times as long as without one by itself.")
 @click.option("--budget", "budget_ns", type=moment_ns, default=PROOF_NS, show_default="5s", metavar="TIME",
@@ -65,6 +67,7 @@ def command(files: tuple[Path, ...], as_json: bool, **options: Any) -> None:
     from fbvm.campaign.work import Mismatch, Unreachable
 
     folder, address = Path.cwd(), options["cluster"]
+    _check_tests(options["arguments"])
     try:
         names = _names(files, folder) or sources_of(folder)
         sources = [read_source(folder, name) for name in names]
@@ -73,7 +76,7 @@ def command(files: tuple[Path, ...], as_json: bool, **options: Any) -> None:
         if options["sample"]:
             mutants = sample(mutants, options["sample"], options["seed"])
         outcome = Outcome(len(mutants))
-        settings = Settings(options["jobs"] or os.cpu_count() or 1, options["arguments"], options["limit_ns"],
+        settings = Settings(processes(options["jobs"]), options["arguments"], options["limit_ns"],
                             options["budget_ns"], options["cycle_ns"])  # fmt: skip
         try:
             if mutants:
@@ -101,6 +104,16 @@ def _names(files: tuple[Path, ...], folder: Path) -> list[str]:
             raise click.UsageError(f"{named(file)} is not in this folder: go to the folder of its project")
         names.append(path.relative_to(folder).as_posix())
     return names
+
+
+def _check_tests(arguments: Sequence[str]) -> None:
+    """Raises UsageError for a test whose file is not there, which would look like a test that fails."""
+    for argument in arguments:
+        path = argument.partition("::")[0]
+        if path.startswith("-"):  # an option of pytest, whose value may follow
+            return
+        if not Path(path).exists():
+            raise click.UsageError(f"--tests {argument}: there is no {path} in this folder")
 
 
 def _counted(outcome: Outcome) -> str:
@@ -138,4 +151,5 @@ def _print(outcome: Outcome, sources: list[Source], as_json: bool) -> None:
         say("nothing to change")
         return
     cut = f" of {outcome.known}" if len(outcome.tried) < outcome.known else ""
-    say(f"{len(outcome.tried)}{cut} mutants: {_counted(outcome)}; the tests find {100 * outcome.score:.0f} %")
+    many = "s" * (outcome.known != 1)
+    say(f"{len(outcome.tried)}{cut} mutant{many}: {_counted(outcome)}; the tests find {100 * outcome.score:.0f} %")

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from fbvm.run.project import Project
 
 OUTPUT = click.Path(dir_okay=False, path_type=Path)
+MOST_PROCESSES = 1_000
+MOST_SEED = 1 << 62
+jobs_option = click.option("--jobs", type=click.IntRange(1, MOST_PROCESSES), metavar="N",
+                           help="Processes; as many as there are processors by itself.")
 
 
 class RunPath(SourcePath):
@@ -59,9 +63,8 @@ def plan_options(function: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--vary", "varied", multiple=True, metavar="NAME=VALUE,...|FIRST..LAST[/STEP]",
                      help="Write each of these values before the first scan; PLC.cycle, PLC.phase and PLC.timing are settings."),
         show_option,
-        click.option("--seed", type=click.IntRange(min=0), metavar="N", help="What runs are drawn by."),
-        click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-                     help="Processes; as many as there are processors by itself."),
+        click.option("--seed", type=click.IntRange(0, MOST_SEED), metavar="N", help="What runs are drawn by."),
+        jobs_option,
         click.option("--csv", "csv_file", type=OUTPUT, metavar="FILE", help="Write the results as CSV."),
         click.option("--parquet", "parquet_file", type=OUTPUT, metavar="FILE", help="Write them as Parquet; needs pyarrow."),
         allow_outside_option,

@@ -287,6 +287,13 @@ def test_the_row_of_three_plcs_is_good_and_a_fault_planted_in_a_copy_is_found(fo
     (("mix.st", "--faults", "1"), "say how long a run takes at most"),
     (("mix.st", "--for", "1s", "--write-golden"), "no [[golden]] to write"),
     (("none.toml",), "none.toml"),
+    (("mix.st", "--for", "1s", "--runs", "1000000000"), "1,000,000,000 runs are too many"),
+    (("mix.st", "--for", "1s", "--vary", "Main.Limit=1..30000", "--vary", "Main.Count=1..30000"), "900,000,000 combinations"),
+    (("mix.st", "--for", "1s", "--faults", "1001"), "a run has 1,000 of each at most"),
+    (("mix.st", "--for", "1s", "--cuts", "1000000000"), "a run has 1,000 of each at most"),
+    (("mix.st", "--for", "1s", "--jobs", "1000000000"), "is not in the range"),
+    (("mix.st", "--for", "1s", "--seed", "1" + 30 * "0"), "is not in the range"),
+    (("mix.st", "--for", "1s", "--cluster", "192.168.1.5"), "'192.168.1.5' is no scheduler: write local, or an address"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_said_before_anything_is_written(folder: Path, arguments: tuple[str, ...], said: str) -> None:
     status, text = fbvm(*arguments)

@@ -64,7 +64,8 @@ def test_values_of_an_axis_as_a_command_line_writes_them(written: str, values: t
 @pytest.mark.parametrize(("written", "said"), [
     ("Main.n", "is not NAME=VALUE"), ("Main.n=", "is not NAME=VALUE"), ("=1", "is not NAME=VALUE"),
     ("Main.n=5..1", "5 to 1 by 1 is no range"), ("cycle=0ms", "0ms"), ("cycle=5", "5"), ("timing=late", "late"),
-    ("Main.n=a..b", "a"),
+    ("Main.n=a..b", "a"), ("Main.n=1..nan", "1 to nan by 1 is no range"), ("Main.n=1..2/inf", "by inf is no range"),
+    (f"Main.n=1..1{400 * '0'}", "1,000,000 values at most"),
 ])  # fmt: skip
 def test_what_is_no_axis_is_refused(written: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):

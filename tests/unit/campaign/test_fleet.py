@@ -170,6 +170,11 @@ def test_parts_in_a_cluster_are_told_by_their_workers() -> None:
     assert [name for name, _ in workers.told[3:]] == ["_figures", "_stop", "_end"]
 
 
+def test_more_parts_than_plcs_are_refused(folder: Path) -> None:
+    result = CliRunner().invoke(main, ["fleet", "--for", "1s", "--net", "loop", "--shards", "7"])
+    assert (result.exit_code, "--shards 7: there are 6 PLCs; a part has one at least" in result.stderr) == (status.USAGE, True)
+
+
 @pytest.mark.slow
 def test_a_fleet_in_two_processes_does_all_scans_of_the_project(folder: Path) -> None:
     result = CliRunner().invoke(main, ["fleet", "--for", "2s", "--jobs", "2", "--json-lines"])

@@ -82,6 +82,13 @@ def test_only_lines_that_have_changed_since_a_revision(project: Path) -> None:
     git("commit", "-m", "first")
     (project / "src" / "Level.st").write_text(LEVEL.replace("> 5", "> 6").replace("    IF Pulse", "\n    IF Pulse"))
     assert changed_lines(project, "HEAD", ["src/Level.st"]) == {"src/Level.st": {4, 6}}
+    status, said = mutated("--since", "nosuch")
+    assert (status, "--since nosuch: the repository has no such revision" in said) == (2, True)
+
+
+def test_a_test_that_is_not_there_is_told_before_anything_is_tried(project: Path) -> None:
+    status, said = mutated("--tests", "tests/nothing.py::x")
+    assert (status, "--tests tests/nothing.py::x: there is no tests/nothing.py in this folder" in said) == (2, True)
 
 
 def _nothing(number: int) -> None:
