@@ -18,7 +18,7 @@ from distributed.scheduler import KilledWorker
 
 from fbvm.base.host import deaf_children
 from fbvm.base.version import VERSION
-from fbvm.campaign.processes import CRASHED, Crashed, Late
+from fbvm.campaign.processes import Crashed, Late
 from fbvm.campaign.work import Mismatch, Unreachable
 
 Task = TypeVar("Task")
@@ -128,7 +128,7 @@ class Cluster(Generic[Task, Result]):
         self._stack.close()
 
     def results(self, tasks: Iterable[Task], limit_ns: int) -> Iterator[tuple[Task, Result | Late | Crashed]]:
-        """Each task with what came of it, in the order in which they end, CRASHED for one that ends every worker that tries
+        """Each task with what came of it, in the order in which they end, Crashed for one that ends every worker that tries
         it."""
         left, waiting = iter(tasks), dict[str, Task]()
 
@@ -148,7 +148,7 @@ class Cluster(Generic[Task, Result]):
             if future.status == "finished":
                 yield task, future.result()
             elif future.status == "error" and isinstance(future.exception(), KilledWorker):
-                yield task, CRASHED
+                yield task, Crashed()
             elif future.status == "error":
                 raise future.exception()
             else:

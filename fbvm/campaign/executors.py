@@ -1,7 +1,7 @@
 """Who executes the tasks of a campaign: this process, or several of this machine.
 
-An executor is used in a `with` statement; `done` gives back each task with what came of it, None for one that ends its
-process."""
+An executor is used in a `with` statement; `done` gives back each task with what came of it, Late or Crashed for one that
+ends its process."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LIMIT_NS = 600_000_000_000
 class Executor(AbstractContextManager["Executor"], Protocol):
     """Does tasks."""
 
-    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | Late | Crashed]]:
         """Each task with what came of it, in the order in which they end."""
 
 
@@ -33,7 +33,7 @@ class InThisProcess(Executor):
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Nothing to give back."""
 
-    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | Late | Crashed]]:
         for task in tasks:
             yield task, self._bench.work(0, task)
 
@@ -58,9 +58,8 @@ class ByWorkers(Executor):
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._workers.__exit__(kind, error, trace)
 
-    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
-        for task, found in self._workers.results(tasks, LIMIT_NS):
-            yield task, None if isinstance(found, Late | Crashed) else found
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | Late | Crashed]]:
+        yield from self._workers.results(tasks, LIMIT_NS)
 
 
 def in_processes(bench: AnyBench, jobs: int) -> Executor:

@@ -38,6 +38,8 @@ serve(line)
 
 POLL_S = 0.2
 """How often limits are looked at while nobody answers."""
+CLOSED_S = 1.0
+"""How long a process may live that has closed its line."""
 TRIES = 2
 """How often a task is begun whose process ends by itself."""
 
@@ -46,11 +48,19 @@ class Late:
     """What comes of a task that was not done within its limit."""
 
 
+@dataclass(frozen=True)
 class Crashed:
-    """What comes of a task that has ended its process, each time that it was tried."""
+    """What comes of a task that has ended its process, each time that it was tried; `how`, as far as it is known: by which
+    signal, or with which status."""
+
+    how: str = ""
 
 
-LATE, CRASHED = Late(), Crashed()
+LATE = Late()
+
+
+class Hopeless(ValueError):
+    """What `work` may raise to end all tasks: none of them can be done.  Any other error ends the process of its task."""
 
 
 class NotStarted(OSError):
@@ -71,6 +81,16 @@ class Process:
         if not self.process.stdout.read(1):
             raise NotStarted(f"{sys.executable} ended with status {self.process.wait()} before it began")
         return self.door.accept()
+
+    def ended(self) -> Crashed:
+        """How the process has ended, whose line is closed."""
+        with suppress(subprocess.TimeoutExpired):
+            status = self.process.wait(CLOSED_S)
+            try:
+                return Crashed(f"by {signal.Signals(-status).name}" if status < 0 else f"with status {status}")
+            except ValueError:  # a signal without a name
+                return Crashed(f"by signal {-status}")
+        return Crashed()
 
     def end(self) -> None:
         """Ends the process, whatever it does."""
@@ -131,7 +151,7 @@ class Pool(Generic[Task, Result]):
 
     def results(self, tasks: Iterable[Task], limit_ns: int) -> Iterator[tuple[Task, Result | Late | Crashed]]:
         """Each task with what came of it, in the order in which they end.  A task has `limit_ns`
-        from its beginning on, without the start of a process.  Raises NotStarted."""
+        from its beginning on, without the start of a process.  Raises NotStarted, and Hopeless where `work` does."""
         left, begun = deque(tasks), Counter[int]()
         while left or any(worker and worker.task is not None for worker in self._workers):
             self._hand_out(left, limit_ns)
@@ -163,16 +183,19 @@ class Pool(Generic[Task, Result]):
             self._begin(number, left.popleft(), limit_ns)
 
     def _heard(self, number: int, worker: _Worker[Task], limit_ns: int) -> tuple[Result] | Crashed | None:
-        """What a process has sent: a result, None if it is ready to begin; CRASHED if it has ended."""
+        """What a process has sent: a result, None if it is ready to begin; Crashed if it has ended.  Raises Hopeless."""
         try:
             result = worker.line.recv()
         except (EOFError, OSError):
+            how = worker.process.ended()
             self._end(number)
-            return CRASHED
+            return how
         if not worker.is_ready:
             worker.is_ready, worker.expired = True, time_limit(limit_ns)
             return None
         worker.task = None
+        if isinstance(result, Hopeless):
+            raise result
         return (result,)
 
     def _begin(self, number: int, task: Task, limit_ns: int) -> None:
@@ -198,7 +221,11 @@ def _do_tasks(number: int, prepare: Callable[[int], None], work: Callable[[int, 
     prepare(number)
     line.send(None)
     while True:
-        line.send(work(number, line.recv()))
+        task = line.recv()
+        try:
+            line.send(work(number, task))
+        except Hopeless as error:
+            line.send(error)
 
 
 def serve(line: Line) -> None:

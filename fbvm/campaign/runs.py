@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from fbvm.campaign.execution import Result
-from fbvm.campaign.executors import Executor, InThisProcess, in_processes
+from fbvm.campaign.executors import LIMIT_NS, Executor, InThisProcess, in_processes
 from fbvm.campaign.groups import Group, grouped
 from fbvm.campaign.judge import CRASHED, Failure
 from fbvm.campaign.plan import Plan
+from fbvm.campaign.processes import Crashed, Late
 from fbvm.campaign.shrinking import Shrunk
 from fbvm.campaign.work import AnyBench, Batch, Shrinking, Task
 from fbvm.run.time_limit import stopwatch
@@ -64,43 +65,66 @@ def conduct(bench: AnyBench, outcome: Outcome, jobs: int, take: Callable[[Sequen
     smaller.
 
     `take` is called with results as they come, and enters them.  `others` execute runs, else `jobs` processes of this machine, or
-    this process if that is quicker.  What is in `outcome` at a KeyboardInterrupt is good.
+    this process if that is quicker and no run can end it.  What is in `outcome` at a KeyboardInterrupt is good.
 
     Raises Wrong for a project that cannot be executed; ConditionError, LookupError, TypeError and ValueError for names and
     conditions that do not fit its programs."""
-    left, once_ns = outcome.left, 0
-    for number in left[:2]:  # what does not fit is found here; the first takes longer, since all is made ready for it
+    if bench.ends_processes:
+        with others or in_processes(bench, jobs) as those:
+            left, once_ns = _first_runs(those, outcome.left, take)
+            _execute(those, left, _size(bench, once_ns, len(left), jobs), take)
+            if shrinks:
+                _shrink(those, outcome)
+        return
+    left, once_ns = _first_runs(InThisProcess(bench), outcome.left, take)
+    is_quick = others is None and (jobs == 1 or once_ns * len(left) < QUICK_NS)
+    with InThisProcess(bench) if is_quick else others or in_processes(bench, jobs) as those:
+        _execute(those, left, 1 if is_quick else _size(bench, once_ns, len(left), jobs), take)
+        if shrinks:
+            _shrink(those, outcome)
+
+
+def _first_runs(executor: Executor, left: Sequence[int], take: Callable[[Sequence[Result]], None]) -> tuple[Sequence[int], int]:
+    """Executes one run or two, which find out what does not fit.  Returns the others, and how long a run takes: the first one
+    takes longer, since all is made ready for it."""
+    once_ns = 0
+    for number in left[:2]:
         if once_ns > LONG_NS:
             break
         elapsed = stopwatch()
-        take([bench.execution().result(bench.variant(number))])
+        _execute(executor, [number], 1, take)
         once_ns = elapsed()
         left = left[1:]
-    if others is None and (jobs == 1 or once_ns * len(left) < QUICK_NS):
-        others, size = InThisProcess(bench), 1
-    else:
-        others = others or in_processes(bench, jobs)
-        size = max(1, min(bench.batch_ns // max(once_ns, 1), MOST_IN_BATCH, len(left) // jobs))
-    with others:
-        _execute(others, left, size, take)
-        if shrinks:
-            _shrink(others, outcome)
+    return left, once_ns
+
+
+def _size(bench: AnyBench, once_ns: int, count: int, jobs: int) -> int:
+    """How many runs a batch has, if each of so many takes so long."""
+    return max(1, min(bench.batch_ns // max(once_ns, 1), MOST_IN_BATCH, count // jobs))
 
 
 def _execute(executor: Executor, numbers: Sequence[int], size: int, take: Callable[[Sequence[Result]], None]) -> None:
     """Executes runs in batches.  Of a batch that has ended its process each run is tried alone."""
     batches: list[Task] = [Batch(tuple(numbers[at : at + size])) for at in range(0, len(numbers), size)]
-    alone: list[Task] = []
+    alone: list[int] = []
     for task, found in executor.done(batches):
         assert isinstance(task, Batch)
         if isinstance(found, list):
             take(found)
+        elif len(task.numbers) > 1:
+            alone += task.numbers
         else:
-            alone += [Batch((number,)) for number in task.numbers]
-    for task, found in executor.done(alone):
-        assert isinstance(task, Batch)
-        ended = [Result(number, failure=Failure(CRASHED, "the process of the run ended")) for number in task.numbers]
-        take(found if isinstance(found, list) else ended)
+            assert isinstance(found, Late | Crashed)
+            take([ended(task.numbers[0], found)])
+    if alone:
+        _execute(executor, alone, 1, take)
+
+
+def ended(number: int, found: Late | Crashed) -> Result:
+    """The result of a run that has ended its process, or was ended."""
+    how = found.how if isinstance(found, Crashed) else ""
+    said = f"it has not ended within {LIMIT_NS // 1_000_000_000} s" if isinstance(found, Late) else "the process of the run ended"
+    return Result(number, failure=Failure(CRASHED, f"{said} {how}".rstrip()))
 
 
 def _shrink(executor: Executor, outcome: Outcome) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import ClassVar, Protocol, TypeAlias
 
 from fbvm.base.version import VERSION
 from fbvm.campaign.execution import Execution, Result
@@ -62,6 +62,10 @@ class AnyBench(Protocol):
     def batch_ns(self) -> int:
         """About how long a batch takes."""
 
+    @property
+    def ends_processes(self) -> bool:
+        """True if a run may end the process that executes it, as a test may; a program cannot."""
+
     def prepare(self, number: int) -> None:
         """Makes a process ready."""
 
@@ -106,6 +110,7 @@ class Bench:
     mark: str
     """A hash of all that results depend on."""
     batch_ns: int = BATCH_NS
+    ends_processes: ClassVar[bool] = False
 
     @classmethod
     def of(cls, plan: Plan, images: Mapping[str, Image]) -> Bench:

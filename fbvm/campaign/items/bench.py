@@ -6,15 +6,21 @@ import hashlib
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.version import VERSION
+from fbvm.campaign.execution import Result
+from fbvm.campaign.executors import LIMIT_NS
 from fbvm.campaign.items.execution import ItemsExecution, ItemsSession
 from fbvm.campaign.plan import Plan
 from fbvm.campaign.plan_file import Written
 from fbvm.campaign.planning import Unfit, check_count
+from fbvm.campaign.processes import Crashed, Late, Pool
 from fbvm.campaign.project_copies import files_of
+from fbvm.campaign.runs import ended
 from fbvm.campaign.shrinking import Shrunk, shrink
 from fbvm.campaign.variants import Variant, draw
 from fbvm.campaign.work import Batch, Done, Task
@@ -35,6 +41,7 @@ class ItemsBench:
     mark: str
     """A hash of all that results depend on."""
     batch_ns: int = BATCH_NS
+    ends_processes: ClassVar[bool] = True
 
     @classmethod
     def of(cls, plan: Plan, folder: Path) -> ItemsBench:
@@ -69,6 +76,19 @@ class ItemsBench:
             return shrink(session, self.variant(task.result.number), task.result)
 
         return self.execution().within(smaller)
+
+    def recorded_apart(self, variant: Variant, path: Path) -> tuple[Result, str]:
+        """Executes a run in a process of its own, which it may end, and leaves traces as `ItemsExecution.recorded` does.  Returns
+        its result, and what pytest says of it.  Raises NoTests."""
+        path.unlink(missing_ok=True)
+        with Pool[Variant, tuple[Result, str]](1, self.prepare, partial(_recorded, self, path.absolute())) as pool:
+            ((_, found),) = pool.results([variant], LIMIT_NS)
+        return (ended(variant.number, found), "") if isinstance(found, Late | Crashed) else found
+
+
+def _recorded(bench: ItemsBench, path: Path, number: int, variant: Variant) -> tuple[Result, str]:
+    execution = bench.execution()
+    return execution.recorded(variant, path)[0], execution.report
 
 
 def plan_of_tests(written: Written, tests: Sequence[str]) -> Plan:

@@ -23,6 +23,7 @@ from fbvm.campaign.execution import Result
 from fbvm.campaign.items.watched import Violated, Watched
 from fbvm.campaign.judge import TEST, TRAP, Failure
 from fbvm.campaign.plan import CYCLE, PHASE, TIMING, VALUE, Judging, Plan
+from fbvm.campaign.processes import Hopeless
 from fbvm.campaign.pytest_session import run_pytest
 from fbvm.campaign.variants import Variant
 from fbvm.record.recording.file_writer import fingerprint
@@ -38,7 +39,7 @@ NO_TESTS = 5
 Made = TypeVar("Made")
 
 
-class NoTests(ValueError):
+class NoTests(Hopeless):
     """The tests cannot be executed, or there are none, or none of their PLCs has what is varied; the message says which."""
 
 

@@ -58,13 +58,12 @@ def bench_of_tests(files: Sequence[Path], options: dict[str, Any], change: Chang
 
 def record_test(bench: AnyBench, variant: Variant, path: Path) -> tuple[Result, str]:
     """Executes a run and records its PLCs.  Returns its result, and what pytest says."""
-    from fbvm.campaign.items.execution import ItemsExecution
+    from fbvm.campaign.items.bench import ItemsBench
     from fbvm.cli.shared.files import writing
 
-    execution = bench.execution()
-    assert isinstance(execution, ItemsExecution)
+    assert isinstance(bench, ItemsBench)
     with writing(path):
-        return execution.recorded(variant, path.absolute())[0], execution.report
+        return bench.recorded_apart(variant, path)
 
 
 def travelling(bench: AnyBench) -> Any:

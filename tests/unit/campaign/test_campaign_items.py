@@ -71,6 +71,33 @@ def test_failing_runs_of_tests_are_grouped_and_each_is_done_again_by_its_number(
     assert f"run 4, seed {rows[4]['seed']}: test tests/test_counter.py::test_it_counts (tests/test_counter.py:4)" in said
 
 
+ENDS = """import ctypes
+import os
+
+def test_it(fb):
+    counter = fb("src/Counter.st")
+    if counter.Step < 3:
+        os._exit(3)
+    if counter.Step == 3:
+        ctypes.string_at(0)
+    counter.run(scans=2)
+    assert counter.Total < 10
+"""
+
+
+@pytest.mark.slow
+def test_a_test_that_ends_its_process_is_a_failure_of_its_own_and_the_others_are_done(project: Path) -> None:
+    (project / "tests" / "test_ends.py").write_text(ENDS)
+    arguments = ("tests/test_ends.py", "--vary", "Step=2,3,4")
+    status, said = fbvm(*arguments, "--json", "--jobs", "2")
+    found = {(group["kind"], group["text"]): (group["first"], group["runs"]) for group in json.loads(said)["groups"]}
+    ended, segfault = "the process of the run ended with status 3", "the process of the run ended by SIGSEGV"
+    assert (status, found) == (1, {("crashed", ended): (0, 1), ("crashed", segfault): (1, 1),
+                                   ("test", "tests/test_ends.py::test_it"): (2, 1)})  # fmt: skip
+    status, said = fbvm(*arguments, "--only", "0")
+    assert (status, f": crashed {ended}\n" in said) == (1, True)
+
+
 @pytest.mark.slow
 def test_a_test_in_st_is_varied_and_its_line_told(project: Path) -> None:
     status, said = fbvm("tests/test_st.st::Test_of_st", "--vary", "Limit=5,1", "--jobs", "1", "--json")

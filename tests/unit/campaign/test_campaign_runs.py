@@ -158,7 +158,8 @@ def test_a_run_that_ends_its_process_is_a_failure_and_nothing_else_is_lost(folde
     outcome = Outcome(bench.plan)
     conduct(KillsRun(**vars(bench)), outcome, 2, outcome.add, in_processes(KillsRun(**vars(bench)), 2))
     assert sorted(outcome.results) == list(range(20))
-    assert [(result.number, result.failure.kind) for result in outcome.rows if result.failure] == [(7, CRASHED)]
+    failures = [(result.number, result.failure.kind, result.failure.text) for result in outcome.rows if result.failure]
+    assert failures == [(7, CRASHED, "the process of the run ended by SIGKILL")]
 
 
 @pytest.mark.slow

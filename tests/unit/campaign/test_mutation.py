@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from fbvm.campaign.mutation.session import changed_lines
-from fbvm.campaign.processes import CRASHED, LATE, Pool
+from fbvm.campaign.processes import LATE, Crashed, Pool
 from fbvm.campaign.project_copies import pack_project
 from fbvm.campaign.shipped import Shipped
 from fbvm.cli.main import main
@@ -106,7 +106,7 @@ def _work(number: int, task: str) -> str:
 def test_a_task_that_ends_its_process_or_never_ends_is_told_and_the_others_are_done() -> None:
     with Pool[str, str](2, _nothing, _work) as pool:
         found = dict(pool.results(["a", "ends", "b", "stays", "c"], 3_000_000_000))
-    assert found == {"a": "A", "b": "B", "c": "C", "ends": CRASHED, "stays": LATE}
+    assert found == {"a": "A", "b": "B", "c": "C", "ends": Crashed("with status 3"), "stays": LATE}
 
 
 def test_a_cluster_finds_what_processes_find(project: Path) -> None:
