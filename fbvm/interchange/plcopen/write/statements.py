@@ -49,8 +49,11 @@ class StatementWriter:
 
     def _value(self, expr: tree.Expr) -> Ends | str:
         """A value as a wire if it is an output of a block at work or made of one by operators, which are blocks then; else as its
-        text."""
-        if not any(self._block_of(part) is not None for part in walk(expr)):
+        text.
+
+        Operators on a literal that names its type are blocks, too: of `n + INT#1` written at a pin, Beremiz takes all in front
+        of the `#` for the type of the value."""
+        if not any(self._block_of(part) is not None for part in walk(expr)) and "#" not in self.types.text(expr):
             return self.types.text(expr)
         if isinstance(expr, tree.Member) and (block := self._block_of(expr)) is not None:
             self._is_wired = True
