@@ -30,6 +30,8 @@ class Bodies:
         self.rungs = 0
         self.actions: list[NamedAction] = []
         """The ACTIONs that charts of the POU need."""
+        self.renamed: dict[str, str] = {}
+        """By name in capitals, the new names of steps of charts that are written already."""
 
     def lines(self, body: Body) -> list[str]:
         """The lines of a body."""
@@ -49,6 +51,7 @@ class Bodies:
             chart = Chart(self.reading, self.scope, self.pou, self.lines)
             lines = chart.lines(body.element)
             self.actions += chart.actions
+            self.renamed.update(chart.renamed)
             return lines
         except NotImportable as refusal:
             self.reading.report("X0203", *refusal.args)

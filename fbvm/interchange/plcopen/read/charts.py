@@ -81,8 +81,8 @@ class Chart:
         self._report_unused(diagram)
         if compute:
             self.actions.append((compute, list(self.conditions.statements)))
-        self.actions = [(name, [self._with_new_names(line) for line in inner]) for name, inner in self.actions]
-        return [self._with_new_names(line) for line in (*lines, *ways)]
+        self.actions = [(name, [with_new_names(line, self.renamed) for line in inner]) for name, inner in self.actions]
+        return [with_new_names(line, self.renamed) for line in (*lines, *ways)]
 
     def _generated(self, steps: list[Element], arrows: list[Arrow]) -> list[Element]:
         """The steps as the generator of Beremiz comes to them: from each initial step along the transitions, depth first."""
@@ -156,12 +156,6 @@ class Chart:
         """What a step is called here."""
         name = step.get("name")
         return self.renamed.get(name.upper(), name)
-
-    def _with_new_names(self, line: str) -> str:
-        """A line in which the flags of steps are read by the new names of their steps."""
-        for old, new in self.renamed.items():
-            line = re.sub(rf"(?i)\b{re.escape(old)}\s*\.\s*(?=[XT]\b)", f"{new}.", line)
-        return line
 
     def _index(self, body: Element) -> None:
         """Note the elements by localId, and by localId the elements to which wires lead from each."""
@@ -366,6 +360,13 @@ def _names(names: list[str]) -> str:
 def _references(element: Element) -> list[str]:
     """The localIds from which wires lead into an element of a chart, not counting the wires of its condition."""
     return [wire.get("refLocalId") for point in element.all("connectionPointIn") for wire in point.all("connection")]
+
+
+def with_new_names(line: str, renamed: dict[str, str]) -> str:
+    """A line in which the flags of steps are read by the new names of their steps."""
+    for old, new in renamed.items():
+        line = re.sub(rf"(?i)\b{re.escape(old)}\s*\.\s*(?=[XT]\b)", f"{new}.", line)
+    return line
 
 
 def _place(element: Element) -> tuple[float, float]:

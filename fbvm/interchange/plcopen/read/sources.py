@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from fbvm.interchange.plcopen.read.bodies import Bodies
-from fbvm.interchange.plcopen.read.charts import NamedAction
+from fbvm.interchange.plcopen.read.charts import NamedAction, with_new_names
 from fbvm.interchange.plcopen.read.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
 from fbvm.interchange.plcopen.read.types import remark
 from fbvm.interchange.source_files import SourceFiles
@@ -87,7 +87,7 @@ def _variable(variable: Variable) -> str:
 def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
     bodies = Bodies(reading, document, pou)
     main = bodies.lines(pou.body) if pou.body else []
-    actions = [(name, bodies.lines(body)) for name, body in pou.actions]
+    actions = [(name, [with_new_names(line, bodies.renamed) for line in bodies.lines(body)]) for name, body in pou.actions]
     if pou.transitions and (pou.body is None or pou.body.language != "SFC"):
         reading.report("X0203", pou.element, f"{len(pou.transitions)} transitions without a chart are not taken over")
     made = [VarList(section, (), tuple(Variable(name, kind) for name in names))

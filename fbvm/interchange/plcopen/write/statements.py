@@ -104,8 +104,6 @@ class StatementWriter:
         kind = self.types.instances.get(name.upper())
         if kind is None:
             raise self._not_exportable(tree.CallStatement(call.start, call.end, call))
-        if not self._is_wired:
-            self.end_network()
         self.drawing.block(kind, name, inputs, outputs, COLUMN, 0)
         self.blocks[name.upper()] = next(made for made in reversed(self.drawing.elements) if made.get("instanceName") == name)
         self.drawing.skip(max(len(inputs), len(outputs), 2) // 2 + 1)
