@@ -93,6 +93,15 @@ def test_each_function_code() -> None:
     assert [rig.get(f"holding[{number}]") for number in (1, 16, 17)] == [0xBEEF, 0x3AC5, 0x9713]
 
 
+def test_each_bit_of_a_register_is_written_and_read_in_its_place() -> None:
+    rig = Rig()
+    client = rig.client().connect()
+    single = "".join(f"{1 << bit:04X}" for bit in range(16))
+    assert client.ask(f"10 0000 0010 20 {single}") == "10 00 00 00 10"
+    assert [rig.get(f"holding[{bit}]") for bit in range(16)] == [1 << bit for bit in range(16)]
+    assert client.ask("03 0000 0010").replace(" ", "") == f"0320{single}"
+
+
 LONG = {"coils": "ARRAY[0..4000] OF BOOL", "inputs": "ARRAY[0..4000] OF BOOL"}
 
 
@@ -277,7 +286,7 @@ def test_a_connection_that_breaks() -> None:
     assert rig.statuses(client, 4) == ["7006", "7007", "7002", "7002"]
     again = rig.client(51)
     again.submit(Connect(1, again.server))
-    assert "7006" in rig.statuses(again, 4)
+    assert rig.statuses(again, 4) == ["7002", "7004", "7006", "7006"], "the program is told of the new one"
 
 
 # --- data areas ---------------------------------------------------------------------------------------------------------
@@ -338,6 +347,8 @@ def test_bits_of_what_is_not_bool_are_packed(kind: str) -> None:
 @pytest.mark.parametrize(("passed", "overlaps"), first_quick([
     ({"coils": "holding"}, True), ({"coils": "holding[199]"}, True), ({"inputs": "holding[3]", "coils": "holding[4]"}, True),
     ({"registers": "holding"}, True), ({"registers": "holding[0]", "holding": "holding[1]"}, False),
+    ({"coils": "inputs[3]", "registers": "inputs[4]", "inputs": "registers"}, False),
+    ({"coils": "inputs[4]", "registers": "inputs[3]", "inputs": "registers"}, False),
     ({"coils": "coils[1]", "inputs": "coils[1]"}, True), ({"coils": "coils[1]", "inputs": "coils[2]"}, False), ({}, False),
 ]))  # fmt: skip
 def test_areas_that_overlap(passed: dict[str, str], overlaps: bool) -> None:

@@ -7,7 +7,10 @@ from array import array
 
 import pytest
 from mtcp_rig import Rig
-from rows import each_of
+from rows import each_of, first_quick
+
+from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
 
 BITS = [1, 7, 8, 9, 15, 16, 17, 19, 255, 256, 1000, 1968]
 REGISTERS = [1, 2, 3, 64, 122, 123]
@@ -96,6 +99,14 @@ def test_one_coil_written(value: str) -> None:
     before = rig.all_words()
     rig.command("wr")
     assert (rig.result("wr"), bool(rig.server.coils[65535]), rig.all_words()) == ((1, ""), value == "TRUE", before)
+
+
+@pytest.mark.parametrize("code", first_quick(["01", "02", "03", "04", "05", "06", "0F", "10"]))
+def test_a_block_is_enabled_as_long_as_nobody_says_otherwise(code: str) -> None:
+    plc = Plc(compile_text(f"PROGRAM Main VAR fn : MTCP_ETN_Fn{code}; END_VAR fn(); END_PROGRAM").image)
+    assert (plc.read("Main.fn.EN"), plc.read("Main.fn.ENO")) == (True, False)
+    assert plc.scan() is None
+    assert plc.read("Main.fn.ENO") is True
 
 
 SHORT = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import struct
 import time
@@ -9,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from fbvm.net.addresses import AddressMap
+from fbvm.net.addresses import AddressMap, why_unusable
 from fbvm.net.switchboard import MAX_ORPHANS, ORPHAN_LIMIT_NS, UDP, Watcher
 from fbvm.net.tcp import TcpLink, TcpNetwork
 from fbvm.wire.link import (
@@ -564,3 +565,16 @@ def test_wrong_use(network: TcpNetwork, device: Device) -> None:
     assert network.wait(0)
     link.submit([Send(1, b""), Close(1), Connect(1, SERVER)], now_ns())
     assert link.events(now_ns()) == [Failed(1, "send", "ENOTCONN"), Closed(1), Failed(1, "open", "ENETDOWN")]
+
+
+def test_why_a_port_cannot_be_used_is_said_in_words() -> None:
+    said = {errno.EADDRINUSE: "somebody else listens there", errno.EADDRNOTAVAIL: "it is not an address of this host",
+            errno.EMFILE: "too many open files"}  # fmt: skip
+    assert {number: why_unusable(OSError(number, "Too many open files")) for number in said} == said
+    assert why_unusable(OSError("Not today")) == "not today"
+
+
+def test_the_selector_is_closed_with_the_network() -> None:
+    network = TcpNetwork()
+    network.close()
+    assert network._selector.get_map() is None

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import re
+import struct
+from math import inf, nan
 from xml.etree import ElementTree
 
 import pytest
@@ -229,3 +231,12 @@ def test_a_scan_with_very_many_statements_is_shown_in_part(monkeypatch: pytest.M
     values = read.values("Main.sum")
     assert values[2] == 5056
     assert values[4] == 5062
+
+
+def test_the_ends_of_a_column_are_of_numbers_that_are_some() -> None:
+    def extremes(*values: float) -> tuple[float, float]:
+        return columns._extremes(struct.pack(f"<{len(values)}d", *values), "f64")
+
+    assert extremes(nan, 1.5, inf, -2.0) == (-2.0, 1.5)
+    assert extremes(nan, -inf) == (0.0, 0.0)
+    assert extremes(3.0, 1.0, 2.0) == (1.0, 3.0)

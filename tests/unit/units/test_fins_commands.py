@@ -9,8 +9,11 @@ from fins_rig import FinsRig, TcpClient, compiled
 from rows import each_of
 
 from fbvm.net.loop import LoopNetwork
+from fbvm.units.etn21.fins.routing import endpoint_of
+from fbvm.units.etn21.fins.state import FinsSettings, FinsState
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.fins.frames import parse_frame
+from fbvm.wire.link import Peer
 
 
 @pytest.fixture
@@ -326,3 +329,10 @@ def test_a_service_that_cannot_be_is_refused(given: dict[str, object]) -> None:
 
 def test_what_is_too_short_to_be_a_frame_is_described() -> None:
     assert "11 bytes" in getattr(parse_frame(bytes(11)), "reason", "")
+
+
+def test_a_node_is_where_the_table_says_or_it_has_sent_from_or_its_number_leads() -> None:
+    settings = FinsSettings("192.168.250.3", nodes={7: Peer("10.0.0.7", 9601)})
+    state = FinsState(learned={7: Peer("10.0.0.8", 9602), 8: Peer("10.0.0.8", 9602)})
+    assert [str(endpoint_of(settings, state, node)) for node in (7, 8, 9, 255)] == [
+        "10.0.0.7:9601", "10.0.0.8:9602", "192.168.250.9:9600", "192.168.250.255:9600"]

@@ -55,6 +55,13 @@ def test_an_etn21_shows_how_a_service_failed_and_its_errors() -> None:
     assert [lamp.said for lamp in front.lamps[1:4]] == ["EEPROM Error", "Address Disagreement", "no link: the cable is pulled"]
 
 
+def test_an_etn21_shows_a_socket_that_only_its_status_tells_of() -> None:
+    rig = Rig()
+    layout = rig.unit.layout
+    rig.memory.words("CIO")[layout.status("UDP", 2)] = 1 << 15 | 1
+    assert [(socket.name, socket.state) for socket in rig.unit.front(rig.memory).sockets] == [("UDP 2", "OPEN, opening")]
+
+
 def test_units_with_a_mailbox_show_their_lines() -> None:
     for unit, lamps in ((Noc(), ["RUN", "LINK", "100 MB"]), (Tianxing(), ["READY"])):
         memory = FakeMemory()
