@@ -21,6 +21,7 @@ from fbvm.prove.encoding.summary import Summary, summarize
 from fbvm.prove.encoding.terms import Term, TimeOver
 from fbvm.prove.induction import Induction
 from fbvm.prove.invariants import Guess, Invariants, Literal, facts_of, guesses
+from fbvm.prove.lemmas import lemma_places, lemmas
 from fbvm.prove.question import (
     ALWAYS,
     BROKEN,
@@ -100,12 +101,14 @@ class Prover:
         self.rules = tuple(rules)
         free = [extent for name in (*question.free, *free_words(rules)) for extent in names.extents(name)]
         seen = [place for word in words_of(rules) for place in names.places(f"{word[0]}{word[1]}")]
+        seen += lemma_places(names, question)
         self.summary: Summary = summarize(image, STEP_BUDGET, free, limits.expired, [*self.judge.all_places, *seen],
                                            [bits_of(place) for place in self.judge.written])  # fmt: skip
         longest_ns = max(limits.longest_ns, limits.cycle_ns)
         self.clock: Clock = clock_of(self.summary.terms, image.tasks, limits.cycle_ns, longest_ns)
         self.machine = Machine(image, limits.cycle_ns, longest_ns, STEP_BUDGET)
         self.goal = self._goal(names)
+        self.lemmas = lemmas(self.summary, names, question) if question.lemmas else {}
         self.notes: list[str] = []
         relevant = leaves([*self.goal.terms, *self.summary.next.values()])
         self.inputs = [cell for variable, cell in self.summary.inputs.items() if variable in relevant]
@@ -190,6 +193,7 @@ class Prover:
         methods: list[Callable[[], Verdict | None]] = [
             lambda: self._searched(min(FIRST_SCANS, shallow)),
             lambda: self._induced([], 1),
+            self._with_lemmas,
             self._with_copies,
             lambda: self._searched(shallow),
             self._simulated,
@@ -337,14 +341,30 @@ class Prover:
             kept = invariants.kept([*kept, *(guess for guess in guesses(state, samples, doubted) if guess not in known)])
         return self._induced(kept, self._deepest()) if kept else None
 
+    def _with_lemmas(self) -> Verdict | None:
+        """Induction with the lemmas that somebody has given, as far as no scan breaks them."""
+        if not self.lemmas or self.limits.expired():
+            return None
+        self.tell("proving the lemmas")
+        kept = self._kept([*self.lemmas])
+        if kept is None:
+            return None
+        self.notes += [f"no help, because a scan may break it: {text}" for lemma, text in self.lemmas.items()
+                       if text and lemma not in kept]  # fmt: skip
+        return self._induced(kept, MOST_INDUCTION) if kept else None
+
+    def _kept(self, found: Sequence[Guess]) -> list[Guess] | None:
+        """What of some guesses about any variables holds behind every scan; None if the time is over."""
+        return Invariants(self.summary, [*self.summary.cells], self.goal.stop, self.goal.given, self.clock,
+                          self.limits.expired).kept(found)  # fmt: skip
+
     def _with_copies(self) -> Verdict | None:
         """Induction with the same property of what the variables of the property are copied from."""
         found = [*copied(self.summary, self.condition)]
         if not found or self.limits.expired():
             return None
         self.tell("trying the property of what was copied")
-        kept = Invariants(self.summary, [*self.summary.cells], self.goal.stop, self.goal.given, self.clock,
-                          self.limits.expired).kept(found)  # fmt: skip
+        kept = self._kept(found)
         return self._induced(kept, MOST_INDUCTION) if kept else None
 
     def _deepest(self) -> int:

@@ -40,6 +40,8 @@ class Question:
     within_ns: int = 0
     units: tuple[tuple[int, int], ...] = ()
     """Numbers of ETN21s and of sockets, whose words the unit changes by the rules of `unit_rules`."""
+    lemmas: tuple[str, ...] = ()
+    """Conditions that hold behind every scan, too, which is proved with the property: induction begins with them."""
 
     def __str__(self) -> str:
         if self.title:

@@ -31,7 +31,7 @@ class NotProved(AssertionError):
 
 def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False, written_once: str = "",
            assume: str | Sequence[str] = (), free: str | Sequence[str] = (), scans: int = 1000, seconds: float = 60,
-           cycle: str = "", unit_rules: Sequence[tuple[int, int]] = ()) -> Verdict:  # fmt: skip
+           cycle: str = "", unit_rules: Sequence[tuple[int, int]] = (), lemma: str | Sequence[str] = ()) -> Verdict:  # fmt: skip
     """Asserts that a property of the block or program of a rig holds in every run from power-on.
 
     One of `never`, `always` (conditions, as `until` takes them), `no_trap` and `written_once` (a name, address or range
@@ -39,7 +39,8 @@ def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False
     scan; `free` names others.  `assume` are conditions that all runs keep.  `scans` is how far to look where there is no proof,
     `seconds` how long.  `cycle` is the time between two scans, that of the rig unless given:
     `5ms..50ms` lets any time within these bounds pass.  `unit_rules` are unit numbers of ETN21s and sockets, (0, 1), whose words
-    change as the manuals say.  Stubs and units themselves have no part in it.  A proof is kept on disk until the program or the
+    change as the manuals say.  `lemma` are conditions that are proved to hold behind every scan, too, and then help the
+    proof.  Stubs and units themselves have no part in it.  A proof is kept on disk until the program or the
     property changes.
 
     Raises NotProved, and ValueError for a program that cannot be followed, for names that it does not have, or without exactly
@@ -55,7 +56,8 @@ def proved(rig: Rig, *, never: str = "", always: str = "", no_trap: bool = False
     named = [free] if isinstance(free, str) else [*free]
     assumed = (assume,) if isinstance(assume, str) else tuple(assume)
     question = Question(kind, "" if kind == NO_TRAP else text, assumed, (*_inputs(subject.image, subject.prefix), *named),
-                        subject.prefix, units=tuple(unit_rules))  # fmt: skip
+                        subject.prefix, units=tuple(unit_rules),
+                        lemmas=(lemma,) if isinstance(lemma, str) else tuple(lemma))  # fmt: skip
     cycle_ns, longest_ns = cycle_bounds(cycle) if cycle else (rig.plc.cycle_ns, 0)
     limits = Limits(cycle_ns, scans, longest_ns=longest_ns, expired=time_limit(int(seconds * 1_000_000_000)))
     try:

@@ -78,6 +78,8 @@ def _unit(value: str) -> tuple[int, int]:
               help="Takes any value in each scan, as inputs do.")
 @click.option("--unit-rules", type=_unit, multiple=True, metavar="UNIT:SOCKET",
               help="The words of this socket of an ETN21 change as its manuals say, and not otherwise: 0:1.")
+@click.option("--lemma", multiple=True, metavar="EXPRESSION",
+              help="It holds behind every scan, too: it is proved as well, and helps to prove the property.")
 @click.option("--cycle", type=_cycle, default=str(CYCLE_NS // 1_000_000) + "ms", metavar="TIME|TIME..TIME", show_default="10ms",
               help="How often the PLC scans; 5ms..50ms: any time within these bounds passes between two scans.")
 @click.option("--scans", type=click.IntRange(min=1), default=1000, show_default=True, metavar="N",
@@ -114,7 +116,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         asked += [(image, question) for question in questions]
     verdicts = []
     for image, plain in asked:
-        question = replace(plain, units=options["unit_rules"])
+        question = replace(plain, units=options["unit_rules"], lemmas=options["lemma"])
         verdict = _answered(image, question, options)
         verdicts.append(verdict)
         if not as_json:
@@ -134,6 +136,8 @@ def _refuse_mixed(options: dict[str, Any], asks: bool) -> None:
         raise click.UsageError("--tests stands alone: ask for properties in a call of its own")
     if options["tests_file"] and options["unit_rules"]:
         raise click.UsageError("--unit-rules goes with properties; tests are written for any words: name them with --free")
+    if options["tests_file"] and options["lemma"]:
+        raise click.UsageError("--lemma helps to prove a property, which --tests has none of")
     if options["covered"] and not options["tests_file"]:
         raise click.UsageError("--covered says what --tests may leave out, which is not given")
     if not asks and not options["tests_file"]:
