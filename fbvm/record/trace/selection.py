@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fbvm.base.areas import Area
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, followed
-from fbvm.watch.paths import Place, Span, UnknownPlace, find, member
+from fbvm.watch.paths import Place, Span, UnknownPlace, element, find, member
 
 MOST_ELEMENTS = 4096
 """Elements of an array of structures that are compared with a pattern with a star."""
@@ -107,10 +107,9 @@ def single_places(place: Place) -> Iterator[Place]:
         for inner in _members(place):
             yield from single_places(inner)
     elif isinstance(place.type, ArrayType):
-        if len(place.type.bounds) == 1 and place.type.count <= FEW_ELEMENTS:
-            low, size = place.type.bounds[0][0], place.type.element.size
+        if place.type.count <= FEW_ELEMENTS:
             for number in range(place.type.count):
-                yield from single_places(place.inner(f"{place.name}[{low + number}]", place.type.element, number * size))
+                yield from single_places(element(place, place.type, number))
     else:
         yield place
 

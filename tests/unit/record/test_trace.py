@@ -38,7 +38,7 @@ from fbvm.record.trace.format import (
     xor,
 )
 from fbvm.record.trace.observing import observing
-from fbvm.record.trace.selection import select
+from fbvm.record.trace.selection import select, single_places, symbol_places
 from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.writer import START
 from fbvm.watch.names import Names
@@ -458,3 +458,11 @@ def test_what_references_lead_to_is_read_from_a_trace() -> None:
     assert [trace.at(2).read(name) for name in names] == [plc.read(name) for name in names] == [3, 7, 7, 3, None]
     assert [track.changes for track in waveforms(trace, ["Main.f"]).tracks] == [[(0, 1), (1, 2), (2, 3)]]
     assert [track.signal.label for track in waveforms(trace).tracks] == ["Main.a[0].n"]
+
+
+def test_small_arrays_are_charted_element_by_element_whatever_their_subscripts() -> None:
+    made = compile_text("PROGRAM Main VAR a : ARRAY [0..1, 3..4] OF INT; b : ARRAY [1..2] OF BOOL; c : ARRAY [0..32] OF INT; "
+                        "END_VAR a[0, 3] := c[0]; b[1] := TRUE; END_PROGRAM").image
+    assert made is not None
+    names = [single.name for place in symbol_places(made.symbols) for single in single_places(place)]
+    assert names == ["Main.a[0, 3]", "Main.a[0, 4]", "Main.a[1, 3]", "Main.a[1, 4]", "Main.b[1]", "Main.b[2]"]
