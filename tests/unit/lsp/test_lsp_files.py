@@ -84,13 +84,70 @@ def test_a_project_file_that_comes_and_goes_says_what_belongs_together(folder: P
     talk(folder, about, "main.st")
 
 
+def test_a_file_that_was_never_there_may_belong_to_the_program(folder: Path) -> None:  # noqa: F811
+    async def about(desk: Desk) -> None:
+        desk.replace("main.st", (1, 9), (1, 13), "Lamp")
+        await desk.shows("main.st", "S0204")
+        desk.written("Lamp.st", PUMP.replace("Pump", "Lamp"))
+        await desk.shows("main.st")
+        assert {path.name for path in desk.server.projects.all[0].paths} == {"main.st", "Lamp.st"}
+
+    talk(folder, about, "main.st")
+
+
+def test_mistakes_of_a_project_file_are_told_with_no_source_open_and_go_when_the_disk_has_none(folder: Path) -> None:  # noqa: F811
+    good = '[plc.pump]\nsources = ["main.st", "Pump.st"]\n'
+
+    async def alone(desk: Desk) -> None:
+        desk.open("fbvm.toml", good + "cicle = 1\n")
+        await desk.shows("fbvm.toml", "P0102")
+
+    async def on_disk(desk: Desk) -> None:
+        await desk.shows("fbvm.toml", "P0102")
+        desk.written("fbvm.toml", good)
+        await desk.shows("fbvm.toml")
+
+    (folder / "fbvm.toml").write_text(good, encoding="utf-8")
+    talk(folder, alone)
+    (folder / "fbvm.toml").write_text(good + "cicle = 1\n", encoding="utf-8")
+    talk(folder, on_disk, "main.st")
+
+
+def test_mistakes_of_blocks_that_a_test_names_are_shown_in_their_files(folder: Path) -> None:  # noqa: F811
+    (folder / "src").mkdir()
+    lamp = PUMP.replace("Pump", "Lamp")
+    (folder / "src" / "Lamp.st").write_text(lamp.replace("200", "'a'"), encoding="utf-8")
+    lit = "PROGRAM Lit\nVAR L : Lamp; END_VAR\n    L(Level := 1);\nEND_PROGRAM\n"
+    (folder / "test_lamp.st").write_text(lit, encoding="utf-8")
+
+    async def about(desk: Desk) -> None:
+        await desk.until(lambda: bool(desk.codes("src/Lamp.st")))
+        [told] = desk.told[desk.uri("src/Lamp.st")]
+        assert told["range"]["start"]["line"] == 3
+
+    talk(folder, about, "test_lamp.st")
+
+
+def test_garbage_is_collected_once_after_the_last_key(folder: Path) -> None:  # noqa: F811
+    async def about(desk: Desk) -> None:
+        await desk.checked()
+        first = desk.server._collection
+        desk.replace("main.st", (3, 4), (3, 6), "Off")
+        await desk.shows("main.st", "S0201")
+        await desk.checked()
+        assert first is not None and first.cancelled() and desk.server._collection is not first
+
+    talk(folder, about, "main.st")
+
+
 def test_settings_say_the_dialect_and_the_libraries_of_files_without_a_project(folder: Path) -> None:  # noqa: F811
-    (folder / "own.st").write_text("PROGRAM Own\nVAR i : INT; END_VAR\n    i := 2 ** 3;\nEND_PROGRAM\n", encoding="utf-8")
+    (folder / "own.st").write_text("PROGRAM Own\nVAR i : INT; w : WORD; END_VAR\n    w := i;\nEND_PROGRAM\n", encoding="utf-8")
 
     async def about(desk: Desk) -> None:
         await desk.shows("own.st", "S0301")
         desk.notify("workspace/didChangeConfiguration", settings={"fbvm": {"dialect": "codesys"}})
         assert desk.server.projects.settings == Settings("codesys")
+        await desk.shows("own.st")
         desk.notify("workspace/didChangeConfiguration", settings={"dialect": "matiec", "libraries": ["/a", "/b"]})
         assert desk.server.projects.settings == Settings("matiec", (Path("/a"), Path("/b")))
         for wrong in ({"dialect": "pascal"}, {"dialect": ["codesys"]}, {"dialect": "codesys", "libraries": "x"}):
@@ -102,7 +159,12 @@ def test_settings_say_the_dialect_and_the_libraries_of_files_without_a_project(f
         await desk.shows("own.st", "S0301")
 
     talk(folder, about, "own.st")
-    talk(folder, lambda desk: desk.checked(), "own.st", settings={"dialect": "codesys"})
+
+    async def from_the_beginning(desk: Desk) -> None:
+        await desk.checked()
+        assert desk.codes("own.st") == [] and [each.program.dialect.name for each in desk.server.projects.all] == ["codesys"]
+
+    talk(folder, from_the_beginning, "own.st", settings={"dialect": "codesys"})
 
 
 def test_an_editor_that_can_is_asked_to_watch_files(folder: Path) -> None:  # noqa: F811
@@ -191,6 +253,7 @@ def test_a_project_of_twincat_is_read_again_when_it_or_a_task_changes(twincat: P
         [told] = desk.told[desk.uri("Conveyor.plcproj")]
         assert "FB_Motor.TcPOU cannot be read" in told["message"] and told["range"]["start"]["line"] > 0
         desk.written("Drives/FB_Motor.TcPOU", motor)
+        await desk.shows("Conveyor.plcproj")
         desk.written("Conveyor.plcproj", (twincat / "Conveyor.plcproj").read_text(encoding="utf-8"))
         await desk.shows("Conveyor.plcproj")
 
