@@ -1,6 +1,7 @@
 """A folder of somebody's documents in PLCopen XML: how many are imported, checked, run, and mean the same when they are exported.
 
-`python tests/plcopen/sweep.py DIR [DIALECT]` prints the counts, and the causes that kept documents from a stage.  A document
+`python tests/plcopen/sweep.py DIR [DIALECT]` prints the counts, and the causes that kept documents from a stage.  Without a
+DIALECT, each document has that of the tool which its header names, and matiec if it names none.  A document
 counts as imported if nothing of its program is lost, as checked if the sources have no errors, as run if 50 scans with inputs
 at random stop at no trap, and as equal if the document that is made of the sources gives the same values in every scan.  A
 document without a program that runs is compiled, and goes no further.  Documents belong to whoever wrote them: they are never
@@ -19,6 +20,7 @@ from sweeping import BUDGET, CYCLE_NS, Sweep, cause, compare, run
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
+from fbvm.interchange.dialect_signs import FAMILIES
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.write.exporting import export_xml
 from fbvm.machine.plc import Plc
@@ -26,7 +28,7 @@ from fbvm.machine.plc import Plc
 STAGES = ("found", "imported", "checked", "run", "equal")
 
 
-def sweep(folder: Path, dialect: str = "matiec") -> Sweep:
+def sweep(folder: Path, dialect: str = "") -> Sweep:
     """The documents below a folder."""
     made = Sweep(STAGES)
     for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in (".xml", ".pro") and path.is_file()):
@@ -37,6 +39,7 @@ def sweep(folder: Path, dialect: str = "matiec") -> Sweep:
 
 def _document(made: Sweep, path: Path, name: str, dialect: str) -> None:
     imported = import_xml(path.read_bytes(), name)
+    dialect = dialect or FAMILIES.get(imported.family, "matiec")
     made.note("imported", name, cause(imported.errors))
     if not imported.files:
         return

@@ -350,3 +350,18 @@ def test_an_instruction_list_is_taken_over() -> None:
     made = imported(pou("<xhtml:p>LD a\nANDN b\nJMPC on\nLD FALSE\non: ST q</xhtml:p>", "a b q", language="IL"))
     assert codes(made) == []
     assert states(made, "q", ["a=1", "b=1", "b=0"]) == ["1", "0", "1"]
+
+
+@each_of(("order", "found"), [("document", ["X0292"]), ("network", ["X0202"])])
+def test_an_input_that_nothing_is_wired_to_is_left_out_where_its_tool_does(order: str, found: list[str]) -> None:
+    drawn = value(1, "n") + value(2, "3") + block(3, "EQ", "IN1= IN2=1 IN3=2", "OUT") + result(4, "3.OUT", "x")
+    text = pou(drawn, variable("n", "INT") + variable("x"), language="FBD").replace(wires(""), "<connectionPointIn/>")
+    made = import_xml(document(text), order=order)
+    assert [code for code in codes(made) if code != "X0190"] == found
+    if not made.errors:
+        assert states(made, "x", ["n=2", "n=3"]) == ["0", "1"]
+
+
+def test_a_reference_in_the_place_of_a_name_is_a_type() -> None:
+    text = pou("", '<variable name="r"><type><derived name="REFERENCE TO BOOL"/></type></variable>', language="LD")
+    assert "r : REFERENCE TO BOOL;" in imported(text).files["Main.st"]

@@ -7,7 +7,18 @@ from fbvm.interchange.plcopen.read.context import NetworkContext
 from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
 from fbvm.interchange.plcopen.read.rung_parts import instruction
 from fbvm.interchange.plcopen.read.scope import SHARED
-from fbvm.interchange.plcopen.read.values import ATOM, CHAINED, INFIX, TRUE, Unexecutable, Value, joined, negation, variable
+from fbvm.interchange.plcopen.read.values import (
+    ATOM,
+    CHAINED,
+    EXTENSIBLE,
+    INFIX,
+    TRUE,
+    Unexecutable,
+    Value,
+    joined,
+    negation,
+    variable,
+)
 
 
 class Calls:
@@ -133,6 +144,7 @@ class Calls:
         pins = [pin for pin in item.inputs if pin.name.upper() != "EN"]
         while pins and not pins[-1].connected and len(pins) > 2:
             pins.pop()
+        pins = self._without_loose(item, pins)
         if loose := [pin.name or "an input" for pin in pins if not pin.connected]:
             raise Unexecutable(item, f"{', '.join(loose)} of {item.text} is not connected", "a function needs all its inputs")
         value = self._called(item.text, [context.value_at(item, pin) for pin in pins])
@@ -143,6 +155,14 @@ class Calls:
             context.set_output(wire, value, keep=True)
         else:
             self._guarded(item, wire, condition, value)
+
+    def _without_loose(self, item: Object, pins: list[Pin]) -> list[Pin]:
+        """The inputs that Beremiz and OpenPLC Editor pass on: they leave out those that nothing is wired to."""
+        wired = [pin for pin in pins if pin.connected]
+        if not self.context.generates or len(wired) < 2 or len(wired) == len(pins) or item.text.upper() not in EXTENSIBLE:
+            return pins
+        self.context.warn(item, f"{item.text} has inputs that nothing is wired to: Beremiz and OpenPLC Editor leave them out")
+        return wired
 
     def _called(self, name: str, values: list[Value]) -> Value:
         folded = name.upper()

@@ -15,6 +15,8 @@ INFIX = {name: (sign, _LEVELS[sign]) for name, sign in SIGNS.items()}
 """Functions that are written as operators."""
 CHAINED = ("OR", "XOR", "AND", "ADD", "MUL")
 """Those that take more than two inputs."""
+EXTENSIBLE = (*CHAINED, "GT", "GE", "EQ", "LE", "LT", "MAX", "MIN", "CONCAT")
+"""Functions that take two inputs or more (IEC 61131-3 tables 29 to 34); the index of MUX makes it another case."""
 _ATOM = re.compile(r"[\w.#%\[\]^]+|'[^']*'|\"[^\"]*\"")
 
 
