@@ -117,6 +117,7 @@ CODES: dict[str, Code] = {
         "S0192": "characters beyond the type of the literal",
         "S0193": "only some dialects take it",
         "S0194": "use that an attribute warns of",
+        "S0195": "the tool of the dialect refuses it",
         "S0290": "variable is never used",
         "S0291": "instance is never called",
         "S0292": "function never sets its result",

@@ -88,6 +88,10 @@ class Dialect:
     times_are_numbers: bool = False
     short_names: bool = False
     own_time: bool = False
+    no_short_circuit_words: bool = False
+    no_jumps: bool = False
+    functions_have_inputs: bool = False
+    plain_names: bool = False
     locals_hide_results: bool = False
 
 
@@ -202,6 +206,10 @@ QUESTIONS = {
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
     "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
+    "no_short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken", "taken, with a warning (S0195)"),
+    "no_jumps": ("JMP in Structured Text", "taken", "taken, with a warning (S0195)"),
+    "functions_have_inputs": ("FUNCTION f : INT without an input", "taken", "taken, with a warning (S0195)"),
+    "plain_names": ("names that begin with _ or P_", "taken", "taken, with a warning (S0195)"),
     "any_width_at": ("x AT %IW4 : DINT, x AT %ML2 : DWORD: an address of another size than the type", "an error",
                      "x begins there, with a warning (S0193)"),
     "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
@@ -242,7 +250,8 @@ _ROWS = (
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
-            wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True),
+            wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True, no_short_circuit_words=True, no_jumps=True,
+            functions_have_inputs=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional", "strucpp"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
@@ -257,9 +266,10 @@ _ROWS = (
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
             generic_functions=True, times_are_numbers=True, places_for_all=True, own_time=True,
-            round_arrays=True, nested_repetitions=True),
+            round_arrays=True, nested_repetitions=True, no_short_circuit_words=True, no_jumps=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
-            comments_end_at_once=True, refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
+            comments_end_at_once=True, no_jumps=True, plain_names=True,
+            refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
 DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}
 SWITCHES = tuple(f.name for f in fields(Dialect) if f.name not in ("name", "for_whom"))

@@ -196,7 +196,7 @@ def mismatch_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
         return f"a {wanted.name.partition('[')[0]} literal stands in {'double' if wanted.wide else 'single'} quotes"
     if isinstance(expr, tree.Literal):
         return literal_hint(expr.value if isinstance(expr.value, int | float | str) else None, base(target))
-    return conversion_hint(kind, target)
+    return bcd_hint(expr, target) or conversion_hint(kind, target)
 
 
 def conversion_hint(kind: Type, target: Type) -> str:
@@ -229,6 +229,17 @@ def _function_hint(source: Type, wanted: Type) -> str:
 
 def _first_of(kind: EnumType) -> str:
     return next(iter(kind.shown.values()))
+
+
+def bcd_hint(call: tree.Expr, target: Type) -> str:
+    """For BCD_TO_INT where another integer is needed, the function for that; "" for other expressions."""
+    callee = call.callee if isinstance(call, tree.Call) else None
+    name = fold(callee.text) if isinstance(callee, tree.NameRef) else ""
+    wanted = base(target).name
+    return f"write BCD_TO_{wanted}(...)" if name.startswith("BCD_TO_") and wanted in _BCD else ""
+
+
+_BCD = ("USINT", "UINT", "UDINT", "ULINT", "INT", "DINT", "LINT", "SINT")
 
 
 def _reference_hint(source: Type, wanted: Type) -> str:

@@ -24,6 +24,10 @@ def refuse_reserved(report: Report, source: Source, name: tree.Name, dialect: Di
     """Report a declaration under the name of an elementary type.
 
     Members of structures may have one: they stand behind a point.  `what` is declared: a POU, a type, a section of variables."""
+    if dialect.plain_names and not source.library and fold(name.text).startswith(("_", "P_")):
+        sign = "_" if name.text[0] == "_" else "P_"
+        report.add("S0195", source, name, f"`{name.text}` begins with `{sign}`, and the tool of this dialect refuses such names",
+                   "choose another name")
     if fold(name.text) not in RESERVED:
         return
     switches = {switch: meant for switch, (words, meant) in _TAKEN.items()

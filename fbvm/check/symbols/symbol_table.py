@@ -204,6 +204,10 @@ class SymbolTable:
             pou.modifiers = frozenset(word.text for word in declaration.modifiers)
             pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)
+            if self.dialect.functions_have_inputs and pou.is_function and not source.library and not any(
+                    section.kind in ("VAR_INPUT", "VAR_IN_OUT") for section in declaration.sections):
+                self.report.add("S0195", source, declaration.name, f"{name} has no input, and the tool of this dialect wants one",
+                                "matiec takes it with its option -i")
             return pou
         return None
 

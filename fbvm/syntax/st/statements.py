@@ -19,6 +19,7 @@ from fbvm.syntax.tree import (
     Exit,
     Expr,
     For,
+    Form,
     If,
     NameRef,
     Node,
@@ -145,6 +146,9 @@ class Statements(Expressions):
         return Return(word.start, value.end if value else word.end, value)
 
     def jump(self, word: Token, target: Token) -> RefusedStatement:
+        self.forms.append(Form("no_jumps", word.start, target.end, None, (
+            "S0195", "JMP in Structured Text is CODESYS's, and the tool of this dialect refuses it",
+            "write IF or a loop; in an instruction list JMP stands alone")))
         made = RefusedStatement(word.start, target.end, "JMP")
         self.targets[made] = target.text
         return made

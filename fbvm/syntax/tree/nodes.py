@@ -411,13 +411,13 @@ class Pragma(Node):
 class Form(NamedTuple):
     """Text that only some dialects take: those that have `switch` set, or that do not if `taken` is False.
 
-    The parser reads it for all of them.  `refused` is the code, message and hint for the others; `accepted` is the warning, if
-    there is one, for who takes it."""
+    The parser reads it for all of them.  `refused` is the code, message and hint for the others, None if they take it without a
+    word; `accepted` is the warning, if there is one, for who takes it."""
 
     switch: str
     start: int
     end: int
-    refused: tuple[str, str, str]
+    refused: tuple[str, str, str] | None
     accepted: tuple[str, str, str] | None = None
     taken: bool = True
 
