@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from fbvm.base.areas import AREAS
 from fbvm.machine.plc import Phase, Plc
 from fbvm.prove.encoding.terms import Term, Terms
+from fbvm.units.etn21 import codes
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.map import Layout, Switch
 
@@ -21,9 +23,14 @@ Values = Mapping[Word, Term]
 UNUSED = 0x1FF0
 MOST_BYTES = 0x07C0
 MOST_STATE = max(at.TcpState)
-OPENS = 1 << Switch.UDP_OPEN | 1 << Switch.PASSIVE_OPEN | 1 << Switch.ACTIVE_OPEN
-FLAGS = {1 << 0: OPENS, 1 << 1: 1 << Switch.RECEIVE, 1 << 2: 1 << Switch.SEND, 1 << 3: 1 << Switch.CLOSE}
-"""Opening, Receiving, Sending and Closing of a socket's status word, each with the switches that ask for it."""
+UNUSED_OF_UDP = 0x3FF0
+UDP_OPENS, TCP_OPENS = 1 << Switch.UDP_OPEN, 1 << Switch.PASSIVE_OPEN | 1 << Switch.ACTIVE_OPEN
+OPENING = 1 << 0
+RUNNING = OPENING | 1 << 1 | 1 << 2
+"""Opening, Receiving and Sending."""
+CODES = tuple(sorted({*codes.MEANING, *codes.ERRNO.values()}))
+FLAGS = {1 << 1: 1 << Switch.RECEIVE, 1 << 2: 1 << Switch.SEND, 1 << 3: 1 << Switch.CLOSE}
+"""Receiving, Sending and Closing of a socket's status word, each with the switch that asks for it."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +44,8 @@ class Rule:
     number: int
     source: str
     cause: tuple[tuple[Word, int], ...] = ()
+    values: tuple[int, ...] = ()
+    """Of "becomes one of": the values."""
 
     def term(self, terms: Terms, before: Values, after: Values) -> Term:
         """The rule about the words as the program left them, and as the next scan finds them."""
@@ -73,6 +82,19 @@ def _becomes_at_most(terms: Terms, rule: Rule, before: Values, after: Values) ->
     return terms.or_(_at_most(terms, rule, before, after), terms.eq(after[rule.word], before[rule.word]))
 
 
+def _becomes_one_of(terms: Terms, rule: Rule, before: Values, after: Values) -> Term:
+    new = after[rule.word]
+    return terms.any_of(terms.eq(new, before[rule.word]), *(terms.eq(new, terms.constant(16, value)) for value in rule.values))
+
+
+def _one_at_most(terms: Terms, rule: Rule, before: Values, after: Values) -> Term:
+    """Of the bits of the mask never two are ON, unless the program has left them so."""
+    bits = [1 << bit for bit in range(16) if rule.number >> bit & 1]
+    both = (terms.and_(_has(terms, after[rule.word], one), _has(terms, after[rule.word], other))
+            for one, other in combinations(bits, 2))  # fmt: skip
+    return terms.or_(terms.eq(after[rule.word], before[rule.word]), terms.not_(terms.any_of(*both)))
+
+
 def _caused(terms: Terms, rule: Rule, before: Values) -> Term:
     return terms.any_of(*(_has(terms, before[word], mask) for word, mask in rule.cause))
 
@@ -88,12 +110,12 @@ def _changes_while(terms: Terms, rule: Rule, before: Values, after: Values) -> T
 KINDS: dict[str, Callable[[Terms, Rule, Values, Values], Term]] = {
     "only clears": _only_clears, "stays off": _stays_off, "keeps": _keeps, "at most": _at_most,
     "becomes at most": _becomes_at_most, "rises while": _rises_while,
-    "changes while": _changes_while,
+    "changes while": _changes_while, "becomes one of": _becomes_one_of, "one at most": _one_at_most,
 }  # fmt: skip
 
 
 def rules(unit: int, socket: int) -> tuple[Rule, ...]:
-    """The rules of the words of a TCP socket 1..8, driven by the area of the same number, of the unit 0..15.
+    """The rules of the words of a socket 1..8, TCP and UDP, driven by the area of the same number, of the unit 0..15.
 
     Raises ValueError for other numbers."""
     layout = Layout.of(unit)
@@ -112,11 +134,17 @@ def rules(unit: int, socket: int) -> tuple[Rule, ...]:
         Rule(("D", area + at.COUNT), "becomes at most", MOST_BYTES, "W421 6-7-4 p117: 0 to 07C0 bytes were sent or received"),
         Rule(response, "changes while", 0, "W421 6-7-5 p120: a code answers a request", asked),
     ]
+    found += [Rule(response, "becomes one of", 0, "W421 6-7-6 p120 to 125, W420 8-6 p227: the codes of services", (), CODES),
+              Rule(status, "one at most", RUNNING, "W421 6-7-6 p120: during another service only a close is accepted")]
     found += [Rule(("D", area + offset), "keeps", 0xFFFF, "W421 6-7-4 p117: the program alone writes it")
               for offset in (at.OPTION_AND_SOCKET, at.DATA_ADDRESS, at.DATA_ADDRESS + 1, at.TIMEOUT)]  # fmt: skip
-    found += [Rule(status, "rises while", flag, "W420 4-1 p80: ON when its request was accepted",
-                   ((switches, mask << shift),))
-              for flag, mask in FLAGS.items()]
+    udp = "CIO", layout.status("UDP", socket)
+    found += [Rule(udp, "stays off", UNUSED_OF_UDP, "W420 4-1 p80: bits 4 to 12 are not used, 13 is that of TCP"),
+              Rule(udp, "one at most", RUNNING, "W421 6-7-6 p120: during another service only a close is accepted")]
+    for word, opens in (status, TCP_OPENS), (udp, UDP_OPENS):
+        for flag, mask in {OPENING: opens, **FLAGS}.items():
+            found.append(Rule(word, "rises while", flag, "W420 4-1 p80: ON when its request was accepted",
+                              ((switches, mask << shift),)))  # fmt: skip
     return tuple(found)
 
 

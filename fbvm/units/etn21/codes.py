@@ -25,6 +25,7 @@ MEANING = {
     NORMAL_END: "normal end",
     TIMED_OUT: "the time set in the parameter area ran out",
     SOCKET_CLOSED: "the socket was closed while this service ran",
+    0x0066: "no internal memory can be had",
     0x0082: "no connection with the specified peer",
     LOCAL_ADDRESS_ERROR: "local IP address setting error",
     CPU_UNIT_ERROR: "CPU Unit error, cannot execute",

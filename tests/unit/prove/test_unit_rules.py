@@ -69,12 +69,23 @@ def test_every_run_of_the_emulated_unit_keeps_the_rules(
         assert broken(some, before, words_of(rig, some)) == []
 
 
-STATUS, SWITCHES, STATE, CODE = ("CIO", 1509), ("CIO", 1519), ("D", 30009), ("D", 30027)
+UDP, STATUS, SWITCHES, STATE, CODE = ("CIO", 1501), ("CIO", 1509), ("CIO", 1519), ("D", 30009), ("D", 30027)
 WRONG = [
     ("only clears", SWITCHES, 0, 1), ("stays off", STATUS, 0, 0x10), ("at most", STATE, 0, 0xB), ("keeps", ("D", 30018), 1, 2),
     ("becomes at most", ("D", 30023), 1985, 1986),
     ("rises while", STATUS, 0, 1), ("changes while", CODE, 0xFFFF, 0),
+    ("becomes one of", CODE, 0, 0x1234), ("one at most", STATUS, 0, 0x6), ("one at most", STATUS, 1, 3),
+    ("stays off", UDP, 0, 0x2000), ("rises while", UDP, 0, 1), ("one at most", UDP, 0, 6),
 ]  # fmt: skip
+
+
+def test_the_switch_of_one_protocol_opens_no_socket_of_the_other() -> None:
+    some = rules(0, 1)
+    for switch, status in ((Switch.UDP_OPEN, STATUS), (Switch.ACTIVE_OPEN, UDP)):
+        before = {word: 0 for rule in some for word in rule.words} | {SWITCHES: 1 << switch}
+        other = UDP if status == STATUS else STATUS
+        assert broken(some, before, before | {other: 1}) == []
+        assert {rule.kind for rule in broken(some, before, before | {status: 1})} == {"rises while"}
 
 
 @pytest.mark.parametrize(("kind", "word", "old", "new"), WRONG)
