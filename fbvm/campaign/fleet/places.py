@@ -5,9 +5,10 @@ from __future__ import annotations
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from fbvm.campaign.fleet.shard import FAILED, Figures, Shard, ShardProcess
+from fbvm.campaign.fleet.shard import FAILED, OVER, Figures, Shard, ShardProcess
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -77,6 +78,9 @@ def _end(mark: str) -> None:
         part.end()
 
 
+SCHEDULER_GONE = "the scheduler has gone away; a part that hears nothing ends by itself within half a minute"
+
+
 class InCluster:
     """The parts run beside the workers of a cluster, each worker having as many as the others."""
 
@@ -85,21 +89,35 @@ class InCluster:
         self._mark = uuid.uuid4().hex
         workers = sorted(self._client.scheduler_info(n_workers=-1)["workers"])
         self._where = {shard.number: workers[number % len(workers)] for number, shard in enumerate(shards)}
+        self._told = {shard.number: Figures(shard.number) for shard in shards}
         for shard in shards:
             self._client.run(_begin, self._mark, shard, workers=[self._where[shard.number]])
 
     def figures(self) -> dict[int, tuple[str, Figures]]:
-        found = self._client.run(_figures, self._mark, on_error="ignore")
-        told = {number: figures for parts in found.values() for number, figures in parts.items()}
-        return {number: (where, told.get(number) or Figures(number, FAILED, message="its worker has gone away"))
-                for number, where in self._where.items()}  # fmt: skip
+        """What the parts tell; of those whose worker or scheduler has gone what they told last, as failed."""
+        found = self._asked(_figures)
+        now = {number: figures for parts in (found or {}).values() for number, figures in parts.items()}
+        why = SCHEDULER_GONE if found is None else "its worker has gone away"
+        for number, before in self._told.items():
+            if number in now:
+                self._told[number] = now[number]
+            elif before.state not in (OVER, FAILED):
+                self._told[number] = replace(before, state=FAILED, message=why)
+        return {number: (where, self._told[number]) for number, where in self._where.items()}
 
     def stop(self) -> None:
-        self._client.run(_stop, self._mark, on_error="ignore")
+        self._asked(_stop)
 
     def end(self) -> None:
         """Ends all processes."""
-        self._client.run(_end, self._mark, on_error="ignore")
+        self._asked(_end)
+
+    def _asked(self, function: Callable[[str], Any]) -> dict[str, Any] | None:
+        """What each worker answers that is there; None without a scheduler."""
+        try:
+            return cast(dict[str, Any], self._client.run(function, self._mark, on_error="ignore"))
+        except (OSError, RuntimeError):  # the connection is closed, or nobody accepts another one
+            return None
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from contextlib import AbstractContextManager
 from importlib.util import find_spec
@@ -48,3 +49,6 @@ def client_of(address: str, jobs: int) -> AbstractContextManager[Client]:
 def _check_dask() -> None:
     if find_spec("distributed") is None:
         raise click.UsageError("--cluster needs Dask: pip install 'fbvm[cluster]'")
+    import distributed  # noqa: F401 - which sets the levels of its loggers
+
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # the verb says itself that a scheduler has gone

@@ -170,6 +170,22 @@ def test_parts_in_a_cluster_are_told_by_their_workers() -> None:
     assert [name for name, _ in workers.told[3:]] == ["_figures", "_stop", "_end"]
 
 
+def test_a_scheduler_that_goes_away_is_told_with_the_last_figures(folder: Path) -> None:
+    [part] = shards_of(project_of(), 1)
+    workers = Workers()
+    with in_cluster(nullcontext(workers), lambda count: [Shard(n, part, (), "") for n in range(3)]) as places:  # type: ignore[arg-type]
+        places.figures()
+
+        def run(*asked: object, **options: object) -> None:
+            raise RuntimeError("ConnectionPool is closed")
+
+        workers.run = run  # type: ignore[method-assign,assignment]
+        found = {number: (each.state, each.plcs, each.message) for number, (_, each) in places.figures().items()}
+        places.stop()
+    gone = "the scheduler has gone away; a part that hears nothing ends by itself within half a minute"
+    assert found == {0: ("failed", 3, gone), 1: ("failed", 0, "its worker has gone away"), 2: (OVER, 1, "")}
+
+
 def test_more_parts_than_plcs_are_refused(folder: Path) -> None:
     result = CliRunner().invoke(main, ["fleet", "--for", "1s", "--net", "loop", "--shards", "7"])
     assert (result.exit_code, "--shards 7: there are 6 PLCs; a part has one at least" in result.stderr) == (status.USAGE, True)
