@@ -72,10 +72,11 @@ def test_a_block_never_sends_and_receives_at_once_if_the_unit_keeps_its_rules() 
 
 def test_a_run_that_is_shown_keeps_the_rules() -> None:
     image = client()
-    verdict = prove(image, Question(NEVER, "D30027 = 5", units=((0, 1),)), LIMITS)
+    assert prove(image, Question(NEVER, "D30027 = 5", units=((0, 1),)), LIMITS).word == "proved"  # which is no code
+    verdict = prove(image, Question(NEVER, "D30027 = 74", units=((0, 1),)), LIMITS)
     assert verdict.run is not None
     assert (verdict.word, verdict.run.scans) == ("broken", 2)  # the first scan asks for it
-    assert asked(image, "D30027 = 5").run.scans == 1  # type: ignore[union-attr]
+    assert asked(image, "D30027 = 74").run.scans == 1  # type: ignore[union-attr]
 
 
 READER, WRITER, LINE = "Main.Fn03_.Exchange", "Main.Fn05_.Exchange", "MTCP_ETN_Line"
