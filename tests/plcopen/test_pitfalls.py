@@ -365,3 +365,12 @@ def test_an_input_that_nothing_is_wired_to_is_left_out_where_its_tool_does(order
 def test_a_reference_in_the_place_of_a_name_is_a_type() -> None:
     text = pou("", '<variable name="r"><type><derived name="REFERENCE TO BOOL"/></type></variable>', language="LD")
     assert "r : REFERENCE TO BOOL;" in imported(text).files["Main.st"]
+
+
+def test_the_type_of_a_moved_literal_is_that_of_the_variable_which_its_sum_reaches() -> None:
+    moved = [value(1, "a") + value(2, "30") + block(3, "MOVE", "EN=1 IN=2", "ENO,OUT"),
+             value(4, "b") + value(5, "-10") + block(6, "MOVE", "EN=4 IN=5", "ENO,OUT")]
+    added = block(7, "ADD", "IN1=3.OUT IN2=6.OUT", "OUT") + result(8, "7.OUT", "n")
+    made = imported(pou("".join(moved) + added, variable("a") + variable("b") + variable("n", "INT"), language="FBD"))
+    assert made.errors == []
+    assert states(made, "n", ["", "a=1", "b=1", "a=0"]) == ["0", "30", "20", "20"]

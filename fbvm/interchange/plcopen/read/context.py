@@ -215,9 +215,24 @@ class NetworkContext:
         return written(text, self.scope.roots(text))
 
     def sink_type(self, wire: Wire) -> str:
-        """The type of a variable to which an output leads; "" if it leads to none."""
-        sinks = (sink for sink in self.network.objects if sink.kind != "block" for pin in sink.pins if pin.wires == [wire])
-        return next((found for sink in sinks if (found := self.scope.type_of(sink.text))), "")
+        """The type of a variable to which an output leads, also through functions whose result has the type of their operands;
+        "" if it leads to none."""
+        seen: set[Object] = set()
+        todo = [wire]
+        while todo:
+            here = todo.pop(0)
+            for item in self.network.objects:
+                if item in seen or not any(here in pin.wires for pin in item.pins):
+                    continue
+                if item.kind != "block" and (found := self.scope.type_of(item.text)):
+                    return found
+                if item.kind == "block" and self.scope.has_type_of_operands(item):
+                    seen.add(item)
+                    outs = [Wire(item, pin.name) for pin in item.outputs if pin.name.upper() != "ENO"]
+                    todo += outs
+                    if found := next((kind for out in outs if (kind := self.scope.wire_type(out))), ""):
+                        return found
+        return ""
 
     def warn(self, item: Object, message: str) -> None:
         self.reading.report("X0292", item.element, message)

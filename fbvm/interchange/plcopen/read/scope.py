@@ -201,6 +201,12 @@ class Scope:
             return variable.type if variable else other.result
         return _standard_type(name) or self._operand_type(item, depth)
 
+    def has_type_of_operands(self, item: Object) -> bool:
+        """Whether an object is a standard function whose result has the type of its operands."""
+        name = item.text.upper()
+        is_standard = name in SIGNATURES or name in OPERATORS
+        return is_standard and not item.instance and name not in self.pous and not _standard_type(name)
+
     def _operand_type(self, item: Object, depth: int) -> str:
         """The type of the result of a standard function whose result has the type of its operands."""
         name = item.text.upper()
