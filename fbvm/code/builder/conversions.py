@@ -174,7 +174,23 @@ def _real_to_integer(emitter: Emitter, rounding: str, node: Node, form: str, sit
     if emitter.dialect.negative_is_zero and form[0] == "u":
         real, nought = emitter.to_temporary(node), ("const", node[1], 0.0)
         node = ("select", node[1], ("lt", "b", node[1], real, nought), real, nought)
-    return _wrapped(emitter, rounding, node, form) if emitter.dialect.reals_wrap else (rounding, form, node[1], node, site)
+    if emitter.dialect.reals_wrap:
+        return _wrapped(emitter, rounding, node, form)
+    if rounding == "nearest" and emitter.dialect.ties_away:
+        node = _without_tie(emitter, node)
+    return (rounding, form, node[1], node, site)
+
+
+def _without_tie(emitter: Emitter, node: Node) -> Node:
+    """A real as an f64; one in the middle of two integers is moved away from 0, so that it is nearest to the outer one."""
+    real = emitter.to_temporary(node if node[1] == "f64" else ("convert", "f64", "f32", node))
+    low, high, nought = ("const", "f64", -2.0 ** 52), ("const", "f64", 2.0 ** 52), ("const", "f64", 0.0)
+    inside = ("and", "b", ("gt", "b", "f64", real, low), ("lt", "b", "f64", real, high))  # no other f64 has a fraction
+    small = emitter.to_temporary(("select", "f64", inside, nought, real))
+    rest = emitter.to_temporary(("sub", "f64", small, ("convert", "f64", "i64", ("nearest", "i64", "f64", small, 0))))
+    tie = ("or", "b", ("eq", "b", "f64", rest, ("const", "f64", 0.5)), ("eq", "b", "f64", rest, ("const", "f64", -0.5)))
+    step = ("select", "f64", ("gt", "b", "f64", small, nought), ("const", "f64", -0.25), ("const", "f64", 0.25))
+    return ("add", "f64", real, ("select", "f64", tie, nought, step))
 
 
 def _wrapped(emitter: Emitter, rounding: str, node: Node, form: str) -> Node:
