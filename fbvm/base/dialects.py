@@ -22,6 +22,7 @@ class Dialect:
     last_of_mux: bool = False
     lenient_positions: bool = False
     seconds: bool = False
+    dates_in_nanoseconds: bool = False
     hexadecimal_bits: bool = False
     real_bits_by_value: bool = False
     reals_of_other_widths: bool = False
@@ -100,6 +101,8 @@ QUESTIONS = {
     "lenient_positions": ("a length below 0 or a position below 1 in LEFT, MID, DELETE ...", "stops the program (R0108)",
                           "0, and position 1"),
     "seconds": ("TIME_TO_REAL(T#5s), INT_TO_TIME(5000): the unit", "milliseconds", "seconds"),
+    "dates_in_nanoseconds": ("ULINT_TO_DT(n), TOD_TO_LINT(t), LINT_TO_DATE(n): the unit",
+                             "seconds; of a time of day milliseconds", "nanoseconds"),
     "hexadecimal_bits": ("DWORD_TO_STRING(255)", "'255'", "'16#ff'"),
     "real_bits_by_value": ("REAL_TO_DWORD(2.0), DWORD_TO_REAL(2), LREAL_TO_LWORD, LWORD_TO_LREAL",
                            "the bits stay: 16#40000000, 2.8E-45", "the value: 2, 2.0"),
@@ -266,7 +269,8 @@ _ROWS = (
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
             generic_functions=True, times_are_numbers=True, places_for_all=True, own_time=True,
-            round_arrays=True, nested_repetitions=True, no_short_circuit_words=True, no_jumps=True),
+            round_arrays=True, nested_repetitions=True, no_short_circuit_words=True, no_jumps=True,
+            dates_in_nanoseconds=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, no_jumps=True, plain_names=True,
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),

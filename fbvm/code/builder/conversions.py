@@ -239,6 +239,8 @@ def saturated(emitter: Emitter, rounding: str, node: Node, form: str) -> Node:
 
 def _tick(emitter: Emitter, kind: Type) -> int:
     """Nanoseconds of the unit in which a time of a type is converted to and from numbers."""
+    if emitter.dialect.dates_in_nanoseconds and kind.name != "TIME":
+        return 1
     return 1_000_000_000 if emitter.dialect.seconds and kind.name == "TIME" else _TICKS.get(kind.name, 1)
 
 
