@@ -93,6 +93,17 @@ class BoundedSearch:
         """True if no run is left to go on: each has trapped, or broken an assumption."""
         return self.solver.ask(self._alive[self.cleared]) == UNSAT
 
+    def longest_run(self, scans: int) -> int | None:
+        """The scans of the longest run, if all runs end within so many: by a trap, or an assumption that is broken; else None."""
+        self.hit(scans - 1)
+        if self.solver.ask(self._alive[scans]) != UNSAT:
+            return None
+        low, high = 0, scans
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if self.solver.ask(self._alive[middle]) == UNSAT else (middle, high)
+        return low
+
     def _shortest(self, hits: list[Term]) -> Inputs | None:
         while True:
             values = self.solver.values(hits)

@@ -209,7 +209,10 @@ class Prover:
         return self._undecided()
 
     def _with_unreached(self, verdict: Verdict) -> Verdict:
-        """A proof with the statements of which it says nothing."""
+        """A proof with the scans and the statements of which it says nothing."""
+        if self.question.assumptions and (most := self.search.longest_run(DEPTHS[-1])) is not None:
+            ends = f"no run keeps the assumptions, or does not trap, for longer than {_scans(most)}"
+            verdict = replace(verdict, notes=(*verdict.notes, f"{ends}: nothing is said of later ones"))
         self.tell("looking for statements that no run reaches")
         sites = unreached(self.summary, self.goal, self.clock, DEPTHS[-1], self.limits.expired)
         if not sites:

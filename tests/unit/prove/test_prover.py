@@ -88,6 +88,15 @@ def test_without_a_proof_the_scans_without_a_run_are_told() -> None:
     assert verdict.how == "no run of 40 scans gets there, and no proof was found that none ever does"
 
 
+def test_assumptions_that_no_run_keeps_for_long_are_told() -> None:
+    counts = program("n := n + 1;", "n : INT;")
+    verdict = asked(counts, NEVER, "Main.n > 9", "Main.n < 10")
+    assert (verdict.word, verdict.notes) == ("proved", (
+        "assumed: Main.n < 10",
+        "no run keeps the assumptions, or does not trap, for longer than 9 scans: nothing is said of later ones"))
+    assert asked(counts, NEVER, "Main.In", "NOT Main.In").notes == ("assumed: NOT Main.In",)
+
+
 def test_statements_of_which_nothing_is_known_yet_are_not_said_to_be_unreached(monkeypatch: pytest.MonkeyPatch) -> None:
     prover = Prover(program("IF In THEN n := 1; END_IF", "n : INT;"), Question(NEVER, "Main.n > 1"), Limits(), lambda said: None)
     asked = prover.summary, prover.goal, prover.clock, 4, lambda: False
