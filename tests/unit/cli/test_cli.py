@@ -7,6 +7,8 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import click
 import pytest
@@ -15,10 +17,12 @@ from rows import each_of
 
 from fbvm.base.codes import CODES
 from fbvm.cli.main import GROUP_OF, main
-from fbvm.cli.running.demo import command_name
+from fbvm.cli.running.demo import Comparison, command_name
+from fbvm.cli.shared.debug.attach import open_attached
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.run_result import RunResult
 from fbvm.code.compiler import compile_text
+from fbvm.dap.target import LaunchError
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.chart import Chart
 from fbvm.record.export.pcapng import Capture
@@ -568,3 +572,22 @@ def test_a_run_that_shows_nothing_says_what_ran(capsys: pytest.CaptureFixture[st
     assert click.unstyle(capsys.readouterr().err) == "1,500 scans in 15s, ended by scans\n"
     RunResult(plc, "scans", {"Main.n": plc.find("Main.n")}, None, False, "").print()
     assert click.unstyle(capsys.readouterr().out) == "Main.n = 1500\n"
+
+
+def test_words_that_are_not_there_are_not_equal() -> None:
+    found = [Comparison("", [], words, 0, registers).equal for words, registers in (([1], [1]), ([1], [2]), ([], []))]
+    assert found == [True, False, False]
+
+
+def test_an_editor_that_names_no_plc_of_the_run_is_told_those_there_are() -> None:
+    debugged: Any = [SimpleNamespace(name="pump", plc=None), SimpleNamespace(name="mix", plc=None)]
+    with pytest.raises(LaunchError, match="there is no PLC tank; there is pump, mix"):
+        open_attached(debugged, {}, {}, {"plc": "tank"})
+
+
+@pytest.mark.slow
+def test_a_page_in_memory_has_no_doors_to_the_host(tmp_path: Path) -> None:
+    (tmp_path / "a.st").write_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM", encoding="utf-8")
+    for more in (("--door", "192.168.250.2:502=127.0.0.1:0"), ("--map", "192.168.250.1:502=127.0.0.1:1502")):
+        result = CliRunner().invoke(main, ["live", str(tmp_path / "a.st"), "--net", "loop", *more])
+        assert (result.exit_code, "leave memory: add --net tcp" in result.stderr) == (2, True), result.stderr

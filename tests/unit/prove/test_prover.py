@@ -68,6 +68,13 @@ def test_reach_finds_the_shortest_inputs() -> None:
     assert (verdict.word, verdict.run.scans, verdict.is_good) == ("reached", 3, True)
 
 
+@pytest.mark.slow
+def test_an_input_of_a_subrange_has_its_ends_and_nothing_behind_them() -> None:
+    image = program("n := Part;", "Part AT %IW4 : INT(-3..5); n : INT;")
+    words = {value: asked(image, REACH, f"Main.n = {value}").word for value in (-4, -3, 5, 6)}
+    assert words == {-4: "unreachable", -3: "reached", 5: "reached", 6: "unreachable"}
+
+
 def test_what_is_never_reached_is_said_to_be_unreachable() -> None:
     verdict = asked(program(COUNTER.replace("5;", "5; IF n > 9 THEN n := 0; END_IF"), COUNTED), REACH, "Main.n = 11")
     assert (verdict.word, verdict.is_good) == ("unreachable", False)
