@@ -54,7 +54,8 @@ TESTS = {
     "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
     "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run"),
     "record": ("tests/unit/record", "tests/unit/cli"), "run": ("tests/unit/run", "tests/unit/net"),
-    "testing": ("tests/unit/testing",), "cli": ("tests/unit/cli",), "analysis": ("tests/unit/analysis", "tests/unit/lsp"),
+    "testing": ("tests/unit/testing", "tests/twincat"), "cli": ("tests/unit/cli",),
+    "analysis": ("tests/unit/analysis", "tests/unit/lsp"),
 }  # fmt: skip
 """The folders of tests that matter for a room; for others that of its own name."""
 RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is": "is not", "is not": "is",
