@@ -28,10 +28,14 @@ class StatementWriter:
         self.blocks: dict[str, Element] = {}
         """By instance in capitals, the blocks of the network at work.  A statement without a wire from them begins another."""
         self._is_wired = False
+        self._has_effects = False
+        """Whether something other than calls has been drawn behind the blocks at work: calls in a row may all be read by the next
+        one, and their wires make one network of them."""
 
     def end_network(self) -> None:
         """Let no wire lead from what is drawn so far to what follows: a rung stands in between."""
         self.blocks = {}
+        self._has_effects = False
 
     def write(self, statement: tree.Statement) -> None:
         """Draw one statement as a network of its own, or behind the blocks whose outputs it takes.  Raises NotExportable."""
@@ -44,8 +48,10 @@ class StatementWriter:
             self._conditional(statement)
         elif not isinstance(statement, tree.Empty):
             raise self._not_exportable(statement)
-        if not self._is_wired and not isinstance(statement, tree.CallStatement):
-            self.end_network()
+        if not isinstance(statement, tree.CallStatement):
+            self._has_effects = True
+            if not self._is_wired:
+                self.end_network()
 
     def _value(self, expr: tree.Expr) -> Ends | str:
         """A value as a wire if it is an output of a block at work or made of one by operators, which are blocks then; else as its
@@ -104,6 +110,8 @@ class StatementWriter:
         kind = self.types.instances.get(name.upper())
         if kind is None:
             raise self._not_exportable(tree.CallStatement(call.start, call.end, call))
+        if not self._is_wired and self._has_effects:
+            self.end_network()
         self.drawing.block(kind, name, inputs, outputs, COLUMN, 0)
         self.blocks[name.upper()] = next(made for made in reversed(self.drawing.elements) if made.get("instanceName") == name)
         self.drawing.skip(max(len(inputs), len(outputs), 2) // 2 + 1)
