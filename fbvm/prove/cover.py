@@ -67,12 +67,12 @@ class Covered:
 
 
 def cover(image: Image, limits: Limits, assumed: tuple[str, ...] = (), free: tuple[str, ...] = (),
-          known: Known = lambda site, others: False,
-          tell: Callable[[str], None] = lambda said: None) -> Covered:  # fmt: skip
-    """Runs that meet the goals of a program that are not `known` to be met.
+          known: Known = lambda site, others: False, tell: Callable[[str], None] = lambda said: None,
+          units: tuple[tuple[int, int], ...] = ()) -> Covered:  # fmt: skip
+    """Runs that meet the goals of a program that are not `known` to be met; `units` are those of a `Question`.
 
     Raises what `prove` raises."""
-    prover = Prover(image, Question(NO_TRAP, "", assumed, free), limits, tell)
+    prover = Prover(image, Question(NO_TRAP, "", assumed, free, units=units), limits, tell)
     spots = _spots(image)
     waiting = dict.fromkeys(spot for spot in spots if not known(image.sites[spot.site], _others(image, spot)))
     outputs = output_places(prover)

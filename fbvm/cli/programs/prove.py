@@ -134,8 +134,6 @@ def _refuse_mixed(options: dict[str, Any], asks: bool) -> None:
     """Raises UsageError for options that do not go together, and where nothing is asked."""
     if options["tests_file"] and asks:
         raise click.UsageError("--tests stands alone: ask for properties in a call of its own")
-    if options["tests_file"] and options["unit_rules"]:
-        raise click.UsageError("--unit-rules goes with properties; tests are written for any words: name them with --free")
     if options["tests_file"] and options["lemma"]:
         raise click.UsageError("--lemma helps to prove a property, which --tests has none of")
     if options["covered"] and not options["tests_file"]:

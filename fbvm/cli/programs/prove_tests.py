@@ -65,7 +65,7 @@ def write_tests(files: Sequence[Path], program: str | None, libraries: Sequence[
     limits = Limits(cycle_ns, options["scans"], options["seed"], time_limit(options["budget_ns"]), longest_ns=longest_ns)
     with answering(image, "tests"), told("tests") as tell:
         try:
-            found = cover(image, limits, options["assume"], options["free"], known, tell)
+            found = cover(image, limits, options["assume"], options["free"], known, tell, options["unit_rules"])
         except TimeOver:
             raise click.UsageError("the time is over: one scan has too many ways to follow all of them") from None
     if found.runs:

@@ -116,7 +116,7 @@ def test_the_run_is_recorded(tmp_path: Path) -> None:
 @pytest.mark.parametrize("arguments", [[], ["--never", "Main.Nobody"], ["--never", "Main.Left +"], ["--always", "3"],
                                        ["--never", "Main.Left", "--free", "Nobody"],
                                        ["--written-once", "Main.Left,Nobody"], ["--never", "Main.Left", "--unit-rules", "0:9"],
-                                       ["--tests", "t.py", "--unit-rules", "0:1"]])  # fmt: skip
+                                       ["--tests", "t.py", "--lemma", "Main.Left"]])  # fmt: skip
 def test_wrong_use_has_status_2(arguments: list[str]) -> None:
     result = proved(INTERLOCK, *arguments)
     assert result.exit_code == 2, result.output
@@ -225,6 +225,36 @@ def test_tests_for_what_no_test_executes(tmp_path: Path, plc: RigMaker) -> None:
     assert json.loads(none.stdout) == {"met": 5, "tests": [], "never": [f"{program}:9"], "missed": []}
     short = proved(str(program), "--tests", str(tests), "--scans", "1")
     assert (short.exit_code, f"{program}:5: no run of 1 scan does it" in short.stdout) == (1, True)
+
+
+ANSWERED = """PROGRAM Main
+VAR Asked AT CIO 1519.02 : BOOL; Code AT D30027 : UINT; Waits, Fault, Odd : BOOL; END_VAR
+    IF NOT Waits THEN
+        Asked := TRUE;
+    ELSIF NOT Asked AND Code <> 0 THEN
+        Fault := TRUE;
+        IF Code = 5 THEN
+            Odd := TRUE;
+        END_IF
+    END_IF
+    Waits := Asked;
+END_PROGRAM
+"""
+
+
+@pytest.mark.slow
+def test_tests_drive_the_words_of_a_unit_as_its_rules_say(tmp_path: Path, plc: RigMaker) -> None:
+    program, tests = tmp_path / "asks.st", tmp_path / "test_asks.py"
+    program.write_text(ANSWERED, encoding="utf-8")
+    result = proved(str(program), "--tests", str(tests), "--unit-rules", "0:1", "--scans", "4")
+    assert f"{program}:8" in result.stdout  # 0005 is no response code
+    assert f"{program}:6" not in result.stdout
+    text = tests.read_text(encoding="utf-8")
+    assert "machine.write('Main.Asked', False)" in text
+    assert "machine.write('Main.Code', " in text
+    for name, run in runpy.run_path(str(tests)).items():
+        if name.startswith("test_"):
+            run(plc)
 
 
 def test_options_of_tests_that_do_not_go_together(tmp_path: Path) -> None:
