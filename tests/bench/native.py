@@ -4,11 +4,11 @@ The limit is C by hand, `cc -O2`: it holds its state in variables of their own, 
 code stores every input of a block where a watch can see it, checks what can trap, makes NaN canonical and keeps the step
 budget in memory; it wins where C calls functions and LLVM sees through the calls.
 
-Wanted are at most 0.8, 1.5, 1.5 and 3.0 times C.  One x86-64 machine measured 0.71, 1.46, 1.33 and 2.86.  Of the 0.46 that
-PID is behind, 0.16 are the looks at NaN in front of stores of REAL (without them it stands at 1.30), the rest stores of
-what C keeps in registers.  Of the 1.84 of Fn03, 0.3 are checks and the budget; eight instances store some forty inputs
-and words of state that C does not have.  A build that can be stopped costs a load and a branch at each statement and write,
-and LLVM sees less far across them."""
+Wanted are at most 0.8, 1.5, 1.4 and 2.5 times C.  One x86-64 machine, with other work on it, measured 0.71, 1.41, 1.33 and
+2.5.  Of the 0.41 that PID is behind, 0.2 are the looks at NaN in front of stores of REALs that were computed, 0.05 the step
+budget, the rest stores of what C keeps in registers.  Of the 1.5 of Fn03, 0.3 are the budget; eight instances store some forty
+inputs and words of state that C does not have.  A build that can be stopped costs a load and a branch at each statement and
+write, and LLVM sees less far across them."""
 
 from __future__ import annotations
 
