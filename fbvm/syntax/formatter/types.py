@@ -233,8 +233,8 @@ class TypeLayout(StatementLayout):
         return Phrase(count.start, "[", self.array_repeated(count, opener, values, closer).doc, "]", level="list")
 
     def array_round(self, opener: Token, bare: Phrase, closer: Token) -> Phrase:
-        """... and one in parentheses gets brackets for these."""
-        return Phrase(opener.start, self.leaf(opener, ""), bare.doc, self.closer(closer, ""), level="list")
+        """... and one in parentheses keeps these, which only a dialect takes."""
+        return Phrase(opener.start, self.leaf(opener), *bare.parts[1:-1], self.closer(closer), level="list")
 
     def array_item(self, value: Phrase) -> Phrase:
         return value
