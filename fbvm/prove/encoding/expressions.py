@@ -393,7 +393,8 @@ def _from_bcd(x: Execution, state: State, machine: str, source: str, a: Node, si
         nibble = terms.extract(value, 4 * digit, 4)
         wrong = terms.or_(wrong, terms.less(terms.constant(4, 9), nibble, False))
         total = terms.add(total, terms.mul(terms.extend(nibble, wide, False), terms.constant(wide, 10**digit)))
-    x.trap(state, wrong, "R0105", site)
+    most = terms.constant(wide, (1 << (width(machine) - is_signed(machine))) - 1)
+    x.trap(state, terms.or_(wrong, terms.less(most, total, False)), "R0105", site)
     return terms.resized(total, width(machine), False)
 
 

@@ -95,6 +95,14 @@ def test_without_a_proof_the_scans_without_a_run_are_told() -> None:
     assert verdict.how == "no run of 40 scans gets there, and no proof was found that none ever does"
 
 
+@pytest.mark.parametrize(("kind", "greatest"), [("USINT", 255), ("SINT", 127)])
+def test_decimal_digits_that_make_too_large_a_number_trap(kind: str, greatest: int) -> None:
+    digits = image_of(f"PROGRAM Main VAR w AT %IW0 : WORD; n : {kind}; END_VAR n := WORD_BCD_TO_{kind}(w); END_PROGRAM")
+    few = int(str(greatest), 16)
+    assert asked(digits, NO_TRAP, "", f"Main.w = {few + 1}").word == "broken"
+    assert asked(digits, NO_TRAP, "", f"Main.w = {few}").word == "proved"
+
+
 def test_assumptions_that_no_run_keeps_for_long_are_told() -> None:
     counts = program("n := n + 1;", "n : INT;")
     verdict = asked(counts, NEVER, "Main.n > 9", "Main.n < 10")
