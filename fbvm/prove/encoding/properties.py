@@ -56,6 +56,8 @@ class _Property:
     def _compared_reals(self, term: watched.Term) -> Term:
         """A comparison of REALs and LREALs, as numbers of 64 bits; whole numbers are compared with constants only."""
         widest = max(_real_bits(part) for part in term.parts)
+        if not widest:
+            raise Refused(f"{term.text} cannot be followed: compare whole numbers with a whole number")
         left, right = (self._real(part, widest) for part in term.parts)
         if term.sign in ("=", "<>"):
             equal = reals.equal(self.terms, left, right)

@@ -158,6 +158,12 @@ def test_assumptions_that_no_run_keeps_are_refused() -> None:
         asked(program(COUNTER, COUNTED), NEVER, "Main.Q", "Main.In AND NOT Main.In")
 
 
+@pytest.mark.parametrize("condition", ["Main.n < 101.5", "Main.n <> 1e999"])
+def test_a_whole_number_beside_a_real_literal_is_refused_in_words(condition: str) -> None:
+    with pytest.raises(Refused, match="compare whole numbers with a whole number"):
+        prove(program("n := n + 1;", "n : INT;"), Question(NEVER, condition), FEW)
+
+
 def test_a_word_is_free_if_it_is_named() -> None:
     image = program("Q := w > 5;", "w AT %D100 : INT; Q : BOOL;")
     assert prove(image, Question(NEVER, "Main.Q"), FEW).word == "proved"
