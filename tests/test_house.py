@@ -89,7 +89,7 @@ SEPARATE = {("units", "net"), ("net", "units"), ("units", "engine"), ("engine", 
             *((one, other) for one in SHOPS for other in SHOPS - {one} if (one, other) not in BETWEEN_SHOPS)}  # fmt: skip
 """Neighbours that do not import each other."""
 ONLY_IN = {
-    "socket": {"net/tcp.py", "net/udp.py", "net/streams.py", "live/sockets.py"},
+    "socket": {"net/tcp.py", "net/connections.py", "net/udp.py", "net/streams.py", "live/sockets.py"},
     "selectors": {"net", "base/host.py", "live/sockets.py"},
     "websockets": {"live"},
     "time": {"run", "base/host.py"},

@@ -11,6 +11,7 @@ import os
 import re
 import signal
 import stat
+import struct
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -246,6 +247,10 @@ def taken_alone(file: IO[bytes]) -> bool:
 # --- sockets ----------------------------------------------------------------------------------------------------------
 
 FD_SETSIZE = 1024
+SIOCOUTQNSD = 0x894B
+"""The request of `ioctl` for the bytes that a socket has not sent (linux/sockios.h)."""
+TCP_NOTSENT_LOWAT = 25
+"""The option of TCP after which a socket can be written to once less than so many bytes are not sent (tcp(7), linux/tcp.h)."""
 LONGEST_WAIT_S = 0.25
 """How long Windows may wait for sockets at a time: Ctrl-C does not end its `select`."""
 
@@ -265,6 +270,20 @@ def shares_ports() -> bool:
 def keeps_ports() -> bool:
     """True if others can listen beside a socket that is only bound, so that this keeps a port from being given away."""
     return sys.platform == "linux"
+
+
+def unsent_bytes(number: int) -> int:
+    """Bytes that the host has taken for the socket of a file number and not sent yet, since acknowledgements are missing; 0 where
+    that is not known."""
+    if sys.platform != "linux":
+        return 0
+    import fcntl
+
+    try:
+        size: int = struct.unpack("i", fcntl.ioctl(number, SIOCOUTQNSD, bytes(4)))[0]
+    except OSError:  # it has ended
+        return 0
+    return size
 
 
 def selector_number(selector: selectors.BaseSelector) -> int | None:

@@ -218,6 +218,19 @@ def test_close_by_fin_and_by_rst(network: TcpNetwork, device: Device) -> None:
         line.recv(10)
 
 
+@pytest.mark.parametrize("half_closed", [False, True])
+def test_a_reset_comes_behind_what_has_been_sent(network: TcpNetwork, device: Device, half_closed: bool) -> None:
+    """The host sends no more than ten small segments before the first acknowledgement."""
+    link, line = opened(network, device)
+    if half_closed:
+        line.shutdown(socket.SHUT_WR)
+        assert until(link, bool) == [PeerClosed(1)]
+    link.submit([*(Send(1, b"reply") for _ in range(100)), Close(1, reset=True)], now_ns())
+    until_last(link, Closed)
+    until(link, lambda events: is_reset(line))
+    assert b"".join(iter(lambda: line.recv(1000), b"")) == 100 * b"reply"
+
+
 def test_unread_data_do_not_turn_the_fin_into_a_reset(network: TcpNetwork, device: Device) -> None:
     link, line = opened(network, device, grant=0)
     line.sendall(b"never fetched")
