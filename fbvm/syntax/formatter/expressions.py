@@ -57,6 +57,8 @@ class ExpressionLayout:
                 text = text.upper()
             elif token.type == "NAME":
                 text = text.upper() if self.words.get(text.upper()) in self.reserved else self.spell(token.start, text)
+            elif token.type in ("TYPED_LITERAL", "DATE_LITERAL"):
+                text = self._typed(token)
         return Leaf(text, token.start, token.end)
 
     def closer(self, token: Token, text: str | None = None) -> Leaf:
@@ -119,14 +121,13 @@ class ExpressionLayout:
     def number(self, token: Token) -> Phrase:
         return Phrase(token.start, self.leaf(token))
 
-    string_literal = truth = null = name_ref = direct = self_reference = number
+    string_literal = typed_literal = truth = null = name_ref = direct = self_reference = number
 
-    def typed_literal(self, token: Token) -> Phrase:
+    def _typed(self, token: Token) -> str:
         prefix, rest = token.text.split("#", 1)
         if prefix.upper() in ELEMENTARY:
-            return Phrase(token.start, self.leaf(token, f"{prefix.upper()}#{rest}"))
-        member = self.spell(token.start + len(prefix) + 1, rest)
-        return Phrase(token.start, self.leaf(token, f"{self.spell(token.start, prefix)}#{member}"))
+            return f"{prefix.upper()}#{rest}"
+        return f"{self.spell(token.start, prefix)}#{self.spell(token.start + len(prefix) + 1, rest)}"
 
     # --- variables ---
 

@@ -93,7 +93,7 @@ def _arguments(row: list[Token], spelled: Spelled) -> str:
     before = ""
     for token in row:
         word = spelled(token)
-        joined = not parts or token.text in _NOTHING_BEFORE or before in _NOTHING_BEHIND
+        joined = not parts or token.text in _NOTHING_BEFORE or token.text[0] == "." or before in _NOTHING_BEHIND
         joined = joined or token.text == "(" and before.isidentifier()
         parts += [word] if joined else [" ", word]
         before = token.text

@@ -334,6 +334,13 @@ END_PROGRAM
 """An instruction list in canonical text."""
 
 
+def test_operands_of_instruction_lists_are_spelt_as_everywhere() -> None:
+    declared = "TYPE Colour : (Red, Green); END_TYPE\nPROGRAM Main\nVAR c : Colour; w : WORD; d : DATE; END_VAR\n"
+    written, _ = formatted(Source("x.st", declared + "ld c\neq colour#GREEN\nld w . 2\nld d\neq d#2020-1-2\nEND_PROGRAM\n"))
+    assert [line.split() for line in written.splitlines()[-6:-1]] == [
+        ["LD", "c"], ["EQ", "Colour#Green"], ["LD", "w.2"], ["LD", "d"], ["EQ", "D#2020-1-2"]]
+
+
 def test_an_instruction_list_stands_in_columns() -> None:
     loose = WRITTEN_LIST.replace("LD      Go  ", "ld GO ").replace(" := ", ":=")
     loose = loose.replace("over:\n        CAL     t(", "over :  cal t (").replace("        // both", "\n\n // both")
