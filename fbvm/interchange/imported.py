@@ -33,7 +33,7 @@ class Imported:
     diagnostics: list[Diagnostic]
     """Errors and warnings about the document, in the order of their places in it."""
     family: str = ""
-    """The family of tools that wrote it: "beremiz", "codesys", "twincat"; "" if that is not known, or of no use."""
+    """The family of tools that wrote it: "beremiz", "codesys", "twincat", "fbvm"; "" if that is not known, or of no use."""
     because: str = ""
     """From what the family and the order of evaluation were concluded."""
     references: tuple[str, ...] = ()

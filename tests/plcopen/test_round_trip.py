@@ -131,6 +131,18 @@ def test_a_call_behind_an_interlock_there_and_back() -> None:
     compare(program, back)
 
 
+def test_what_a_text_begins_with_is_an_expression_there_and_back() -> None:
+    back = there_and_back("""FUNCTION_BLOCK Part
+VAR_INPUT name : STRING := 'part'; END_VAR
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR p : Part; both : STRING := CONCAT('my ', p.name); END_VAR
+    p();
+END_PROGRAM
+""")
+    assert "both : STRING := CONCAT('my ', p.name);" in " ".join("".join(back.files.values()).split())
+
+
 @pytest.mark.slow
 def test_a_tenth_of_the_corpus_there_and_back() -> None:
     count = round_trips("", each=10)

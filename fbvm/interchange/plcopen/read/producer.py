@@ -31,7 +31,7 @@ _UNNAMED = frozenset((
     "sans nom", "sconosciuto", "senza nome", "неизвестно", "неизвестный", "безымянный", "未知", "未命名", "不明", "名称未設定"))
 """What Beremiz and OpenPLC Editor write as company and product, in the language of the desktop."""
 _NAMED = {"twincat": ("twincat",), "codesys": ("codesys", "e!cockpit", "machine expert", "somachine"),
-          "beremiz": ("beremiz", "openplc")}
+          "beremiz": ("beremiz", "openplc"), "fbvm": ("fbvm",)}
 """Families, and words of headers that name one of their tools."""
 _GENERATION_2, _GENERATION_3 = "2022-06", "2025-10-03"
 """Dates from which documents were probably meant for the second and third generation of the generator."""
@@ -39,8 +39,8 @@ _GENERATION_2, _GENERATION_3 = "2022-06", "2025-10-03"
 
 @dataclass(frozen=True)
 class Producer:
-    """The family of tools that wrote a document: "beremiz" (OpenPLC Editor too), "codesys", "twincat", or "" if that is not
-    known; the order of evaluation that is taken, and from what that was concluded."""
+    """The family of tools that wrote a document: "beremiz" (OpenPLC Editor too), "codesys", "twincat", "fbvm", or "" if that is
+    not known; the order of evaluation that is taken, and from what that was concluded."""
 
     family: str
     order: str

@@ -102,13 +102,14 @@ def value_text(holder: Element | None, kind: str = "", family: str = "") -> str:
 
 def quoted(text: str, quote: str, family: str) -> str:
     """What a STRING or WSTRING begins with, between its quotes.  Beremiz puts quotes around whatever has none of its own kind:
-    in `"abc"` of a STRING, the double quotes are characters of the text on its PLC.  Other tools may name a constant, and
-    double quotes of a STRING can only be meant as its quotes, since a STRING takes no literal of a WSTRING.
+    in `"abc"` of a STRING, the double quotes are characters of the text on its PLC.  Double quotes of a STRING can only be meant
+    as its quotes elsewhere, since a STRING takes no literal of a WSTRING.  Other tools may name a constant, and fbvm itself
+    writes expressions.
 
-    >>> print(quoted('"abc"', "'", "beremiz"), quoted('"abc"', "'", "codesys"))
-    '"abc"' 'abc'
+    >>> print(quoted('"abc"', "'", "beremiz"), quoted('"abc"', "'", "codesys"), quoted("unit.name", "'", "fbvm"))
+    '"abc"' 'abc' unit.name
     """
-    if quote in (text[0], text[-1]) or (family != "beremiz" and _CONSTANT.fullmatch(text)):
+    if quote in (text[0], text[-1]) or family == "fbvm" or (family != "beremiz" and _CONSTANT.fullmatch(text)):
         return text
     if family != "beremiz" and len(text) > 1 and text[0] == text[-1] and text[0] in "'\"":
         text = text[1:-1]
