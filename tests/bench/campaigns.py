@@ -52,7 +52,7 @@ def conducted(bench: Bench, executor: Executor, jobs: int) -> tuple[float, float
     """Runs a second once all is started, seconds to start it, and what came of it.
 
     The first two runs are done by this process, before others are started: the rate is that from the first result that the
-    executor gives to the last one."""
+    executor gives to the last one.  Where all come at once, it is that with the start."""
     outcome, taken = Outcome(bench.plan), list[tuple[float, int]]()
 
     def take(results: Sequence[Result]) -> None:
@@ -60,8 +60,9 @@ def conducted(bench: Bench, executor: Executor, jobs: int) -> tuple[float, float
         taken.append((time.monotonic(), len(outcome.results)))
 
     conduct(bench, outcome, jobs, take, executor, shrinks=False)
-    (begun, _), (started, before), (ended, count) = taken[1], taken[2], taken[-1]
-    return (count - before) / max(ended - started, 1e-9), started - begun, outcome
+    (begun, known), (started, before), (ended, count) = taken[1], taken[2], taken[-1]
+    rate = (count - before) / (ended - started) if count > before else (count - known) / (ended - begun)
+    return rate, started - begun, outcome
 
 
 def row(what: str, ours: str, besides: str = "") -> None:
