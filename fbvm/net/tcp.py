@@ -1,6 +1,6 @@
 """The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
 
-One selector serves all links; sockets are handled in `events` and `submit` of a link, here, in `net.connections` and in `net.udp` only.
+One selector serves all links; sockets are handled in `events` and `submit` of a link: here, in `net.connections`, `net.udp`.
 """
 
 from __future__ import annotations
