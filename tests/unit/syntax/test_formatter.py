@@ -336,9 +336,10 @@ END_PROGRAM
 
 def test_operands_of_instruction_lists_are_spelt_as_everywhere() -> None:
     declared = "TYPE Colour : (Red, Green); END_TYPE\nPROGRAM Main\nVAR c : Colour; w : WORD; d : DATE; b : BOOL; END_VAR\n"
-    operands = ("ld c\neq colour#GREEN\nst b\nld w.2\nst b\nld d\neq d#2020-1-2\nst b\nEND_PROGRAM\n")
+    operands = "ld c\neq colour#GREEN\nst b\nld w.2\nst b\nld d\neq d#2020-1-2\nst b\nEND_PROGRAM\n"
     written, _ = formatted(Source("x.st", declared + operands))
-    assert [line.split()[1] for line in written.splitlines()[-9:-1]] == ["c", "Colour#Green", "b", "w.2", "b", "d", "D#2020-1-2", "b"]
+    assert [line.split()[1] for line in written.splitlines()[-9:-1]] == [
+        "c", "Colour#Green", "b", "w.2", "b", "d", "D#2020-1-2", "b"]
 
 
 def test_an_instruction_list_stands_in_columns() -> None:
