@@ -15,6 +15,13 @@ from fbvm.lsp.features import server
 from fbvm.lsp.server import Server
 
 WAIT_S = 30
+PUMP = """\
+FUNCTION_BLOCK Pump // moves water
+VAR_INPUT Level : INT; END_VAR
+VAR_OUTPUT Runs : BOOL; END_VAR
+    Runs := Level < 200;
+END_FUNCTION_BLOCK
+"""
 
 
 class Desk:

@@ -6,19 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from in_process import Desk, span, talk
+from in_process import PUMP, Desk, span, talk
 
 HOUSE = Path(__file__).resolve().parents[3]
 
 pytestmark = pytest.mark.slow  # pygls and the protocol take their time to be imported
 
-PUMP = """\
-FUNCTION_BLOCK Pump // moves water
-VAR_INPUT Level : INT; END_VAR
-VAR_OUTPUT Runs : BOOL; END_VAR
-    Runs := Level < 200;
-END_FUNCTION_BLOCK
-"""
 MAIN = """\
 PROGRAM Main
 VAR P1 : Pump; On AT %QX0.0 : BOOL; s : WSTRING; m : Mode; t : TON; END_VAR

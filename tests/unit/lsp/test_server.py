@@ -11,19 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from in_process import PUMP
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.client import LanguageClient
 
 pytestmark = pytest.mark.slow
 
-PUMP = """\
-FUNCTION_BLOCK Pump // moves water
-VAR_INPUT Level : INT; END_VAR
-VAR_OUTPUT Runs : BOOL; END_VAR
-    Runs := Level < 200;
-END_FUNCTION_BLOCK
-"""
 MAIN = """\
 PROGRAM Main
 VAR P1 : Pump; On AT %QX0.0 : BOOL; s : WSTRING; END_VAR
