@@ -193,7 +193,8 @@ WHOLE = {"REFUSED_BLOCK", "REFUSED_SECTION", "TRY", "INSTRUCTION_LIST"}
 def renamed(text: str, chance: random.Random) -> str:
     """Names in another case, where something is known about them."""
     for start, name in Spelling(parsed(text)[0]).at.items():
-        text = text[:start] + chance.choice(CASES)(name) + text[start + len(name):]
+        if text[start:start + len(name)].upper() == name.upper():  # a generic type stands for the one that limits it
+            text = text[:start] + chance.choice(CASES)(name) + text[start + len(name):]
     return text
 
 
