@@ -167,8 +167,10 @@ def read_day(out: int, at: int, n: int) -> int:
     if n == 0 or n > 2 or count_digits(at, n) != n:
         return MALFORMED
     day = number_at(at, n)
-    if year < 1 or month < 1 or month > 12 or day < 1 or day > days_of_month(year, month):
+    if month < 1 or month > 12 or day < 1 or day > days_of_month(year, month):
         return MALFORMED
+    if year < 1:
+        return OUTSIDE
     if month < 3:
         year -= 1
         month += 12
