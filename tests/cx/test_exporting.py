@@ -8,6 +8,7 @@ import re
 import pytest
 from click.testing import CliRunner
 from cx_text import SAMPLE, Cxt
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
@@ -109,6 +110,13 @@ def test_symbols_get_comments_addresses_and_rows() -> None:
         "+   VariableCount:=5;"]  # fmt: skip
     assert sorted(made.changed) == ["global symbol Extra", "global symbol Pump", "global symbol Start"]
     assert "VariableCount:=5;" in (made.data or b"").decode("cp1252")
+
+
+@each_of(("version", "row"), [("1.5", "Extra,,INT,A,more"), ("1.8", "Extra,,INT,,A,more"), ("2.2", "Extra,,INT,,A,,more")])
+def test_a_new_symbol_has_as_many_fields_as_the_format_of_its_file(version: str, row: str) -> None:
+    cxt = Cxt(sections=(("One", ("LD 0.00\nOUT 1.00",)),), version=version, symbols=("Pump,100.00,BOOL,,",))
+    made = exported(cxt, ("VAR_GLOBAL\n", "VAR_GLOBAL\n    Extra : INT; // more\n"))
+    assert f"+    {row};" in difference(cxt, made)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 from cx_text import DOUBLE, SAMPLE, Cxt
+from rows import each_of
 
 from fbvm import Plc
 from fbvm.base.diagnostics import Diagnostic, Source
@@ -14,6 +15,7 @@ from fbvm.code.compiler import compile_sources
 from fbvm.interchange.cx.compression import compress
 from fbvm.interchange.cx.markup import CxText, read_markup
 from fbvm.interchange.cx.read.importing import import_project
+from fbvm.interchange.cx.read.memory import initial_values
 from fbvm.interchange.cx.write.exporting import export_into
 from fbvm.interchange.imported import Imported
 
@@ -331,6 +333,12 @@ def test_what_is_no_ladder_protected_or_in_no_task_is_told() -> None:
         assert any(d.code == code and words in d.message for d in made.diagnostics), words
 
 
+@each_of(("task", "why"), [(0, "it belongs to interrupt task 0,"), (-1, "it is given to no task"), (255, "interrupt task 255")])
+def test_a_program_that_no_cyclic_task_runs_is_named(task: int, why: str) -> None:
+    made = imported(Cxt(sections=(("Main", ("LD 0.00\nOUT 1.00",)),), task=task))
+    assert [d.code for d in made.diagnostics if why in d.message] == ["X0190"]
+
+
 def test_a_plc_setup_is_named_as_not_read_and_stays_in_the_file() -> None:
     setup = "  Settings:=\n  BEGIN\n   Data:=\n$?St$Bk?_#[900]\n5A 5A\n$?St$Bk?_#[900]\n  END;"
     data = replace(SAMPLE, plc_keys=setup).bytes()
@@ -348,6 +356,20 @@ def test_one_of_several_plcs_is_chosen_by_name() -> None:
     assert "NewPLC1, Other" in made.diagnostics[0].message
     assert "Other" in import_project(data, "two.cxt", plc="other").files["configuration.st"]
     assert "no PLC Third" in import_project(data, "two.cxt", plc="Third").diagnostics[0].message
+
+
+@each_of(("line", "declared"), [
+    ("D=0:0,1:7789,2:24aa", "D_1_initial AT D1 : ARRAY [0..1] OF WORD := [16#7789, 16#24AA];"),
+    ("W=8-10:5", "W_8_initial AT W8 : ARRAY [0..2] OF WORD := [16#0005, 16#0005, 16#0005];"),
+    ("Ea_=4:1", "EA_4_initial AT EA_4 : ARRAY [0..0] OF WORD := [16#0001];"),
+    ("D=65535:1,65536:1", "D_65535_initial AT D65535 : ARRAY [0..0] OF WORD := [16#0001];"), ("CIO=0:7", ""), ("D=9:0", "")])
+def test_words_of_the_memory_window_that_follow_one_another_are_an_array(line: str, declared: str) -> None:
+    made = initial_values(line.encode().hex())
+    assert made == (["// Contents of the memory window", "VAR_GLOBAL", declared, "END_VAR"] if declared else [])
+
+
+def test_what_is_no_dump_of_the_memory_window_gives_no_values() -> None:
+    assert initial_values("44 3D zz") == []
 
 
 @pytest.mark.slow

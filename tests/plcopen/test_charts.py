@@ -92,6 +92,14 @@ def test_ways_side_by_side_begin_and_end_together() -> None:
     assert states(made, "x y z", ["", "go=1", "done=1", ""]) == ["0 0 0", "1 1 0", "0 0 1", "0 0 1"]
 
 
+def test_a_jump_to_a_divergence_enters_the_steps_behind_it() -> None:
+    both = node("simultaneousDivergence", 3, "2").replace("localId", 'name="Both" localId', 1)
+    made = chart(step(1, "s", first=True), transition(2, "1", inline("go")), both, step(4, "a", "3"), step(5, "b", "3"),
+                 node("simultaneousConvergence", 8, "4 5"), transition(9, "8", inline("go")), jump(10, "9", "both"),
+                 declared="go")  # fmt: skip
+    assert "TRANSITION FROM (a, b) TO (a, b) := go;" in " ".join(made.files["Main.st"].split())
+
+
 def test_branches_of_a_selection_join_again() -> None:
     made = chart(step(1, "s", first=True), node("selectionDivergence", 2, "1"), transition(3, "2", inline("a")),
                  transition(4, "2", inline("b")), node("selectionConvergence", 5, "3 4"), step(6, "e", "5"),

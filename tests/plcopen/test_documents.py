@@ -117,6 +117,16 @@ def test_tc6_of_its_first_version_names_types_and_intervals_otherwise() -> None:
     assert "PROGRAM one WITH Fast : Main;" in made.files["C.st"]
 
 
+def test_an_interval_that_is_no_duration_is_named_with_its_task() -> None:
+    task = '<task name="Fast" interval="soon" priority="0"><pouInstance name="one" typeName="Main"/></task>'
+    more = ('<instances><configurations><configuration name="C"><resource name="R">' + task +
+            "</resource></configuration></configurations></instances>")
+    made = import_xml(project("", ";", more=more))
+    says = "the interval of task Fast is 'soon', which is no duration"
+    assert [d.code for d in made.diagnostics if says in d.message] == ["X0203"]
+    assert "INTERVAL" not in "".join(made.files.values())
+
+
 def test_globals_of_other_files_of_a_beremiz_project_are_declared_and_told() -> None:
     declared = f"<externalVars>{variable('Level', '<INT/>')}</externalVars>" \
         f"""<localVars>{variable('py', '<derived name="python_eval"/>')}</localVars>"""

@@ -84,6 +84,12 @@ def test_a_huge_file_is_not_even_read(tmp_path: Path) -> None:
     assert found.code == "X0103"
 
 
+def test_a_text_with_too_many_bytes_ends_at_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fbvm.interchange.markup.MAX_BYTES", 2 << 20)
+    found = only(b" " * (2 << 20) + b"<a/>")
+    assert (found.code, found.message) == ("X0103", "bad.xml has more than 2 MiB")
+
+
 def test_a_folder_and_a_missing_file_are_messages(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "none.xml"):
         assert [d.code for d in import_xml(path).diagnostics] == ["X0101"]

@@ -99,6 +99,12 @@ def test_a_contact_in_front_of_two_coils_is_read_once_or_for_each(order: str, se
     assert found == seen
 
 
+def test_a_contact_behind_the_rail_is_read_for_each_of_its_coils() -> None:
+    """Only what has to be worked out goes to a variable of its own."""
+    drawn = RAIL + contact(2, "1", "a") + contact(3, "1", "b") + coil(4, "2 3", "x") + coil(5, "2", "y")
+    assert statements(import_xml(document(pou(drawn, "a b x y")))) == ["x := a OR b;", "y := a;"]
+
+
 def flashing(sink: str) -> bytes:
     """TON -> NOT -> TON, with an output variable behind one of them, or none."""
     parts = [value(1, "T#20ms"), block(2, "TON", "IN=3 PT=1", "Q,ET", "t"), block(3, "NOT", "IN=2.Q", "OUT")]

@@ -25,6 +25,19 @@ from fbvm.interchange.plcopen.read.importing import import_xml
 BRANCH = RAIL + contact(2, "1", "a") + contact(3, "1", "b")
 
 
+TWICE = ('<pou name="Twice" pouType="function"><interface><returnType><INT/></returnType><inputVars><variable name="v">'
+         '<type><INT/></type></variable></inputVars></interface><body><ST><xhtml:p>Twice := 2 * v;</xhtml:p></ST></body></pou>')
+
+
+@each_of(("pins", "n"), [("EN=2 v=4", ["0", "6", "6"]), ("v=4", ["6", "6", "6"])])
+def test_a_function_of_the_project_is_called_where_its_en_is_true(pins: str, n: list[str]) -> None:
+    """Two variables take its result, so it is a statement of its own."""
+    drawn = (RAIL + contact(2, "1", "a") + value(4, "3") + block(3, "Twice", pins, "ENO,OUT") + result(5, "3.OUT", "n")
+             + result(6, "3.OUT", "m"))
+    declared = variable("a") + variable("n", "INT") + variable("m", "INT")
+    assert states(imported(TWICE, pou(drawn, declared)), "n", ["", "a=1", "a=0"]) == n
+
+
 def test_two_wires_at_a_coil_are_ored() -> None:
     made = imported(pou(BRANCH + coil(4, "2 3", "x"), "a b x"))
     assert states(made, "x", ["", "a=1", "a=0 b=1"]) == ["0", "1", "1"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -231,6 +232,41 @@ def test_rungs_and_statements_between_them_mean_the_same_for_all_inputs() -> Non
                 plc.write(f"Main.{name}", bool(bits >> at & 1))
             plc.scan()
         assert same(plcs[0].read("Main"), plcs[1].read("Main")), scan
+
+
+PARTS = """
+PROGRAM Main
+VAR a, b, d : BOOL; n : INT; t : TON; END_VAR
+LADDER
+RUNG 1
+    LD      a
+    OR      b
+    NOT
+    AND>    n #5
+    FBCALL  TON t IN:=b PT:=T#20ms
+    OUT     d
+END_LADDER
+END_PROGRAM
+"""
+
+
+def test_each_kind_of_element_comes_back_as_it_was() -> None:
+    """A contact beside another one, NOT, a comparison, a call."""
+    lines = [line.split() for line in PARTS.splitlines()]
+    again = [line.split() for line in there_and_back(PARTS).files["Main.st"].splitlines()]
+    assert again[again.index(["RUNG", "1"]):] == lines[lines.index(["RUNG", "1"]):]
+
+
+def test_a_wire_has_corners_where_its_ends_stand_in_two_rows() -> None:
+    """Else it is one line from the right to the left."""
+    seen = set()
+    for connection in document(export_xml([Source("Main.st", PARTS)])).walk():
+        if connection.name == "connection":
+            points = [(int(point.get("x")), int(point.get("y"))) for point in connection.children]
+            (right, top), (left, bottom) = points[0], points[-1]
+            assert right > left and all(one[0] == other[0] or one[1] == other[1] for one, other in pairwise(points))
+            seen.add((len(points), top == bottom))
+    assert seen == {(2, True), (4, False)}
 
 
 @pytest.mark.slow

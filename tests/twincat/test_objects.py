@@ -79,6 +79,7 @@ def test_bodies_in_other_languages_are_named_with_their_place(body: str, said: s
     made = read_object(text.encode(), "MAIN.TcPOU")
     [found] = made.diagnostics
     assert (found.code, found.message) == ("X0203", f"the body of MAIN is {said}, which is not read from this file")
+    assert found.source.text[found.start:found.end].removeprefix("<").isalnum()
     assert found.source.place(found.start)[0] == 12
     assert made.source is not None and made.source.text.split()[-1] == "END_PROGRAM"
 
