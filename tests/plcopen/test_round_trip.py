@@ -295,6 +295,22 @@ def test_an_address_that_is_no_iec_location_is_kept_for_ourselves_and_named() ->
     assert [element.get("address") for element in document(made).walk() if element.name == "variable"] == ["", "%MW4"]
 
 
+def test_a_condition_in_an_instruction_list_stands_in_its_transition() -> None:
+    text = """PROGRAM Main
+VAR a, b : BOOL; END_VAR
+INITIAL_STEP s: END_STEP
+TRANSITION FROM s TO s:
+    LD a
+    AND b
+END_TRANSITION
+END_PROGRAM
+"""
+    made = export_xml([Source("Main.st", text)])
+    [inline] = [element for element in document(made).walk() if element.name == "inline"]
+    assert inline.text.split() == ["LD", "a", "AND", "b"]
+    assert "FROM s TO s: LD a AND b END_TRANSITION" in " ".join(there_and_back(text).files["Main.st"].split())
+
+
 @pytest.mark.slow
 def test_charts_of_the_corpus_there_and_back() -> None:
     count = round_trips("sfc")
