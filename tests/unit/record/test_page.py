@@ -7,6 +7,7 @@ import json
 import re
 import struct
 from math import inf, nan
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -22,13 +23,16 @@ from fbvm.record.page.inside import POWER, text_of
 from fbvm.record.page.page import page
 from fbvm.record.recording.recording import Recording
 from fbvm.record.recording.scans import RecordedScans
+from fbvm.record.trace.events import NetworkEvent
 from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Signal
+from fbvm.record.trace.scan_source import Follower
 from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.link import Peer
+from fbvm.wire.tap import TapEvent, TapKind
 
 
 def text(trace: Trace, name: str, scan: int) -> str:
@@ -231,6 +235,37 @@ def test_a_scan_with_very_many_statements_is_shown_in_part(monkeypatch: pytest.M
     values = read.values("Main.sum")
     assert values[2] == 5056
     assert values[4] == 5062
+
+
+def test_a_long_scan_in_front_of_a_window_is_left_at_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its rows are not shown, so the window begins with its own first scan."""
+    monkeypatch.setattr(inside, "MOST_IN_SCAN", 60)
+    plc = Plc(image("PROGRAM Main\nVAR i, k, n : INT; END_VAR\nn := n + 1;\n"
+                    "FOR i := 1 TO SEL(n = 3, 2, 100) DO k := i; END_FOR;\nEND_PROGRAM\n"), engine="python")  # fmt: skip
+    recorded, followed = Recording().add("main", plc), []
+
+    class Source(RecordedScans):
+        def follow(self, follower: Follower, scans: range | None = None) -> None:
+            followed.append(scans)
+            super().follow(follower, scans)
+
+    plc.run(scans=5)
+    source = Source(recorded, {})
+    window = inside.Insides(source, []).window(range(3, 5), 1000)
+    assert list(window.rows) == [3, 4]
+    assert followed == [range(2, 5), range(3, 5)]
+
+
+def test_packets_are_told_in_parts_with_their_first_and_last_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "FRAMES_A_PART", 2)
+    ends = module._Ends(None)  # type: ignore[arg-type]
+    unit, peer = Peer("192.168.250.21", 502), Peer("10.0.0.1", 1024)
+    for scan in (3, 4, 7):
+        moment = SimpleNamespace(scans=scan)
+        ends.event(moment, NetworkEvent(1, TapEvent(TapKind.SYN, unit, peer, True)))  # type: ignore[arg-type]
+    ends.end()
+    assert ends.frames == [[3, 4, 2], [7, 7, 1]]
+    assert len(ends.parts) == 2 and ends.own == "192.168.250.21:502"
 
 
 def test_the_ends_of_a_column_are_of_numbers_that_are_some() -> None:

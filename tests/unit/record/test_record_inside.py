@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
@@ -13,6 +14,7 @@ from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.events import Call, Event, ObservedEngine, Read, Return, Statement, Write
 from fbvm.record.trace.observing import observing
 from fbvm.record.trace.recorder import Signal, signals_of
+from fbvm.record.trace.writes import double_writes
 from fbvm.watch.names import Names
 
 TEXT = """\
@@ -250,3 +252,16 @@ def test_bits_of_a_word_are_told_apart(plc: Plc, names: Names) -> None:
     with observing(plc, made):
         plc.scan()
     assert [isinstance(signal, Signal) and signal in made.writers for signal in made.signals] == [True, False, True]
+
+
+# --- double writes ----------------------------------------------------------------------------------------------------
+
+
+@each_of(("body", "writers"), [
+    ("lamp := a;\nlamp := TRUE;", ["twice.st:4:1 in Main", "twice.st:5:1 in Main"]), ("lamp := a;\nother := TRUE;", []),
+    ("Set(a, lamp);\nSet(TRUE, lamp);", [f"twice.st:1:71 in Set, called by twice.st:{line}:1 in Main" for line in (4, 5)])])
+def test_two_statements_that_write_the_same_bit_in_a_scan(body: str, writers: list[str]) -> None:
+    made = compile_text("FUNCTION Set VAR_INPUT v : BOOL; END_VAR VAR_IN_OUT q : BOOL; END_VAR q := v; END_FUNCTION\n"
+                        f"PROGRAM Main\nVAR a, lamp, other : BOOL; END_VAR\n{body}\nEND_PROGRAM\n", "twice.st").image
+    assert made is not None
+    assert double_writes(Plc(made), "Main.lamp") == writers

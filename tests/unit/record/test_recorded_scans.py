@@ -112,6 +112,18 @@ END_PROGRAM
 """
 
 
+def test_the_scans_in_which_a_variable_may_have_changed_end_where_it_did() -> None:
+    made = compile_text(LONG_AGO).image
+    assert made is not None
+    plc = Plc(made)
+    source = RecordedScans(Recording().add("plc", plc), {})
+    plc.run(scans=60)
+    early, late = (source.find(f"Main.{name}") for name in ("early", "late"))
+    assert isinstance(early, Place) and isinstance(late, Place)
+    assert source.may_change([early], range(60)) == range(28), "the stretch with scan 4; in the 32 behind it nothing changed"
+    assert source.may_change([early], range(5, 60)) == range(5, 5) == source.may_change([late], range(5, 60))
+
+
 @pytest.mark.slow
 def test_causes_of_long_ago_are_those_that_a_search_of_each_scan_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     """A recording is searched by breakpoints from the latest scan backwards, a trace scan by scan."""

@@ -1,0 +1,50 @@
+"""Keyframes of a recording: packed beside an earlier one, and what does the scans behind them again."""
+
+from __future__ import annotations
+
+import pytest
+
+from fbvm import Plc, compile_text
+from fbvm.code.image import Image
+from fbvm.record.recording.chunks import Chunk
+from fbvm.record.recording.recording import Recording
+
+
+def image_of(size: int) -> Image:
+    image = compile_text(f"PROGRAM Main VAR n : UDINT; big : ARRAY[0..{size}] OF UDINT; END_VAR n := n + 1; END_PROGRAM").image
+    assert image is not None
+    return image
+
+
+@pytest.fixture(scope="module")
+def image() -> Image:
+    return image_of(4000)
+
+
+def keyframe(plc: Plc) -> Chunk:
+    plc.scan()
+    return Chunk(plc.snapshot(), [], plc.budget, True)
+
+
+def test_scans_that_python_did_are_not_done_again_by_machine_code(image: Image) -> None:
+    plc = Plc(image)
+    kept = Recording().add("plc", plc)
+    plc.run(scans=3)
+    assert plc.engine.machine is None
+    assert kept.at(2).engine_choice == plc.engine_choice == "auto"
+
+
+def test_a_keyframe_is_packed_beside_an_earlier_one(image: Image) -> None:
+    plc = Plc(image)
+    first, second = keyframe(plc), keyframe(plc)
+    alone, pages = second.size_bytes(None), second.state.memory.pages
+    second.pack(first)
+    assert second.size_bytes(first) < alone / 10
+    assert second.state.memory.pages == pages
+
+
+def test_a_keyframe_of_another_size_of_memory_stays_as_it_is(image: Image) -> None:
+    one = keyframe(Plc(image))
+    whole = one.state.memory
+    one.pack(keyframe(Plc(image_of(1))))
+    assert one.state.memory is whole
