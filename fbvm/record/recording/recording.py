@@ -207,8 +207,9 @@ class PlcRecording(RecordedPlc):
         """Records what was changed from outside since the last scan; begins a chunk if it is time."""
         plc, pending = self._plc, self._pending
         self._now_ns = now_ns
-        if self._has_changed or self._has_begun or self._cost_ns > AGAIN_NS or plc.scans != self._chunks[-1].times.end:
-            self._begin_chunk()
+        goes_on = not self._has_changed and not self._has_begun and plc.scans == self._chunks[-1].times.end
+        if not goes_on or self._cost_ns > AGAIN_NS:
+            self._begin_chunk(goes_on and not self._is_touched())
             self._has_begun = True
             return
         self._has_begun = True
@@ -225,6 +226,13 @@ class PlcRecording(RecordedPlc):
             if unit.times_set != self._times_set[number]:
                 self._times_set[number] = unit.times_set
                 pending.settings = {**pending.settings, number: unit.settings}
+
+    def _is_touched(self) -> bool:
+        """True if something was changed from outside since the last scan, so that this does not lead to the state of now."""
+        plc = self._plc
+        return (plc.budget != self._budget or plc.forces != self._forces
+                or [unit.times_set for unit in self._units] != self._times_set
+                or not self._is_uncopied and plc.memory.map[:] != self._known)
 
     def received(self, unit: int, events: Sequence[Event]) -> None:
         """Records events of the network for a unit."""
@@ -294,12 +302,11 @@ class PlcRecording(RecordedPlc):
             pending = told
         chunk.add(pending)
 
-    def _begin_chunk(self) -> None:
-        """Keeps the state of PLC and units as a keyframe."""
+    def _begin_chunk(self, follows: bool = False) -> None:
+        """Keeps the state of PLC and units as a keyframe; `follows` if the last scan of the chunk before leads to it."""
         plc, chunks = self._plc, self._chunks
         if self._written:
             self._written.flush()
-        follows = bool(chunks) and not self._has_changed and not self._has_begun and plc.scans == chunks[-1].times.end
         while chunks and chunks[-1].first >= plc.scans:  # the PLC went back, or a chunk begins again
             chunks.pop()
             if self._sizes:

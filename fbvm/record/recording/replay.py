@@ -194,6 +194,7 @@ class Replay:
     def _load(self, chunk: Chunk) -> None:
         """Puts the PLC into the state of a keyframe."""
         plc, self._loaded = self.plc, chunk
+        plc.budget = chunk.budget
         tap = self._links[0].tap if self._links else None
         self._links = [RecordedLink(frame.unit.address, tap) for frame in chunk.units]
         self._refreshes, units = [], list[Unit]()

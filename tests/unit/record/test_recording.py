@@ -220,8 +220,11 @@ def happen(plc: Plc, number: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("again_ns", [module.AGAIN_NS, -1], ids=["one keyframe", "a keyframe before each run"])
 @pytest.mark.parametrize("engine", ENGINES)
-def test_whatever_is_done_between_scans_is_done_again(image: Image, engine: str) -> None:
+def test_whatever_is_done_between_scans_is_done_again(image: Image, engine: str, again_ns: int,
+                                                      monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    monkeypatch.setattr(module, "AGAIN_NS", again_ns)
     plc, twin, seen, again = Plc(image, engine=engine), Plc(image), WatchedRun(), WatchedRun()
     kept = recorded(plc)
 
