@@ -23,7 +23,8 @@ PROOF_WORDS = (PROVED, UNREACHABLE)
 def proved_once(image: Image, question: Question, limits: Limits, tell: Tell = lambda said: None) -> Verdict:
     """The answer to a question; a proof is kept and not made again.  Raises what `prove` raises.
 
-    Another program, property, assumption or time between scans is another proof; where notes name lines, another line is, too."""
+    Another program, property, assumption, lemma or time between scans is another proof; where notes name lines, another line
+    is, too."""
     times_ns = [limits.cycle_ns, max(limits.cycle_ns, limits.longest_ns)]
     name = name_of((_methods(), image.fingerprint, _types(image), json.dumps([times_ns, *_asked(image, question)])))
     if (known := _read(name, image, question)) is not None:
@@ -73,10 +74,10 @@ def _asked(image: Image, question: Question) -> list[Any]:
 
     Raises ConditionError and UnknownPlace."""
     names, is_written = Names(image, question.prefix), question.kind == WRITTEN_ONCE
-    conditions = [*([question.text] if question.text and not is_written else []), *question.assumptions]
+    conditions = [*([question.text] if question.text and not is_written else []), *question.assumptions, *question.lemmas]
     conditions += [question.trigger] if question.kind == WITHIN else []
     places = [place for text in conditions for place in names.condition(text).places]
     places += names.places(question.text) if is_written else ()
-    return [question.kind, question.text, question.assumptions, question.trigger, question.within_ns, question.units,
-            [(place.name, str(place.type), place.offset, place.bit, place.hops) for place in places],
+    return [question.kind, question.text, question.assumptions, question.lemmas, question.trigger, question.within_ns,
+            question.units, [(place.name, str(place.type), place.offset, place.bit, place.hops) for place in places],
             [names.extents(name) for name in question.free]]  # fmt: skip

@@ -57,6 +57,7 @@ LATER = Question(WITHIN, "Main.b >= 0", trigger="Main.a > 3", within_ns=10_000_0
 OTHER = [
     (TEXT, ASKED, Limits(20_000_000)), (TEXT, ASKED, Limits(longest_ns=20_000_000)),
     (TEXT, replace(ASKED, text="Main.b > 11"), Limits()), (TEXT, replace(ASKED, assumptions=("Main.a < 5",)), Limits()),
+    (TEXT, replace(ASKED, lemmas=("Main.b < 20",)), Limits()),
     (TEXT, replace(ASKED, free=("D0",)), Limits()), (TEXT.replace("b := a", "b := a / 2"), ASKED, Limits()),
     (TEXT, LATER, Limits()), (TEXT, replace(LATER, trigger="Main.a > 4"), Limits()),
     (TEXT, replace(LATER, within_ns=1), Limits()),
