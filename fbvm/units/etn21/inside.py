@@ -54,11 +54,6 @@ class Inside:
         twin.mail.resume(*self.mail.state)
         return twin
 
-    def begin(self) -> None:
-        """Runs the program's power-on, before any word has been exchanged."""
-        self.reset()
-        self.own.run(0)
-
     def report(self, service_status: int, error_status: int) -> None:
         """Tells the program what n+17 and n+18 show from the next refresh on."""
         self.service_status[0], self.error_status[0] = service_status, error_status

@@ -120,7 +120,6 @@ class Etn21:
                 self.layout, self.address, real=made["timing"] == "real", seed=made["seed"],
                 time_wait_ns=made["time_wait_ns"], odd_filler=made["odd_filler"], engine=self._engine)  # fmt: skip
             inside.report(self._service_status, self._error_status)
-            inside.begin()
             if self._words:
                 inside.know(lengths(self._words.memory))
         return inside

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from random import Random
 
 import pytest
 from rows import each_of
@@ -221,3 +222,17 @@ def test_random_faults_are_seeded() -> None:
         assert before.from_scan < before.until_scan <= before.from_scan + 50
         assert before.until_scan < after.from_scan <= before.until_scan + 50
     assert {row.silent for row in rows} == {True, False}
+
+
+@pytest.mark.parametrize(("row", "copies"), [(Fault(duplicate_percent=7), 2), (Fault(lose_percent=7), 0)])
+def test_so_many_of_a_hundred_parts_are_lost_or_come_twice(row: Fault, copies: int) -> None:
+    class Dice(Random):
+        drawn = 0
+
+        def randrange(self, start: int, *_: object) -> int:  # type: ignore[override]
+            return self.drawn
+
+    dice, seen = Dice(), []
+    for dice.drawn in range(100):
+        seen.append(row.copies(dice))
+    assert seen == [copies] * 7 + [1] * 93

@@ -136,6 +136,44 @@ def test_the_loop_is_told_when_something_is_due(host: Host) -> None:
     assert (relays.channels_behind, relays.until_due_s()) == (0, None)
 
 
+def test_a_wait_ends_when_something_is_due(host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the news that there is something, though no socket is ready."""
+    host.network.faults.append(fault("slow", latency_ns=50 * MS))
+    host.open()
+    host.settle()
+    host.scan(Send(1, b"ask"))
+    assert host.scan() == [Sent(1, 3)]
+    due_s, asked = host.network.relays.until_due_s(), list[float]()
+    monkeypatch.setattr(host.network, "_wait", asked.append)
+    assert host.network.wait(BOUND_S) is True
+    assert not host.network.wait(0.001)
+    assert asked == [due_s, 0.001]
+
+
+@each_of(("row", "quiet"), [
+    (Fault(silent=True, from_scan=3), False), (Fault(silent=True, until_scan=3), False), (Fault(silent=True, from_ns=3), True)])
+def test_a_fault_that_counts_scans_needs_every_scan(row: Fault, quiet: bool) -> None:
+    """A link that is asked for its events in no scan would not count them."""
+    host = Host()
+    try:
+        host.network.driven = True
+        assert (list(host.link.events(0)), host.link.is_quiet) == ([], True)
+        host.network.faults.append(row)
+        host.network.serve(0)
+        assert host.link.is_quiet is quiet
+    finally:
+        host.close()
+
+
+def test_an_open_may_be_the_first_thing_of_all() -> None:
+    host = Host(fault("refused"))
+    try:
+        host.link.submit([Connect(1, SERVER)], 0)
+        assert host.until(Failed) == [Failed(1, "open", "ECONNREFUSED")]
+    finally:
+        host.close()
+
+
 @pytest.mark.slow
 def test_a_send_that_waits_when_a_fault_comes_is_answered(host: Host) -> None:
     """The host has not taken all of it yet; the unit is told as soon as it has."""

@@ -436,9 +436,10 @@ def test_two_units_are_heard_twice_and_marked() -> None:
 def test_closing_the_network_forgets_everything() -> None:
     network, link = opened()
     link.submit([Send(1, b"?")], 1)
+    assert network.next_due_ns() is not None
     network.close()
-    assert link.events(100) == [Sent(1, 1)]
     assert network.next_due_ns() is None
+    assert link.events(100) == [Sent(1, 1)]
 
 
 def test_nothing_is_told_behind_a_break() -> None:

@@ -1,4 +1,4 @@
-"""The ends of a connection in memory: when each is over."""
+"""The ends of a connection in memory: when each is over, and how much a relay takes of one."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from fbvm.net.faults import Fault
-from fbvm.net.stream import End
-from fbvm.wire.link import Peer
+from fbvm.net.relays import Relay
+from fbvm.net.stream import WINDOW_BYTES, End
+from fbvm.wire.link import Close, Peer, Request, Send, Sent
 from fbvm.wire.tap import TapKind
 
 CLIENT, SERVER = Peer("192.168.250.2", 1024), Peer("192.168.250.1", 502)
@@ -99,3 +100,24 @@ def test_who_sends_to_an_end_that_was_left_is_reset(joined: tuple[Carrier, End, 
     carrier.run()
     assert other.told == ["finished", "sent 4", "ECONNRESET 0"] and one.told == []
     assert client.gone and server.gone
+
+
+def test_a_relay_holds_no_more_than_a_window_that_the_host_has_not_taken() -> None:
+    class Behind:
+        def submit(self, requests: list[Request], now_ns: int) -> None:
+            asked.extend(requests)
+
+    asked: list[Request] = []
+    carrier, owner = Carrier(), Owner()
+    unit = End(carrier, CLIENT, SERVER, None, owner)
+    relay = Relay(carrier, Behind(), 7, unit)  # type: ignore[arg-type]
+    unit.send(bytes(3 * WINDOW_BYTES), 0)
+    carrier.run()
+    assert asked == [Send(7, bytes(WINDOW_BYTES))] and owner.told == []
+    relay.told(Sent(7, WINDOW_BYTES), 0)
+    carrier.run()
+    assert asked == 2 * [Send(7, bytes(WINDOW_BYTES))] and owner.told == [f"sent {3 * WINDOW_BYTES}"]
+    unit.leave(0)
+    carrier.run()
+    relay.told(Sent(7, WINDOW_BYTES), 0)
+    assert asked[2:] == [Send(7, bytes(WINDOW_BYTES)), Close(7)]

@@ -9,8 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
+from rows import each_of
 
 from fbvm.net.addresses import AddressMap, why_unusable
+from fbvm.net.notices import Notice, NoticeKind
 from fbvm.net.switchboard import MAX_ORPHANS, ORPHAN_LIMIT_NS, UDP, Watcher
 from fbvm.net.tcp import TcpLink, TcpNetwork
 from fbvm.wire.link import (
@@ -227,6 +229,18 @@ def test_a_reset_comes_behind_what_has_been_sent(network: TcpNetwork, device: De
         assert until(link, bool) == [PeerClosed(1)]
     link.submit([*(Send(1, b"reply") for _ in range(100)), Close(1, reset=True)], now_ns())
     until_last(link, Closed)
+    until(link, lambda events: is_reset(line))
+    assert b"".join(iter(lambda: line.recv(1000), b"")) == 100 * b"reply"
+
+
+def test_a_reset_comes_behind_what_has_been_sent_also_if_there_is_something_to_read(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    network.driven = True
+    line.sendall(b"another request")
+    assert network.wait(BOUND_S)
+    network.serve(now_ns())
+    link.submit([*(Send(1, b"reply") for _ in range(100)), Close(1, reset=True)], now_ns())
+    network.driven = False
     until(link, lambda events: is_reset(line))
     assert b"".join(iter(lambda: line.recv(1000), b"")) == 100 * b"reply"
 
@@ -533,6 +547,56 @@ def test_wait(network: TcpNetwork, device: Device) -> None:
     link.submit([Close(1, reset=True)], now_ns())
     assert network.wait(BOUND_S)  # an answer that waits to be fetched
     assert link.events(now_ns()) == [Closed(1)]
+
+
+@each_of(("number", "timeout_s", "ready", "asked"), [
+    (5, 0.0025, False, [("selector", 0.002), ([5], 0.0005)]), (5, 0.0025, True, [("selector", 0.002)]),
+    (5, 0.0005, False, [([5], 0.0005)]), (None, 0.0005, False, [("selector", 0.0005)]), (None, 0.0, True, [("selector", 0.0)])])
+def test_what_is_finer_than_a_millisecond_is_waited_for_by_select(number: int | None, timeout_s: float, ready: bool,
+                                                                  asked: list[tuple[object, float]]) -> None:
+    """Of a selector that has a file number; others take all of it."""
+    seen: list[tuple[object, float]] = []
+
+    def selected(selector: object, timeout_s: float) -> list[object]:
+        seen.append(("selector", timeout_s))
+        return [selector] if ready else []
+
+    def select(reading: list[int], _writing: object, _failing: object, timeout_s: float) -> tuple[list[int], ...]:
+        seen.append((reading, timeout_s))
+        return [], [], []
+
+    network = TcpNetwork()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fbvm.net.switchboard.host.select", selected)
+        patch.setattr("fbvm.net.switchboard.select.select", select)
+        network._number = number
+        assert network.wait(timeout_s) is ready
+    network.close()
+    assert seen == [(whom, pytest.approx(timeout_s)) for whom, timeout_s in asked]
+
+
+def test_of_a_connection_that_has_ended_on_both_sides_nothing_is_left(network: TcpNetwork, device: Device) -> None:
+    """Else it would be reset when its time is over."""
+    heard: list[TapKind] = []
+    network.tap = lambda now_ns, unit, event: heard.append(event.kind)
+    link, line = opened(network, device)
+    link.submit([Close(1)], now_ns())
+    line.close()
+    until(link, lambda events: heard.count(TapKind.FIN) == 2)
+    network.serve(now_ns() + 2 * ORPHAN_LIMIT_NS)
+    assert TapKind.RST not in heard
+
+
+def test_a_port_that_cannot_be_used_is_told_with_its_reason(device: Device) -> None:
+    told: list[Notice] = []
+    door = Peer(UNIT, 502)
+    network = TcpNetwork({door: ("127.0.0.1", device.port)})
+    network.notices.tell = told.append
+    link = network.attach(UNIT)
+    link.submit([Listen(1, 502)], now_ns())
+    assert until(link, bool) == [Failed(1, "open", "EADDRINUSE")]
+    assert told == [Notice(NoticeKind.UNUSABLE, door, Peer("127.0.0.1", device.port), "somebody else listens there")]
+    network.close()
 
 
 def test_who_drives_a_network_asks_the_host_once_for_all(network: TcpNetwork, device: Device) -> None:

@@ -12,7 +12,7 @@ from rows import each_of
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.map import LINK_UP, Layout, Switch
 from fbvm.units.etn21.unit import Etn21, Fault
-from fbvm.wire.link import Close, Closed, Connect, Grant, Opened, Received, Sent
+from fbvm.wire.link import Bind, Close, Closed, Connect, Grant, Opened, Received, Sent
 
 
 def writable(unit_number: int) -> set[tuple[str, int]]:
@@ -101,6 +101,16 @@ def test_eight_sockets_are_open_at_once() -> None:
     for number in range(1, 9):
         rig.open(number, number)
     assert [rig.status(number) for number in range(1, 9)] == [0x8000] * 8
+
+
+@pytest.mark.parametrize("area", [1, 2, 8])
+@pytest.mark.parametrize("switch", [Switch.UDP_OPEN, Switch.ACTIVE_OPEN])
+def test_each_switch_alone_is_seen_by_a_unit_that_nobody_has_used(area: int, switch: Switch) -> None:
+    rig = Rig()
+    assert rig.unit.exchanged is None, "it has nothing to do"
+    rig.parameters(area, area, local_port=5000)
+    [request, *_] = rig.scan(switch, area=area)
+    assert type(request) is (Bind if switch is Switch.UDP_OPEN else Connect)
 
 
 def test_two_units_share_one_memory() -> None:

@@ -228,6 +228,15 @@ def test_the_unit_echoes(rig: FinsRig) -> None:
     assert rig.command(0x0801, "01 02 03", unit=0xFE) == ("0000", "01 02 03")
 
 
+@each_of(("code", "end_code"), [
+    *[(code, "0402") for code in (0x0802, 0x0803, 0x2701, 0x2702, 0x2703, 0x2704, 0x2710, 0x2711, 0x2712, 0x2713, 0x2714, 0x2720,
+                                  0x2750, 0x2760, 0x2761, 0x2762, 0x2763, 0x2764)],
+    *[(code, "0401") for code in (0x0101, 0x0804, 0x2700, 0x2705, 0x2751, 0x2766)]])
+def test_commands_that_an_etn21_has_and_that_are_not_served_are_not_supported(rig: FinsRig, code: int, end_code: str) -> None:
+    """Those that it does not have are undefined.  W343 section 10."""
+    assert rig.command(code, "", unit=0x10)[0] == end_code
+
+
 @pytest.mark.slow
 def test_a_reset_of_the_unit_takes_its_connections_with_it(rig: FinsRig) -> None:
     client = TcpClient(rig)

@@ -19,8 +19,8 @@ from fbvm.wire.fins.frames import (
 from fbvm.wire.link import Peer
 
 MAX_BROADCAST_BYTES = 1473
-OF_THE_UNIT = {0x0403, 0x0501, 0x0601, 0x0801, 0x0802, 0x0803, 0x2102, 0x2103, *range(0x2701, 0x2766)}
-"""Commands that an ETN21 has; those of them that are in `COMMANDS` and not served here are not supported."""
+NOT_SUPPORTED = COMMANDS.keys() & {0x0802, 0x0803, *range(0x2701, 0x2766)}
+"""Commands that an ETN21 has, but for those that are served; W343 section 10."""
 FATAL_ERRORS, OTHER_ERRORS = 401, 402
 """Words of the auxiliary area."""
 ECHO, RESET = 0x0801, 0x0403
@@ -53,8 +53,7 @@ def execute(settings: FinsSettings, state: FinsState, error_status: int, command
         return EndCode.NORMAL if settings.access.may_control else EndCode.PROTECTED, b""
     if command.code in unit_commands.ROWS:
         return unit_commands.execute(command.code, unit_commands.Asked(settings, state, error_status, command.parameters))
-    known = command.code in OF_THE_UNIT and command.code in COMMANDS
-    return EndCode.NOT_SUPPORTED if known else EndCode.UNDEFINED, b""
+    return EndCode.NOT_SUPPORTED if command.code in NOT_SUPPORTED else EndCode.UNDEFINED, b""
 
 
 def error_flags(cpu: CpuUnit) -> int:
