@@ -6,20 +6,26 @@ from fbvm.base.graphs import cycles
 from fbvm.code.image import Image
 from fbvm.code.operations import Node
 from fbvm.code.shapes import statements
+from fbvm.engine.ranges import Range, value_range
 
 
 def fixed_bases(image: Image) -> dict[int, int]:
     """Where the instance begins, in bytes of the memory, of each body that runs for one instance only, by the body's number."""
+    return {number: low for number, (low, high) in base_ranges(image).items() if low == high}
+
+
+def base_ranges(image: Image) -> dict[int, Range]:
+    """The lowest and the highest byte at which instances of a body begin, by its number; none where that is unknown."""
     callers: dict[int, list[tuple[int, Node]]] = {number: [] for number in range(len(image.bodies))}
     for number, body in enumerate(image.bodies):
         for node in statements(body.code):
             if node[0] == "call":
                 callers[node[1]].append((number, node))
-    starts: dict[int, set[int | None]] = {number: set() for number in callers}
+    starts: dict[int, list[Range | None]] = {number: [] for number in callers}
     for task in image.tasks:
         for run in task.programs:
-            starts[run.body].add(run.offset)
-    known: dict[int, int | None] = dict.fromkeys(recursive_bodies(image))
+            starts[run.body].append((run.offset, run.offset))
+    known: dict[int, Range | None] = dict.fromkeys(recursive_bodies(image))
     waiting = list(callers)
     while waiting:  # a body is looked at again once all that call it are known
         number = waiting.pop()
@@ -27,9 +33,8 @@ def fixed_bases(image: Image) -> dict[int, int]:
         if unknown:
             waiting += [number, *unknown]
         elif number not in known:
-            bases = starts[number] | {_base(known[caller], call) for caller, call in callers[number]}
-            known[number] = bases.pop() if len(bases) == 1 else None
-    return {number: base for number, base in known.items() if base is not None}
+            known[number] = _union(starts[number] + [_bases(known[caller], call) for caller, call in callers[number]])
+    return {number: bases for number, bases in known.items() if bases is not None}
 
 
 def recursive_bodies(image: Image) -> set[int]:
@@ -38,9 +43,18 @@ def recursive_bodies(image: Image) -> set[int]:
     return {number for group in cycles(range(len(called)), called.__getitem__) for number in group}
 
 
-def _base(caller: int | None, call: Node) -> int | None:
-    """Where the instance of one call begins, if that is a constant; `caller` is where the caller's own begins, if known."""
+def _union(ranges: list[Range | None]) -> Range | None:
+    known = [found for found in ranges if found]
+    return (min(known)[0], max(high for _, high in known)) if known and len(known) == len(ranges) else None
+
+
+def _bases(caller: Range | None, call: Node) -> Range | None:
+    """Where instances of one call begin, if that is known; `caller` is where those of the caller do."""
     base, offset, terms = call[2] or ("abs", 0, ())
-    if terms or isinstance(base, tuple) or (base == "self" and caller is None):
+    if isinstance(base, tuple) or (base == "self" and caller is None):
         return None
-    return int(offset) + (caller or 0 if base == "self" else 0)
+    low, high = caller if base == "self" and caller else (0, 0)
+    for stride, term in terms:
+        ends = [stride * end for end in value_range(term)]
+        low, high = low + min(ends), high + max(ends)
+    return low + offset, high + offset

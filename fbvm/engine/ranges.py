@@ -12,6 +12,7 @@ from fbvm.code.operations import EXPRESSIONS, INTEGERS, Node
 from fbvm.code.shapes import is_address, is_expression
 
 Range = tuple[int, int]
+RangeOf = Callable[[Node], Range]
 
 
 def is_float(machine: str) -> bool:
@@ -56,24 +57,26 @@ def _traps_itself(node: Node) -> bool:
     return bool(EXPRESSIONS[name].traps)
 
 
-def unwrapped_range(node: Node) -> Range:
-    """The least and greatest number that an integer operation can yield before the number is wrapped into its type."""
+def unwrapped_range(node: Node, of: RangeOf | None = None) -> Range:
+    """The least and greatest number that an integer operation can yield before the number is wrapped into its type.
+
+    `of` says what its operands can be: `value_range`, unless more is known."""
     row = _UNWRAPPED.get(node[0])
-    return row(node) if row and node[1] in INTEGERS else limits(node[1])
+    return row(node, of or value_range) if row and node[1] in INTEGERS else limits(node[1])
 
 
-def never_wraps(node: Node) -> bool:
+def never_wraps(node: Node, of: RangeOf | None = None) -> bool:
     """True if the number that an integer operation yields always fits its type."""
-    return _within(unwrapped_range(node), limits(node[1]))
+    return _within(unwrapped_range(node, of), limits(node[1]))
 
 
-def value_range(node: Node) -> Range:
+def value_range(node: Node, of: RangeOf | None = None) -> Range:
     """The least and greatest value of an integer expression.
 
     >>> value_range(("add", "i32", ("convert", "i32", "u8", ("load", "u8", ("abs", 0, ()))), ("const", "i32", 1)))
     (1, 256)
     """
-    whole, range_ = limits(node[1]), unwrapped_range(node)
+    whole, range_ = limits(node[1]), unwrapped_range(node, of)
     return range_ if _within(range_, whole) else whole
 
 
@@ -81,85 +84,92 @@ def _within(inner: Range, outer: Range) -> bool:
     return outer[0] <= inner[0] and inner[1] <= outer[1]
 
 
-def _sum(node: Node) -> Range:
-    (low, high), (least, greatest) = value_range(node[2]), value_range(node[3])
+def _sum(node: Node, of: RangeOf) -> Range:
+    (low, high), (least, greatest) = of(node[2]), of(node[3])
     return low + least, high + greatest
 
 
-def _difference(node: Node) -> Range:
-    (low, high), (least, greatest) = value_range(node[2]), value_range(node[3])
+def _difference(node: Node, of: RangeOf) -> Range:
+    (low, high), (least, greatest) = of(node[2]), of(node[3])
     return low - greatest, high - least
 
 
-def _product(node: Node) -> Range:
-    left, right = value_range(node[2]), value_range(node[3])
+def _product(node: Node, of: RangeOf) -> Range:
+    left, right = of(node[2]), of(node[3])
     corners = [a * b for a in left for b in right]
     return min(corners), max(corners)
 
 
-def _quotient(node: Node) -> Range:
+def _quotient(node: Node, of: RangeOf) -> Range:
     divisor = constant_integer(node[3])
     if divisor is not None and divisor > 0:
-        low, high = value_range(node[2])
+        low, high = of(node[2])
         return quotient(low, divisor), quotient(high, divisor)
     low, high = limits(node[1])
     return low, high + (low < 0)
 
 
-def _remainder(node: Node) -> Range:
-    low, high = value_range(node[2])
+def _remainder(node: Node, of: RangeOf) -> Range:
+    low, high = of(node[2])
     if divisor := constant_integer(node[3]):
         most = abs(divisor) - 1
         return (max(low, -most) if low < 0 else 0), (min(high, most) if high > 0 else 0)
     return min(low, 0), max(high, 0)
 
 
-def _negative(node: Node) -> Range:
-    low, high = value_range(node[2])
+def _negative(node: Node, of: RangeOf) -> Range:
+    low, high = of(node[2])
     return -high, -low
 
 
-def _union(*nodes: Node) -> Range:
-    ranges = [value_range(node) for node in nodes]
+def _magnitude(node: Node, of: RangeOf) -> Range:
+    return 0, max(map(abs, of(node[2])))
+
+
+def _union(of: RangeOf, *nodes: Node) -> Range:
+    ranges = [of(node) for node in nodes]
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
-def _bitwise(node: Node) -> Range:
-    high = max(value_range(node[2])[1], value_range(node[3])[1])
+def _masked(node: Node, of: RangeOf) -> Range:
+    return 0, min(of(node[2])[1], of(node[3])[1])
+
+
+def _bitwise(node: Node, of: RangeOf) -> Range:
+    high = max(of(node[2])[1], of(node[3])[1])
     return 0, (1 << high.bit_length()) - 1
 
 
-def _shifted(node: Node) -> Range:
-    low, high = value_range(node[2])
+def _shifted(node: Node, of: RangeOf) -> Range:
+    low, high = of(node[2])
     count = constant_integer(node[3])
     return (0, high >> min(count, 64)) if low >= 0 and count is not None and count >= 0 else limits(node[1])
 
 
-def _converted(node: Node) -> Range:
-    return limits(node[1]) if is_float(node[2]) else value_range(node[3])
+def _converted(node: Node, of: RangeOf) -> Range:
+    return limits(node[1]) if is_float(node[2]) else of(node[3])
 
 
-def _checked(node: Node) -> Range:
-    low, high = value_range(node[2])
+def _checked(node: Node, of: RangeOf) -> Range:
+    low, high = of(node[2])
     return max(low, node[3]), min(high, node[4])
 
 
-def _floored(node: Node) -> Range:
-    (low, high), divisor = value_range(node[2]), constant_integer(node[3])
+def _floored(node: Node, of: RangeOf) -> Range:
+    (low, high), divisor = of(node[2]), constant_integer(node[3])
     return (low // divisor, high // divisor) if divisor else limits(node[1])
 
 
 _LENGTH = (0, (1 << 31) - 1)
 
-_UNWRAPPED: dict[str, Callable[[Node], Range]] = {
-    "const": lambda node: (node[2], node[2]),
+_UNWRAPPED: dict[str, Callable[[Node, RangeOf], Range]] = {
+    "const": lambda node, of: (node[2], node[2]),
     "add": _sum, "sub": _difference, "mul": _product, "div": _quotient, "mod": _remainder, "neg": _negative,
-    "abs": lambda node: (0, max(map(abs, value_range(node[2])))),
-    "and": lambda node: (0, min(value_range(node[2])[1], value_range(node[3])[1])),
-    "or": _bitwise, "xor": _bitwise, "shr": _shifted, "convert": _converted, "check": _checked,
-    "select": lambda node: _union(node[3], node[4]), "mux": lambda node: _union(*node[3]),
-    "min": lambda node: _union(node[2], node[3]), "max": lambda node: _union(node[2], node[3]),
-    "length": lambda node: _LENGTH, "find": lambda node: _LENGTH, "floor_div": _floored,
+    "abs": _magnitude, "and": _masked, "or": _bitwise, "xor": _bitwise, "shr": _shifted, "convert": _converted,
+    "check": _checked, "floor_div": _floored,
+    "select": lambda node, of: _union(of, node[3], node[4]), "mux": lambda node, of: _union(of, *node[3]),
+    "min": lambda node, of: _union(of, node[2], node[3]), "max": lambda node, of: _union(of, node[2], node[3]),
+    "length": lambda node, of: _LENGTH, "find": lambda node, of: _LENGTH,
 }
 
 

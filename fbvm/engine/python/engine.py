@@ -22,14 +22,17 @@ from fbvm.base.memory import Memory
 from fbvm.code.image import Image, ProgramRun
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.apart import run_apart
-from fbvm.engine.bases import fixed_bases, recursive_bodies
+from fbvm.engine.bases import base_ranges, recursive_bodies
 from fbvm.engine.depths import with_recursion_room
+from fbvm.engine.effects import Effects
 from fbvm.engine.observation import NO_SITE, Observation
 from fbvm.engine.powered import UNMARKED
+from fbvm.engine.python.bodies import function_name
 from fbvm.engine.python.logged import ENDLESS, MOST_ENTRIES, Full, Log, LoggedWriter, Row
-from fbvm.engine.python.runtime import environment
-from fbvm.engine.python.statements import BodyWriter, function_name
+from fbvm.engine.python.runtime import OwnViews, environment
+from fbvm.engine.python.statements import PlainWriter
 from fbvm.engine.python.stepped import SteppedWriter, reporting
+from fbvm.engine.ranges import Range
 from fbvm.engine.trap import NO_INSTANCE, Stop, Trap, trap
 
 _NUMBERS = count(1)
@@ -58,8 +61,11 @@ class Program:
     source: str
     parts: tuple[CodeType, ...]
     constants: dict[str, Any] = field(repr=False)
-    bases: dict[int, int]
-    """Where the instance begins of each body that was written for its only one, by the body's number."""
+    bases: dict[int, Range]
+    """The lowest and the highest byte at which the instances begin that a body was written for, by the body's number; none for
+    one that was written for any."""
+    own: dict[int, tuple[str, ...]]
+    """The types of the views that a body has of its instance, by the body's number."""
     frames: int
     """Python frames that a run takes at most: every body once, and every part outlined; all that the stack of frames holds of
     bodies that may be called again while they run."""
@@ -67,44 +73,47 @@ class Program:
     """What the numbers in the log mean; empty for other builds."""
 
 
-_programs: dict[tuple[int, Build, bool], Program] = {}
-"""The programs of images that are still in use, by image, build and `anywhere`."""
+_programs: dict[tuple[int, Build, bool, bool], Program] = {}
+"""The programs of images that are still in use, by image, build, `anywhere` and `strangers`."""
 
 
-def translate(image: Image, build: Build = Build.PLAIN, anywhere: bool = False) -> Program:
+def translate(image: Image, build: Build = Build.PLAIN, anywhere: bool = False, strangers: bool = False) -> Program:
     """The Python code of an image; the same object as long as the image is in use.
 
-    Bodies with one instance are written for that instance, unless `anywhere` is True."""
-    key = id(image), build, anywhere
+    Bodies are written for the instances that there are, unless `anywhere` is True.  With `strangers` Python functions may take
+    the place of bodies, and store anywhere."""
+    key = id(image), build, anywhere, strangers
     known = _programs.get(key)
     if known is not None:
         return known
     name = f"fbvm {build.value} {next(_NUMBERS)}"
-    program = with_recursion_room(image, FRAMES_A_LEVEL, partial(_written, image, build, anywhere, name))
+    program = with_recursion_room(image, FRAMES_A_LEVEL, partial(_written, image, build, anywhere, strangers, name))
     _programs[key] = program
     finalize(image, _forget, key)
     return program
 
 
-def _forget(key: tuple[int, Build, bool]) -> None:
+def _forget(key: tuple[int, Build, bool, bool]) -> None:
     for part in _programs.pop(key).parts:
         linecache.cache.pop(part.co_filename, None)
 
 
-def _written(image: Image, build: Build, anywhere: bool, name: str) -> Program:
-    bases = {} if anywhere else fixed_bases(image)
+def _written(image: Image, build: Build, anywhere: bool, strangers: bool, name: str) -> Program:
+    bases = {} if anywhere else base_ranges(image)
+    own: dict[int, tuple[str, ...]] = {}
     constants: dict[str, Any] = {}
     table: list[Row] = []
     texts: list[str] = []
     lines: list[str] = []
     recursive = recursive_bodies(image)
+    effects = Effects(image, bases, range(len(image.bodies)) if strangers else recursive)
     frames = most = size = 0
     for number in range(len(image.bodies)):
-        base = bases.get(number)
-        writer = LoggedWriter(image, constants, base, table) if build is Build.LOGGED else \
-            SteppedWriter(image, constants, base) if build is Build.STEPPED else BodyWriter(image, constants, base)  # fmt: skip
+        writer = LoggedWriter(image, constants, effects, table) if build is Build.LOGGED else \
+            (SteppedWriter if build is Build.STEPPED else PlainWriter)(image, constants, effects)  # fmt: skip
         body = [*writer.write(number), ""]
         lines += body
+        own[number] = tuple(sorted(writer.own))
         frames += 1 + len(writer.routines)
         most = max(most, 1 + len(writer.routines)) if number in recursive else most
         size += sum(map(len, body))
@@ -113,7 +122,8 @@ def _written(image: Image, build: Build, anywhere: bool, name: str) -> Program:
             lines, size = [], 0
     texts.append("\n".join(lines))
     parts = tuple(_compiled(text, f"<{name} {number}>" if number else f"<{name}>") for number, text in enumerate(texts))
-    return Program(build, "\n".join(texts), parts, constants, bases, frames + MOST_FRAMES * most, tuple(table))
+    source = "\n".join(texts)
+    return Program(build, source, parts, constants, bases, own, frames + MOST_FRAMES * most, tuple(table))
 
 
 def _compiled(text: str, name: str) -> CodeType:
@@ -162,6 +172,9 @@ class PythonEngine:
         log = self._log if program.build is Build.LOGGED else None
         names = environment(self.memory, self.image.objects) | program.constants | (log.names if log else {})
         names["counts"], names["marks"] = self.counted, self.marks
+        for number, machines in program.own.items():
+            if machines:
+                names[f"own{number}"] = OwnViews(self.memory, machines)
         for part in program.parts:
             exec(part, names)
         self._spaces.append(names)
@@ -180,6 +193,7 @@ class PythonEngine:
         whole instance."""
         self.substitutes[body] = function
         self._spaces.clear()
+        self._program = translate(self.image, self._program.build, strangers=not self.observed)
         self._bodies, self._standing = self._bind(self._program), None
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in self.image.tasks]
 
@@ -211,10 +225,12 @@ class PythonEngine:
     def call(self, body: int, base: int = 0) -> Trap | None:
         """Executes one body for the instance that begins at byte `base`.  Returns the trap that ended it, if any."""
         program = self._program
-        if program.bases.get(body, base) == base:
+        low, high = program.bases.get(body, (base, base))
+        if low <= base <= high:
             return self._run([(self._bodies[body], base)])
         try:
-            return self._run([(self._bind(translate(self.image, program.build, anywhere=True))[body], base)])
+            anywhere = translate(self.image, program.build, True, bool(self.substitutes) and not self.observed)
+            return self._run([(self._bind(anywhere)[body], base)])
         finally:
             self._spaces.pop()
 

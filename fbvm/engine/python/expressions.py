@@ -10,16 +10,11 @@ from typing import Any
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import limits, width
 from fbvm.code.operations import BUFFER_OBJECT, INTEGERS, OBJECT_SHIFT, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
-from fbvm.engine.python.writer import ARITHMETIC, Expressions, Rows, bare
-from fbvm.engine.ranges import constant_integer, is_float, mask, may_trap, never_wraps, value_range
+from fbvm.engine.python.writer import ARITHMETIC, LONGEST_TWICE, Expressions, Rows, bare, view
+from fbvm.engine.ranges import constant_integer, is_float, mask, may_trap
 
 SIGNS = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^",
          "eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
-
-
-def view(machine: str) -> str:
-    """The name of the view of a machine type in generated code."""
-    return "u1" if machine == "b" else machine
 
 
 def _brought(name: str) -> Callable[..., str]:
@@ -28,18 +23,20 @@ def _brought(name: str) -> Callable[..., str]:
     def emit(e: Expressions, machine: str, *operands: Any) -> str:
         node = (name, machine, *operands)
         text = _LOOSE[name](e, node)
-        return text if machine == "f64" or (machine in INTEGERS and never_wraps(node)) else e.bring(text, machine)
+        if machine == "f32":
+            return e.rounded(node, text)
+        return text if machine == "f64" or (machine in INTEGERS and e.never_wraps(node)) else e.bring(text, machine)
 
     return emit
 
 
 def _binary(e: Expressions, node: Node) -> str:
-    read = e.value if is_float(node[1]) or never_wraps(node) else e.loose
+    read = e.value if is_float(node[1]) or e.never_wraps(node) else e.loose
     return f"({read(node[2])} {SIGNS[node[0]]} {read(node[3])})"
 
 
 def _negative(e: Expressions, node: Node) -> str:
-    read = e.value if is_float(node[1]) or never_wraps(node) else e.loose
+    read = e.value if is_float(node[1]) or e.never_wraps(node) else e.loose
     return f"(-{read(node[2])})"
 
 
@@ -49,12 +46,12 @@ def _loose_convert(e: Expressions, node: Node) -> str:
         return e.value(a) if is_float(source) else f"float({bare(e.value(a))})"
     if source == "b":
         return f"(1 if {e.condition(a)} else 0)"
-    return e.loose(a) if width(machine) <= width(source) and not never_wraps(node) else e.value(a)
+    return e.loose(a) if width(machine) <= width(source) and not e.never_wraps(node) else e.value(a)
 
 
 def _convert(e: Expressions, machine: str, source: str, a: Node) -> str:
     if machine == "f32" and not is_float(source):
-        low, high = value_range(a)
+        low, high = e.range_of(a)
         exact = low >= -(1 << 24) and high <= 1 << 24
         return f"{'float' if exact else 'single_of_integer'}({bare(e.value(a))})"
     if (is_float(source) and machine == "f64") or machine == source:
@@ -66,7 +63,13 @@ def _loose_divide(e: Expressions, node: Node) -> str:
     a, b = node[2], node[3]
     if b[0] == "const" and b[2]:
         return f"({e.value(a)} / {e.value(b)})"
-    return f"divide({bare(e.value(a))}, {bare(e.value(b))})"
+    if may_trap(a) and may_trap(b):
+        return f"divide({bare(e.value(a))}, {bare(e.value(b))})"
+    first, divisor = e.once(e.value(b))
+    dividend = bare(e.value(a))
+    if len(dividend) > LONGEST_TWICE:
+        return f"divide({dividend}, {first})"
+    return f"(({dividend}) / {divisor} if {first} else divide({dividend}, {divisor}))"
 
 
 def _divide(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
@@ -77,12 +80,12 @@ def _divide(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
     if divisor is not None and divisor > 0:
         return _toward_zero("//", e, a, divisor)
     text = f"quotient({bare(e.value(a))}, {bare(e.value(b))}, {site})"
-    return text if never_wraps(node) or divisor not in (None, -1) else e.bring(text, machine)
+    return text if e.never_wraps(node) or divisor not in (None, -1) else e.bring(text, machine)
 
 
 def _toward_zero(sign: str, e: Expressions, a: Node, b: int) -> str:
     """Quotient or remainder by a positive constant; Python's go toward minus infinity."""
-    if value_range(a)[0] >= 0:
+    if e.range_of(a)[0] >= 0:
         return f"({e.value(a)} {sign} {b})"
     first, v = e.once(e.value(a))
     return f"({v} {sign} {b} if {first} >= 0 else -(-{v} {sign} {b}))"
@@ -110,7 +113,7 @@ def _bitwise(name: str) -> Callable[..., str]:
         if machine == "b":
             word = {"and": "and", "or": "or"}.get(name)
             if word and not may_trap(b):
-                return f"({e.value(a)} {word} {e.value(b)})"
+                return f"({e.value(a)} {word} {e.aside(e.value, b)})"
             return f"({e.value(a)} {'!=' if name == 'xor' else SIGNS[name]} {e.value(b)})"
         reads = [e.value, e.value]
         if name == "and" and "const" in (a[0], b[0]):
@@ -121,7 +124,7 @@ def _bitwise(name: str) -> Callable[..., str]:
 
 
 def _lazy(word: str) -> Callable[..., str]:
-    return lambda e, machine, a, b: f"({e.value(a)} {word} {e.value(b)})"
+    return lambda e, machine, a, b: f"({e.value(a)} {word} {e.aside(e.value, b)})"
 
 
 def _not(e: Expressions, machine: str, a: Node) -> str:
@@ -134,8 +137,6 @@ def _compare(name: str) -> Callable[..., str]:
 
 _USUAL_SHIFTS = {"shift_left": "<<", "shift_right": ">>"}
 """Python's operators where 0 to less than the width is shifted by; all else is seen to by the functions."""
-LONGEST_TWICE = 40
-"""Characters of an expression that may be written twice, of which one is executed."""
 
 
 def _shift(name: str) -> Callable[..., str]:
@@ -144,9 +145,9 @@ def _shift(name: str) -> Callable[..., str]:
         if count is not None and 0 <= count < width(machine):
             if name == "shift_left":
                 return e.bring(f"({e.loose(a)} << {count})", machine)
-            if name == "shift_right" and (count == 0 or value_range(a)[0] >= 0):
+            if name == "shift_right" and (count == 0 or e.range_of(a)[0] >= 0):
                 return f"({e.value(a)} >> {count})" if count else e.value(a)
-        if name in _USUAL_SHIFTS and not (may_trap(a) and may_trap(n)) and (name == "shift_left" or value_range(a)[0] >= 0):
+        if name in _USUAL_SHIFTS and not (may_trap(a) and may_trap(n)) and (name == "shift_left" or e.range_of(a)[0] >= 0):
             first, by = e.once(e.value(n))
             shifted = bare(e.value(a))
             if len(shifted) <= LONGEST_TWICE:
@@ -196,7 +197,7 @@ def _bits(e: Expressions, machine: str, source: str, a: Node) -> str:
 def _select(e: Expressions, machine: str, g: Node, a: Node, b: Node) -> str:
     if may_trap(a) or may_trap(b):
         return f"choose({bare(e.value(g))}, {bare(e.value(a))}, {bare(e.value(b))})"
-    return f"({e.value(b)} if {e.condition(g)} else {e.value(a)})"
+    return f"({e.aside(e.value, b)} if {e.condition(g)} else {e.aside(e.value, a)})"
 
 
 def _mux(e: Expressions, machine: str, k: Node, choices: tuple[Node, ...], site: int) -> str:
@@ -215,11 +216,11 @@ def _extreme(sign: str, function: str) -> Callable[..., str]:
 
 
 def _check(e: Expressions, machine: str, a: Node, low: int, high: int, code: str, site: int) -> str:
-    least, greatest = value_range(a)
+    least, greatest = e.range_of(a)
     if low <= least and greatest <= high:
         return e.value(a)
     lowest, highest = limits(machine)
-    if a[0] in ARITHMETIC and lowest <= low and high <= highest and not never_wraps(a):  # a number within needs no wrap
+    if a[0] in ARITHMETIC and lowest <= low and high <= highest and not e.never_wraps(a):  # a number within needs no wrap
         first, v = e.once(e.loose(a))
         return f"({v} if {low} <= {first} <= {high} else wrapped({v}, {machine!r}, {low}, {high}, {code!r}, {site}))"
     first, v = e.once(e.value(a))
@@ -231,10 +232,15 @@ def _within(e: Expressions, machine: str, a: Node, low: Node, high: Node, code: 
     return f"within({parts}, {code!r}, {site})"
 
 
+def _temporary(e: Expressions, machine: str, number: Any) -> str:
+    known = e.known_range(("tmp", machine, number))
+    return str(known[0]) if known and known[0] == known[1] else f"t{number}"
+
+
 def _load(e: Expressions, machine: str, address: Address) -> str:
     if isinstance(address[0], tuple):
         return _load_raw(e, machine, address)
-    return f"{view(machine)}[{bare(e.index(address, machine))}]"
+    return e.kept(machine, address) or e.item(address, machine)
 
 
 def _load_raw(e: Expressions, machine: str, address: Address) -> str:
@@ -244,7 +250,13 @@ def _load_raw(e: Expressions, machine: str, address: Address) -> str:
 
 
 def _load_bit(e: Expressions, machine: str, address: Address, bit: int) -> str:
-    return f"(u8[{bare(e.place(address, 1))}] & {1 << bit} != 0)"
+    return f"({_bit(e, address, bit)} != 0)"
+
+
+def _bit(e: Expressions, address: Address, bit: int) -> str:
+    """Python for something that is true if a bit is set."""
+    byte = f"u8[{bare(e.place(address, 1))}]" if isinstance(address[0], tuple) else e.item(address, "u8")
+    return f"{byte} & {1 << bit}"
 
 
 def _load_flag(e: Expressions, machine: str, address: Address) -> str:
@@ -288,7 +300,7 @@ def _enum_text(e: Expressions, machine: str, names: Any, a: Node) -> str:
 def _both(word: str, e: Expressions, node: Node) -> str:
     if may_trap(node[3]):
         return e.value(node)
-    return f"({e.condition(node[2])} {word} {e.condition(node[3])})"
+    return f"({e.condition(node[2])} {word} {e.aside(e.condition, node[3])})"
 
 
 _LOOSE: dict[str, Callable[[Expressions, Node], str]] = {
@@ -301,7 +313,7 @@ _LOOSE: dict[str, Callable[[Expressions, Node], str]] = {
 
 VALUES: dict[str, Callable[..., str]] = {
     "const": _const,
-    "tmp": lambda e, machine, number: f"t{number}",
+    "tmp": _temporary,
     "load": _load, "load_raw": _load_raw, "load_bit": _load_bit, "load_flag": _load_flag, "load_text": _load_text,
     **{name: _brought(name) for name in ("add", "sub", "mul", "neg", "abs", "pow", "math", "atan2")},
     "div": _divide, "mod": _remainder,
@@ -331,12 +343,12 @@ VALUES: dict[str, Callable[..., str]] = {
 """How each operation is written: called with the operands of its row."""
 
 _CONDITIONS: dict[str, Callable[[Expressions, Node], str]] = {
-    "load_bit": lambda e, node: f"u8[{bare(e.place(node[2], 1))}] & {1 << node[3]}",
+    "load_bit": lambda e, node: _bit(e, node[2], node[3]),
     "is_set": lambda e, node: e.value(node[3]),
     "and": lambda e, node: _both("and", e, node),
     "or": lambda e, node: _both("or", e, node),
-    "and_then": lambda e, node: f"({e.condition(node[2])} and {e.condition(node[3])})",
-    "or_else": lambda e, node: f"({e.condition(node[2])} or {e.condition(node[3])})",
+    "and_then": lambda e, node: f"({e.condition(node[2])} and {e.aside(e.condition, node[3])})",
+    "or_else": lambda e, node: f"({e.condition(node[2])} or {e.aside(e.condition, node[3])})",
 }
 """Shorter forms where only the truth of a BOOL is wanted."""
 

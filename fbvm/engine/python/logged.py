@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 from fbvm.base.memory import WHOLE_BYTES, Memory, compare
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import Address, Node, detail_size
+from fbvm.engine.effects import STORES, Effects
 from fbvm.engine.observation import NO_SITE, Observation
-from fbvm.engine.python.observed import STORES, ObservedWriter, names_bit
+from fbvm.engine.python.observed import ObservedWriter, names_bit
 from fbvm.engine.python.writer import bare
 from fbvm.engine.ranges import may_trap
 
@@ -55,8 +56,8 @@ class Full(Exception):
 class LoggedWriter(ObservedWriter):
     """Writes one body that tells what it does.  `table` gets its rows."""
 
-    def __init__(self, image: Image, constants: dict[str, Any], base: int | None, table: list[Row]) -> None:
-        super().__init__(image, constants, base)
+    def __init__(self, image: Image, constants: dict[str, Any], effects: Effects, table: list[Row]) -> None:
+        super().__init__(image, constants, effects)
         self.table = table
         self._waiting: list[str] = []
         self._aligned: Address | None = None
@@ -113,13 +114,12 @@ class LoggedWriter(ObservedWriter):
         start = told[0].partition(" := ")[0].lstrip("(") if where == TOLD else f"b1 + {offset}" if where == OWN else str(offset)
         bits = self._bit(form, address, bit, told)
         if size in VIEWS and (size == 1 or address == self._aligned):
-            index = start if size == 1 else f"{start} >> {_SHIFTS[size]}" if where == TOLD else self.index(address, VIEWS[size])
-            value, stored = f"{VIEWS[size]}[{bare(index)}]", size
+            index = start if size == 1 else f"{start} >> {_SHIFTS[size]}"
+            simple = size > 1 and where != TOLD
+            value, stored = self.item(address, VIEWS[size]) if simple else f"{VIEWS[size]}[{bare(index)}]", size
         else:
             end = str(offset + size) if where == ABSOLUTE else f"b1 + {offset + size}" if where == OWN else f"{start} + {size}"
             value, stored = f"buffer[{start}:{end}]", 0
-        if where == OWN:
-            self.bases.add(1)
         self._note(Row(kind, site, form, where, offset, *bits, stored), *told, value)
 
     def _static(self, address: Address) -> tuple[int, int]:

@@ -4,26 +4,26 @@ A store may change its own subscripts, as in `a[a[0]] := 5`.  So these are worke
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node, detail_size
-from fbvm.engine.python.statements import EMITTERS, BodyWriter
+from fbvm.code.operations import Address, Block, Node, detail_size
+from fbvm.engine.effects import STORES
+from fbvm.engine.python.statements import PlainWriter
 from fbvm.engine.python.writer import bare
 
 
-class ObservedWriter(BodyWriter):
+class ObservedWriter(PlainWriter):
     """Writes one body that tells observations."""
 
-    may_hold_budget = False
+    may_hold = False
 
     def block(self, block: Block) -> None:
         nodes: list[Node | None] = [*block, None]
         for number, node in enumerate(block):
             here, following = nodes[number] or node, nodes[number + 1]
             if here[0] not in STORES:
-                EMITTERS[here[0]](self, *here[1:])
+                self.emitters[here[0]](self, *here[1:])
                 continue
             address = STORES[here[0]](here)[0]
             once = self._evaluated(address)
@@ -36,7 +36,7 @@ class ObservedWriter(BodyWriter):
 
     def store(self, node: Node, told: bool) -> None:
         """Writes a store; `told` says that the observation behind it tells all that it has stored."""
-        EMITTERS[node[0]](self, *node[1:])
+        self.emitters[node[0]](self, *node[1:])
 
     def _evaluated(self, address: Address) -> Address:
         """The same address with its subscripts and reference in temporaries."""
@@ -62,15 +62,6 @@ def _with_address(node: Node, address: Address) -> Node:
 def names_bit(form: Any, address: Address, bit: int) -> bool:
     """True for a BOOL behind a reference, which says whether the BOOL is a byte or a bit of one."""
     return form == "b" and isinstance(address[0], tuple) and bit == WHOLE_BYTES
-
-
-STORES: dict[str, Callable[[Node], tuple[Address, int]]] = {
-    "store": lambda node: (node[2], SIZES[node[1]]), "store_raw": lambda node: (node[2], SIZES[node[1]]),
-    "store_bit": lambda node: (node[1], 1), "store_flag": lambda node: (node[1], 1),
-    "store_text": lambda node: (node[1], (node[2] + 1) * TEXT_UNITS[node[3][1]]), "copy": lambda node: (node[1], node[3]),
-    "fill": lambda node: (node[1], len(node[2])), "reverse": lambda node: (node[1], node[2]),
-}  # fmt: skip
-"""By operation that stores: the address, and the number of bytes."""
 
 
 def _tells(observed: Node | None, node: Node) -> bool:

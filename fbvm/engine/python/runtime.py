@@ -6,7 +6,7 @@ A function that can trap takes the number of the site last and raises Stop.  Ari
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from fbvm.base import arithmetic, strings
@@ -22,6 +22,7 @@ from fbvm.code.operations import (
     OBJECT_SHIFT,
     OFFSET_MASK,
     OFFSET_SHIFT,
+    SIZES,
 )
 from fbvm.engine.observation import Observation
 from fbvm.engine.trap import Stop
@@ -107,6 +108,18 @@ _PURE: dict[str, Any] = {
 }
 
 
+class OwnViews(dict[int, tuple[memoryview, ...]]):
+    """By the byte at which an instance begins, views of the memory from there on, one for each type of `machines`."""
+
+    def __init__(self, memory: Memory, machines: Sequence[str]) -> None:
+        super().__init__()
+        self._views = [(memory.views[machine], SIZES[machine]) for machine in machines]
+
+    def __missing__(self, base: int) -> tuple[memoryview, ...]:
+        views = self[base] = tuple(view[base // size:] for view, size in self._views)
+        return views
+
+
 def environment(memory: Memory, objects: Objects) -> dict[str, Any]:
     """The globals of generated code over a memory.
 
@@ -116,6 +129,7 @@ def environment(memory: Memory, objects: Objects) -> dict[str, Any]:
         names["u1" if machine == "b" else machine] = view
         names[f"get_{machine}"], names[f"put_{machine}"] = STRUCTS[machine].unpack_from, STRUCTS[machine].pack_into
     names["buffer"] = memory.map
+    names["r32"] = memoryview(bytearray(4)).cast("f")  # rounds what is stored in it
     return names | _references(memory, objects) | _texts(memory)
 
 

@@ -1,188 +1,30 @@
-"""Statements of code as lines of Python: one row of EMITTERS an operation, and the function that a body becomes.
+"""Statements of code as lines of Python: one row of EMITTERS an operation.
 
-`p3_Main(b1)` is the body of number 3 for the instance at byte b1.  Loops and blocks nested deeper than Python allows become
-functions inside the body; what leaves them is a return code.  Builds that tell observations are subclasses of the writer of
-the plain build (`stepped`, `logged`)."""
+Builds that tell observations are subclasses of the writer of the plain build (`stepped`, `logged`)."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE
-from fbvm.code.image import Body, Image
-from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
-from fbvm.code.shapes import is_address, statements
+from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Block, Node
 from fbvm.engine.case_tables import case_table, single_values
-from fbvm.engine.observation import NO_SITE
-from fbvm.engine.python.expressions import ROWS, flag_operands, view
-from fbvm.engine.python.writer import Expressions, bare, plus
+from fbvm.engine.python.bodies import EXIT, MOST_INDENTS, NEXT, RETURN, BodyWriter
+from fbvm.engine.python.expressions import flag_operands
+from fbvm.engine.python.writer import bare, plus, view
 from fbvm.engine.ranges import may_trap
 
 MOST_LOOPS = 15
 """Nested loops in one function of Python, which takes 20 blocks."""
-MOST_INDENTS = 60
-"""Levels of indentation in one function of Python, which takes 100."""
 CHAIN = 25
 """Branches in one if/elif, which Python's compiler nests in each other."""
 FEW_ROWS = 5
 """Rows up to which a case asks one row after the other."""
-EXIT, NEXT, RETURN = 1, 2, 3
-"""What an outlined block returns if it is left early."""
-
-
-def function_name(number: int, body: Body) -> str:
-    """The name of the Python function of a body."""
-    return f"p{number}_" + re.sub(r"\W", "_", body.name, flags=re.ASCII)
-
-
-class BodyWriter(Expressions):
-    """Writes one body of the plain build, which drops observations.
-
-    `tail` is the tail of the innermost loop of the current function, None outside of any.  `holds_budget` is True for a body
-    whose variable n has the step budget, too, so that a charge need not read it from memory."""
-
-    may_hold_budget = True
-    """Whether nobody changes the memory while a body is executed."""
-
-    def __init__(self, image: Image, constants: dict[str, Any], base: int | None) -> None:
-        super().__init__(ROWS, constants, base)
-        self.image = image
-        self.out: list[str] = []
-        self.indent = 1
-        self.loops = 0
-        self.tail: Block | None = None
-        self.holds_budget = False
-        self.outlined = False
-        self.leaves: set[int] = set()
-        self.assigned: set[int] = set()
-        self.shared: set[int] = set()
-        self.site = NO_SITE
-        self._line = 0
-
-    def write(self, number: int) -> list[str]:
-        """The lines of the Python function of the body of that number."""
-        body = self.image.bodies[number]
-        self.holds_budget = self.may_hold_budget and _may_hold_budget(body)
-        self.block(body.code)
-        self.flush()
-        lines = [f"def {function_name(number, body)}(b1):"]
-        if self.holds_budget:
-            lines.append(f"    n = i64[{BUDGET // 8}]")
-        lines += [f"    b{size} = b1 >> {size.bit_length() - 1}" for size in (2, 4, 8) if size in self.bases]
-        if self.shared:
-            lines.append("    " + "".join(f"t{number} = " for number in sorted(self.shared)) + "None")
-        for routine in self.routines:
-            lines += ["    " + line for line in routine]
-        return lines + self.ended(self.out)
-
-    # --- what other builds do otherwise
-
-    def ended(self, lines: list[str]) -> list[str]:
-        """The lines of a function, one at least."""
-        return [*lines, "    pass"] if _empty(lines) else lines
-
-    def calling(self, call: str) -> str:
-        """Python that calls a function which is made of a block."""
-        return call
-
-    def call_body(self, pou: int, address: Address | None, place: str) -> None:
-        """Writes the call of the body of number `pou`, whose instance begins at `address`; `place` is Python for that byte."""
-        self.line(f"{self.function(pou)}({place})")
-
-    def observe(self, kind: str, site: int, detail: Any) -> None:
-        """Writes an observation."""
-
-    def begin_pass(self) -> None:
-        """Writes what is done at the beginning of each pass of a loop."""
-
-    def flush(self) -> None:
-        """Writes what must stand in front of the next line, or at the end of a block."""
-
-    def function(self, pou: int) -> str:
-        """The name of the function of a body."""
-        return function_name(pou, self.image.bodies[pou])
-
-    # --- lines and blocks
-
-    def line(self, text: str) -> None:
-        self.out.append("    " * self.indent + text)
-
-    def comment(self, text: str) -> None:
-        self.out.append("    " * self.indent + text)
-
-    def block(self, block: Block) -> None:
-        for node in block:
-            EMITTERS[node[0]](self, *node[1:])
-
-    def suite(self, write: Callable[[], None]) -> None:
-        """What `write` writes, one level deeper."""
-        self.indent += 1
-        before = len(self.out)
-        if self.indent > MOST_INDENTS:
-            self.outline(write)
-        else:
-            write()
-        self.flush()
-        if _empty(self.out[before:]):
-            self.line("pass")
-        self.indent -= 1
-
-    def outline(self, write: Callable[[], None]) -> None:
-        """What `write` writes as a function inside the body, and its call."""
-        self.flush()
-        outer = (self.out, self.indent, self.loops, self.tail, self.outlined, self.leaves, self.assigned)
-        self.out, self.indent, self.loops, self.tail = [], 1, 0, None
-        self.outlined, self.leaves, self.assigned = True, set(), set()
-        write()
-        self.flush()
-        name, lines, leaves, assigned = self.name("o"), self.out, self.leaves, self.assigned
-        self.out, self.indent, self.loops, self.tail, self.outlined, self.leaves, self.assigned = outer
-        self.shared |= assigned
-        shared = [f"    nonlocal {', '.join(f't{number}' for number in sorted(assigned))}"] if assigned else []
-        self.routines.append([f"def {name}():", *shared, *self.ended(lines)])
-        call = self.calling(f"{name}()")
-        self.line(f"r = {call}" if leaves else call)
-        if self.holds_budget and not self.outlined:
-            self.line(f"n = i64[{BUDGET // 8}]")
-        for code, leave in ((EXIT, _exit), (NEXT, _next), (RETURN, _return)):
-            if code in leaves:
-                self.line(f"if r == {code}:")
-                self.indent += 1
-                leave(self)
-                self.indent -= 1
-
-    def leave(self, code: int) -> None:
-        """Leave an outlined block: whoever called it goes on with the code."""
-        self.leaves.add(code)
-        self.line(f"return {code}")
-
-    def branches(self, tests: list[tuple[str, Block]], otherwise: Block) -> None:
-        """An if with its branches."""
-        word = "if"
-        for test, block in tests:
-            self.line(f"{word} {test}:")
-            self.suite(lambda block=block: self.block(block))  # type: ignore[misc]
-            word = "elif"
-        if otherwise:
-            self.line("else:")
-            self.suite(lambda: self.block(otherwise))
-
-
-def _may_hold_budget(body: Body) -> bool:
-    """True for a body with several charges, but no calls and no stores behind references, which might change the budget."""
-    nodes = list(statements(body.code))
-    return sum(node[0] == "charge" for node in nodes) > 1 and not any(map(_may_change_budget, nodes))
-
-
-def _may_change_budget(node: Node) -> bool:
-    return node[0] in ("call", "mark") or any(is_address(part) and isinstance(part[0], tuple) for part in node[1:3])
-
-
-def _empty(lines: list[str]) -> bool:
-    return all(line.lstrip().startswith("#") for line in lines)
-
+ROUNDED = ("add", "sub", "mul", "div", "pow", "math", "atan2", "convert")
+"""Operations whose number may have to be rounded to 32 bits."""
+SAME_BITS = {"u32": "f32", "u64": "f64"}
+"""By the type in which numbers are copied that are floats."""
 
 # --- stores ---------------------------------------------------------------------------------------------------------
 
@@ -199,11 +41,38 @@ def _ordered(w: BodyWriter, address: Address, value: Node, text: str) -> str:
 def _store(w: BodyWriter, machine: str, address: Address, a: Node) -> None:
     if isinstance(address[0], tuple):
         _store_raw(w, machine, address, a)
+        w.held.forget(("store_raw", machine, address, a), w.range_of)
         return
-    index = bare(w.index(address, machine))
-    index = _ordered(w, address, a, index)
+    held, key = w.held, w.held.key(machine, address)
+    if not held.worth(key, 1):
+        key = None
+    range_ = w.range_of(a) if machine in INTEGERS else None
     stored, text = w.stored(machine, a)
-    w.line(f"{view(stored)}[{index}] = {text}")
+    if key in held.must and stored != machine:
+        stored, text = machine, bare(w.value(a))
+    name, index = w.cell(address, stored)
+    index = _ordered(w, address, a, index)
+    rounds = machine == "f32" and a[0] in ROUNDED
+    if key and stored == machine and not rounds:
+        w.line(f"{name}[{index}] = {held.name(key)} = {text}")
+        held.forget(("store", machine, address, a), w.range_of)
+        held.hold(key, range_)
+    else:
+        w.line(f"{name}[{index}] = {text}")
+        held.forget(("store", machine, address, a), w.range_of)
+        if key and key in held.must:
+            w.line(f"{held.name(key)} = {w.item(address, machine)}")
+            held.hold(key, None)
+    if machine in SAME_BITS and a[:2] == ("load", machine):
+        _hold_copy(w, SAME_BITS[machine], address, a[2])
+
+
+def _hold_copy(w: BodyWriter, machine: str, to: Address, source: Address) -> None:
+    """Holds a float whose bits were copied, if the one that they were copied from is held."""
+    held, key, known = w.held, w.held.key(machine, to), w.held.key(machine, source)
+    if key and known and held.state and known in held.state and held.worth(key, 1):
+        w.line(f"{held.name(key)} = {held.name(known)}")
+        held.hold(key, None)
 
 
 def _store_raw(w: BodyWriter, machine: str, address: Address, a: Node) -> None:
@@ -220,16 +89,16 @@ def _store_raw(w: BodyWriter, machine: str, address: Address, a: Node) -> None:
 
 
 def _store_bit(w: BodyWriter, address: Address, bit: int, a: Node) -> None:
-    place = bare(w.place(address, 1))
+    view_, place = ("u8", bare(w.place(address, 1))) if isinstance(address[0], tuple) else w.cell(address, "u8")
     if not place.isdigit():
         name = w.name("v")
         w.line(f"{name} = {place}")
         place = name
-    on, off = 1 << bit, 255 ^ 1 << bit
+    byte, on, off = f"{view_}[{place}]", 1 << bit, 255 ^ 1 << bit
     if a[0] == "const":
-        w.line(f"u8[{place}] |= {on}" if a[2] else f"u8[{place}] &= {off}")
+        w.line(f"{byte} |= {on}" if a[2] else f"{byte} &= {off}")
     else:
-        w.line(f"u8[{place}] = u8[{place}] | {on} if {w.condition(a)} else u8[{place}] & {off}")
+        w.line(f"{byte} = {byte} | {on} if {w.condition(a)} else {byte} & {off}")
 
 
 def _store_flag(w: BodyWriter, address: Address, a: Node) -> None:
@@ -265,19 +134,23 @@ def _fill(w: BodyWriter, address: Address, pattern: bytes) -> None:
 def _let(w: BodyWriter, number: int, machine: str, a: Node) -> None:
     w.assigned.add(number)
     w.line(f"t{number} = {bare(w.value(a))}")
+    w.held.hold(("tmp", "", number), w.range_of(a) if machine in INTEGERS else None)
 
 
 # --- control --------------------------------------------------------------------------------------------------------
 
 
 def _if(w: BodyWriter, rows: tuple[tuple[Node, Block], ...], otherwise: Block) -> None:
-    if len(rows) > CHAIN:
-        rest: Block = (("if", rows[CHAIN:], otherwise),)
-        w.branches([(bare(w.condition(c)), block) for c, block in rows[:CHAIN]], ())
-        w.line("else:")
-        w.suite(lambda: w.outline(lambda: w.block(rest)))
+    first, conditions = rows[:CHAIN], [condition for condition, _ in rows[:CHAIN]]
+    texts = [bare(w.condition(conditions[0])), *(bare(w.aside(w.condition, condition)) for condition in conditions[1:])]
+    tests = list(zip(texts, (block for _, block in first), strict=True))
+    if len(rows) <= CHAIN:
+        w.branches(tests, otherwise, conditions)
         return
-    w.branches([(bare(w.condition(c)), block) for c, block in rows], otherwise)
+    rest: Block = (("if", rows[CHAIN:], otherwise),)
+    w.branches(tests, (), conditions)
+    w.line("else:")
+    w.suite(lambda: w.outline(lambda: w.block(rest)))
 
 
 def _case(w: BodyWriter, machine: str, a: Node, rows: tuple[tuple[Any, Block], ...], otherwise: Block) -> None:
@@ -300,10 +173,13 @@ def _case(w: BodyWriter, machine: str, a: Node, rows: tuple[tuple[Any, Block], .
             w.block(blocks[first])
             return
         middle = (first + last + 1) // 2
+        before = w.held.copy()
         w.line(f"if {name} < {middle}:")
         w.suite(lambda: choose(first, middle - 1))
+        end, w.held.state = w.held.state, before
         w.line("else:")
         w.suite(lambda: choose(middle, last))
+        w.held.meet([end, w.held.state])
 
     choose(0, len(rows))
 
@@ -312,7 +188,7 @@ def _loop(w: BodyWriter, head: Block, body: Block, tail: Block) -> None:
     if w.loops >= MOST_LOOPS or w.indent >= MOST_INDENTS:
         w.outline(lambda: _loop(w, head, body, tail))
         return
-    outer = w.tail
+    outer, must = w.tail, w.held.begin_loop(("loop", head, body, tail))
     w.loops += 1
     w.line("while True:")
 
@@ -326,6 +202,7 @@ def _loop(w: BodyWriter, head: Block, body: Block, tail: Block) -> None:
     w.suite(inside)
     w.loops -= 1
     w.tail = outer
+    w.held.end_loop(must)
 
 
 def _exit(w: BodyWriter) -> None:
@@ -333,6 +210,7 @@ def _exit(w: BodyWriter) -> None:
         w.leave(EXIT)
     else:
         w.line("break")
+        w.held.exit()
 
 
 def _next(w: BodyWriter) -> None:
@@ -343,6 +221,7 @@ def _next(w: BodyWriter) -> None:
     w.block(tail)
     w.tail = tail
     w.line("continue")
+    w.held.state = None
 
 
 def _return(w: BodyWriter) -> None:
@@ -350,6 +229,7 @@ def _return(w: BodyWriter) -> None:
         w.leave(RETURN)
     else:
         w.line("return")
+        w.held.state = None
 
 
 def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
@@ -381,6 +261,7 @@ def _mark(w: BodyWriter, number: int, rows: tuple[int, ...], a: Node) -> None:
 
 def _stop(w: BodyWriter, code: str, site: int) -> None:
     w.line(f"stop({code!r}, {site})")
+    w.held.state = None
 
 
 # --- observations ---------------------------------------------------------------------------------------------------
@@ -403,3 +284,9 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "observe": _observe, "count": _count, "mark": _mark,
 }
 """How each statement is written: called with the operands of its row."""
+
+
+class PlainWriter(BodyWriter):
+    """Writes one body of the plain build."""
+
+    emitters = EMITTERS

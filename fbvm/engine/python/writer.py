@@ -11,10 +11,13 @@ from typing import Any, NamedTuple
 
 from fbvm.base.arithmetic import limits, width
 from fbvm.code.operations import INTEGERS, SIZES, Address, Node
-from fbvm.engine.ranges import is_float, mask, never_wraps
+from fbvm.engine.effects import located
+from fbvm.engine.ranges import Range, is_float, mask, never_wraps, value_range
 
 DEEPEST = 24
 """Levels of nodes in one Python expression: at most four parentheses each, where Python takes 200 in all."""
+LONGEST_TWICE = 40
+"""Characters of an expression that may be written twice, of which one is executed."""
 ARITHMETIC = ("add", "sub", "mul", "neg", "abs", "convert")
 """Integer operations whose number is cut to the width at its end."""
 
@@ -31,6 +34,11 @@ class Rows(NamedTuple):
 
 
 _QUOTED = re.compile(r"'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\"")
+
+
+def view(machine: str) -> str:
+    """The name of the view of a machine type in generated code."""
+    return "u1" if machine == "b" else machine
 
 
 def bare(text: str) -> str:
@@ -64,15 +72,19 @@ class Expressions:
     """Writes the expressions of one body.
 
     `constants` are objects by the names under which generated code finds them; `base` is the byte at which the body's only
-    instance begins, None if there are several.  Known afterwards: `bases`, the sizes in which the code counts the base of its
-    instance, and `routines`, functions that the body has to define."""
+    instance begins, None if there are several or that is unknown.  Known afterwards: `own`, the types of the views of its
+    instance that the code uses, and `routines`, functions that the body has to define."""
 
-    def __init__(self, rows: Rows, constants: dict[str, Any], base: int | None) -> None:
+    def __init__(self, rows: Rows, constants: dict[str, Any]) -> None:
         self.rows = rows
         self.constants = constants
-        self.base = base
-        self.bases: set[int] = set()
+        self.base: int | None = None
+        self.own: set[str] = set()
         self.routines: list[list[str]] = []
+        self.perhaps = 0
+        """How many parts of expressions around may stay unevaluated."""
+        self.apart = False
+        """True inside an expression that becomes a function of its own."""
         self._depth = 0
         self._names = 0
 
@@ -112,8 +124,9 @@ class Expressions:
         outer = self._depth
         deep = outer >= DEEPEST and node[0] not in ("const", "tmp")
         self._depth = 0 if deep else outer + 1
+        inside, self.apart = self.apart, self.apart or deep
         text = how(node)
-        self._depth = outer
+        self._depth, self.apart = outer, inside
         if not deep:
             return text
         name = self.name("e")
@@ -131,6 +144,35 @@ class Expressions:
     def _condition(self, node: Node) -> str:
         row = self.rows.conditions.get(node[0])
         return row(self, node) if row else self._value(node)
+
+    def aside(self, read: Callable[[Node], str], node: Node) -> str:
+        """What `read` writes of a part that may stay unevaluated."""
+        self.perhaps += 1
+        text = read(node)
+        self.perhaps -= 1
+        return text
+
+    # --- what a build that holds values in local variables does otherwise
+
+    def kept(self, machine: str, address: Address) -> str | None:
+        """Python for what an item of the memory holds, if that need not be read from there."""
+        return None
+
+    def known_range(self, node: Node) -> Range | None:
+        """What is known of the value of a load or temporary besides its type."""
+        return None
+
+    def rounded(self, node: Node, text: str) -> str:
+        """Python for the value of `node`, whose number, not yet rounded to 32 bits, is `text`."""
+        return self.bring(text, "f32")
+
+    def range_of(self, node: Node) -> Range:
+        """The least and greatest value of an integer expression at this place."""
+        return self.known_range(node) or value_range(node, self.range_of)
+
+    def never_wraps(self, node: Node) -> bool:
+        """True if the number that an integer operation yields always fits its type."""
+        return never_wraps(node, self.range_of)
 
     def bring(self, text: str, machine: str) -> str:
         """Python for a number brought into its type."""
@@ -151,7 +193,7 @@ class Expressions:
                 return machine, self.value(node)
             first, v = self.once(self.loose(node))
             return machine, f"{v} if {first} == {v} else NAN"
-        if machine in INTEGERS and node[0] in ARITHMETIC and not never_wraps(node):
+        if machine in INTEGERS and node[0] in ARITHMETIC and not self.never_wraps(node):
             return f"u{width(machine)}", f"{self.loose(node)} & {mask(machine)}"
         return machine, bare(self.value(node))
 
@@ -159,8 +201,7 @@ class Expressions:
 
     def known(self, address: Address) -> Address:
         """The address as one of the buffer if the body's instance is known."""
-        base, offset, terms = address
-        return ("abs", self.base + offset, terms) if base == "self" and self.base is not None else address
+        return located(address, self.base)
 
     def place(self, address: Address, count: int) -> str:
         """Python for the byte offset of an address whose `count` bytes are used."""
@@ -169,19 +210,21 @@ class Expressions:
             _, reference, site = base
             delta = self._sum("", offset, [(stride, term) for stride, term in terms])
             return f"at({bare(self.value(reference))}, {delta}, {count}, {site})"
-        if base == "self":
-            self.bases.add(1)
         return self._sum("b1" if base == "self" else "", offset, list(terms))
 
-    def index(self, address: Address, machine: str) -> str:
-        """Python for the index of an address without reference in the view of its type."""
+    def cell(self, address: Address, machine: str) -> tuple[str, str]:
+        """Python for the view in which a place without reference is an item, and for its index there."""
         base, offset, terms = self.known(address)
         size = SIZES[machine]
         if offset % size or any(stride % size for stride, _ in terms):
-            return f"{self.place(address, size)} >> {size.bit_length() - 1}"
+            return view(machine), f"{self.place(address, size)} >> {size.bit_length() - 1}"
         if base == "self":
-            self.bases.add(size)
-        return self._sum(f"b{size}" if base == "self" else "", offset // size, [(s // size, t) for s, t in terms])
+            self.own.add(machine)
+        return f"{view(machine)}{'s' * (base == 'self')}", bare(self._sum("", offset // size, [(s // size, t) for s, t in terms]))
+
+    def item(self, address: Address, machine: str) -> str:
+        """Python for a place without reference as an item of a view."""
+        return "{}[{}]".format(*self.cell(address, machine))
 
     def _sum(self, base: str, offset: int, terms: list[tuple[int, Node]]) -> str:
         parts = [base] if base else []

@@ -70,7 +70,7 @@ def test_calls_are_found_in_all_blocks() -> None:
 
 def test_places_are_constants_and_a_call_elsewhere_still_works() -> None:
     rig = execute(COUNT)
-    assert f"u8[{MAIN}] = (u8[{MAIN}] + 1) & 255" in rig.engine.source
+    assert f"u8[{MAIN}] = u8_at_{MAIN} = (u8[{MAIN}] + 1) & 255" in rig.engine.source
     assert rig.engine.call(0, MAIN) is None
     assert rig.engine.call(0, MAIN + 8) is None
     assert (rig.memory.u8[MAIN], rig.memory.u8[MAIN + 8]) == (2, 1)
