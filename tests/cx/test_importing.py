@@ -13,7 +13,7 @@ from fbvm import Plc
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.cx.compression import compress
-from fbvm.interchange.cx.markup import CxText, read_markup
+from fbvm.interchange.cx.markup import CxText, is_project, read_markup
 from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.cx.read.memory import initial_values
 from fbvm.interchange.cx.write.exporting import export_into
@@ -87,6 +87,13 @@ def test_damaged_and_foreign_files_get_a_sentence() -> None:
         assert not made.files
     assert "Sysmac" in import_project(b"PK\x03\x04", "a.smc2").diagnostics[0].message
     assert "cut" in import_project(compress(SAMPLE.bytes())[:500], "a.cxp").diagnostics[0].message
+
+
+@each_of(("data", "is_one"), [
+    (SAMPLE.bytes(), True), (compress(SAMPLE.bytes()), True), (compress(SAMPLE.bytes())[:8] + b"\xff" * 50, True),
+    (compress(b"another text" * 20), False), (b"\x00\x06\x80" + b"\xff" * 50, False), (b"PROGRAM Main", False)])
+def test_a_project_is_known_by_how_it_begins_also_a_damaged_one(data: bytes, is_one: bool) -> None:
+    assert is_project(data) is is_one
 
 
 @pytest.mark.slow
@@ -301,6 +308,14 @@ def test_a_timer_of_a_block_is_one_of_each_instance() -> None:
         seen.append((plc.read("CIO 1.00"), plc.read("CIO 1.01")))
     assert [first for first, _ in seen] == [False, False, False, True, True, True, False, False]
     assert [second for _, second in seen] == [False] * 5 + [True] * 3
+
+
+@each_of(("row", "declared"), [
+    ("0,Runs,2,D100,0,5,0,;", "Runs AT D100 : UINT := 5;"), ("0,Runs,2,D100,7,3,1,;", "Runs AT D100 : ARRAY[0..6] OF UINT;"),
+    ("2,Runs,2,D100,0,5,0,;", "Runs AT D100 : UINT;"), ("2,Runs,2,,0,5,0,;", "Runs : UINT := 5;")])
+def test_a_variable_of_a_block_has_its_initial_value_but_for_arrays_and_pins_at_an_address(row: str, declared: str) -> None:
+    made = imported(replace(SAMPLE, blocks=(DOUBLE.replace("0,Runs,2,,0,0,1,;", row),)))
+    assert declared in " ".join(made.files["DOUBLE.st"].split())
 
 
 def test_a_timer_as_a_pin_is_refused_by_name() -> None:

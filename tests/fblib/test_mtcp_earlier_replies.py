@@ -89,6 +89,24 @@ def test_a_late_reply_of_which_a_part_is_there_when_the_next_command_comes(there
     assert rig.get("conn.ENO"), "the connection has not been opened again"
 
 
+@pytest.mark.parametrize("there", [1, 5])
+def test_less_than_a_header_of_a_late_reply_holds_no_command_up(there: int) -> None:
+    """How long that reply is, is not known yet; its rest comes in front of the reply that is waited for."""
+
+    class Rig(LateRig):
+        def said(self, request: int) -> list[Action]:
+            if request > 1:
+                return [Say(self.kept[0][there:] + self.kept[1])]
+            return [Say(self.kept[0][:there], REPLY_NS + 2 * GAP_NS)]
+
+    rig = Rig(one=ONE, three=THREE)
+    assert rig.end_of("one") == "0080"
+    rig.run_until(f"D30001 = {there}", max_s=1)
+    assert rig.end_of("three") == "ok"
+    assert (rig.words(200, 1), rig.words(210, 3)) == ([0], HELD)
+    assert rig.get("conn.ENO"), "the connection has not been opened again"
+
+
 @pytest.mark.parametrize("surplus", [-3, 0, 4])
 def test_a_reply_that_comes_two_requests_later(surplus: int) -> None:
     """A reply to the second request does not mean that the one to the first will not come."""

@@ -29,13 +29,41 @@ TWICE = ('<pou name="Twice" pouType="function"><interface><returnType><INT/></re
          '<type><INT/></type></variable></inputVars></interface><body><ST><xhtml:p>Twice := 2 * v;</xhtml:p></ST></body></pou>')
 
 
-@each_of(("pins", "n"), [("EN=2 v=4", ["0", "6", "6"]), ("v=4", ["6", "6", "6"])])
-def test_a_function_of_the_project_is_called_where_its_en_is_true(pins: str, n: list[str]) -> None:
+@each_of(("pins", "n", "x"), [("EN=2 v=4", ["0", "6", "6"], ["0", "1", "0"]), ("v=4", ["6", "6", "6"], ["1", "1", "1"])])
+def test_a_function_of_the_project_is_called_once_where_its_en_is_true(pins: str, n: list[str], x: list[str]) -> None:
     """Two variables take its result, so it is a statement of its own."""
     drawn = (RAIL + contact(2, "1", "a") + value(4, "3") + block(3, "Twice", pins, "ENO,OUT") + result(5, "3.OUT", "n")
-             + result(6, "3.OUT", "m"))
-    declared = variable("a") + variable("n", "INT") + variable("m", "INT")
-    assert states(imported(TWICE, pou(drawn, declared)), "n", ["", "a=1", "a=0"]) == n
+             + result(6, "3.OUT", "m") + coil(7, "3.ENO", "x"))
+    declared = variable("a") + variable("x") + variable("n", "INT") + variable("m", "INT")
+    made = imported(TWICE, pou(drawn, declared))
+    assert made.files["Main.st"].count("Twice(") == 1
+    assert states(made, "n", ["", "a=1", "a=0"]) == n
+    assert states(made, "x", ["", "a=1", "a=0"]) == x
+
+
+def test_a_function_without_enable_that_two_variables_take_is_called_once() -> None:
+    drawn = value(4, "3") + block(3, "Twice", "v=4", "OUT") + result(5, "3.OUT", "n") + result(6, "3.OUT", "m")
+    made = imported(TWICE, pou(drawn, variable("n", "INT") + variable("m", "INT"), language="FBD"))
+    assert made.files["Main.st"].count("Twice(") == 1
+    assert states(made, "n m", [""]) == ["6 6"]
+
+
+def test_what_a_block_gives_is_taken_only_while_it_is_enabled() -> None:
+    """Also where something else stands between the call and who takes it."""
+    drawn = (RAIL + contact(2, "1", "a") + value(6, "u") + value(7, "9") + block(3, "CTU", "EN=2 CU=6 PV=7", "ENO,Q,CV", "k")
+             + coil(4, "3.ENO", "x") + result(5, "3.CV", "n") + block(8, "ADD", "IN1=3.CV IN2=7", "OUT")
+             + result(9, "8.OUT", "m"))
+    declared = (variable("a") + variable("u") + variable("x") + variable("n", "INT") + variable("m", "INT")
+                + variable("k", "CTU"))
+    assert states(imported(pou(drawn, declared)), "x n", ["a=1 u=1", "a=0 n=99", "a=1"]) == ["1 1", "0 99", "1 1"]
+
+
+@each_of(("element", "found"), [
+    (contact(2, "1", "a").replace('localId="2"', 'localId="two"'), ["X0105"]),
+    ('<vendorElement typeName="note"><position x="0" y="0"/></vendorElement>', [])])
+def test_an_element_without_a_number_is_named_unless_it_is_a_tools_own(element: str, found: list[str]) -> None:
+    made = imported(pou(RAIL + element + contact(3, "1", "a") + coil(4, "3", "x"), "a x"))
+    assert [code for code in codes(made) if code == "X0105"] == found
 
 
 def test_two_wires_at_a_coil_are_ored() -> None:

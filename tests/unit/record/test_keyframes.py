@@ -6,8 +6,10 @@ import pytest
 
 from fbvm import Plc, compile_text
 from fbvm.code.image import Image
-from fbvm.record.recording.chunks import Chunk
+from fbvm.record.recording import replay
+from fbvm.record.recording.chunks import Chunk, ScanInputs
 from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.scan_codec import WRITES, decode_inputs, encode_inputs
 
 
 def image_of(size: int) -> Image:
@@ -32,6 +34,31 @@ def test_scans_that_python_did_are_not_done_again_by_machine_code(image: Image) 
     plc.run(scans=3)
     assert plc.engine.machine is None
     assert kept.at(2).engine_choice == plc.engine_choice == "auto"
+
+
+@pytest.mark.parametrize("name", WRITES)
+def test_inputs_of_each_kind_alone_are_kept(name: str) -> None:
+    inputs = ScanInputs(7)
+    setattr(inputs, name, [(3, b"\1\2")])
+    assert decode_inputs(encode_inputs(inputs), 100) == inputs
+
+
+def test_scans_of_machine_code_are_done_again_by_machine_code(image: Image, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Since Python takes too long for as many."""
+    plc = Plc(image)
+    kept = Recording().add("plc", plc)
+    plc.run(scans=3)
+    kept.chunk(2).machine = True
+    made: list[object] = []
+    monkeypatch.setattr(replay.native, "available", lambda: True)
+
+    def again(image: Image, cycle_ns: int, *, budget: int, engine: str) -> Plc:
+        made.append(engine)
+        return Plc(image, cycle_ns, budget=budget, engine="python")
+
+    monkeypatch.setattr(replay, "Plc", again)
+    replay.Replay(kept, 2)
+    assert made == ["native"]
 
 
 def test_a_keyframe_is_packed_beside_an_earlier_one(image: Image) -> None:

@@ -18,6 +18,7 @@ from fbvm.machine.plc import Plc
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.page import columns, inside
 from fbvm.record.page import data as module
+from fbvm.record.page.cells import BIT, TEXT, Cell, cell_of
 from fbvm.record.page.data import page_data
 from fbvm.record.page.inside import POWER, text_of
 from fbvm.record.page.page import page
@@ -210,6 +211,7 @@ def test_frames_are_arrows() -> None:
         ("out", "scan 3: 192.168.250.21:1 -> 192.168.250.1:502  asks & waits"),
         ("in", "scan 4: 192.168.250.1:502 -> 192.168.250.21:1  answers"),
     ]
+    assert float(svg.get("height", 0)) > float(drawn(traced(20), "D200").get("height", 0)), "they have a row of their own"
 
 
 @pytest.mark.slow
@@ -266,6 +268,32 @@ def test_packets_are_told_in_parts_with_their_first_and_last_scan(monkeypatch: p
     ends.end()
     assert ends.frames == [[3, 4, 2], [7, 7, 1]]
     assert len(ends.parts) == 2 and ends.own == "192.168.250.21:502"
+
+
+def test_a_text_is_read_again_where_any_of_its_bytes_changed() -> None:
+    texts = columns.Texts(Cell(TEXT, columns.LINE - 1, signal=7, size=2), "first")
+    asked: list[int] = []
+
+    def text(signal: int, moment: object) -> str:
+        asked.append(signal)
+        return f"text {len(asked)}"
+
+    for moved in ({2}, {0}, {1}):
+        texts.add(None, moved, text)  # type: ignore[arg-type]
+    assert asked == [7, 7]
+    assert list(texts.values) == [0, 1, 2]
+
+
+def test_numbers_are_columns_and_what_is_behind_a_reference_is_text() -> None:
+    plc = Plc(image(NUMBERS))
+
+    def code(name: str) -> str:
+        place = plc.find(name)
+        assert isinstance(place, Place)
+        return cell_of(Signal(place, ""), 0).code
+
+    found = {name: code(f"Main.{name}") for name in ("n", "dw", "low", "r", "text", "day", "p", "p^")}
+    assert found == {"n": "i16", "dw": "u32", "low": BIT, "r": "f32", "text": TEXT, "day": TEXT, "p": TEXT, "p^": TEXT}
 
 
 def test_the_ends_of_a_column_are_of_numbers_that_are_some() -> None:

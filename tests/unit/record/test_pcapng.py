@@ -109,7 +109,9 @@ def test_the_file_begins_with_its_section_and_names_its_interfaces() -> None:
         capture.tap(0, unit, TapEvent(TapKind.UDP, Peer(unit, 1), Peer("10.0.0.9", 2), True, b"x"))
     kinds = [kind for kind, _ in blocks(file.getvalue())]
     assert kinds == [0x0A0D0D0A, 1, 6, 1, 6, 6]
-    assert b"10.0.0.2" in file.getvalue()
+    [first, second] = [body[8:] for kind, body in blocks(file.getvalue()) if kind == 1]
+    assert struct.unpack_from("<HH8s", second) == (2, 8, b"10.0.0.2"), "option if_name; draft-ietf-opsawg-pcapng 4.2"
+    assert struct.unpack_from("<HH8sHHB", first) == (2, 8, b"10.0.0.1", 9, 1, 9), "then if_tsresol, nanoseconds"
 
 
 def test_a_comment_names_the_scan() -> None:

@@ -74,6 +74,7 @@ class ReadPage:
         head, blocks = self.head, self.head["blocks"]
         varying = [number for number, column in enumerate(head["columns"]) if "value" not in column]
         rows = len(varying) * len(blocks)
+        assert len(index) == (4 + 8 + 8 + 8) * rows
         lengths = struct.unpack(f"<{rows}I", index[:4 * rows])
         firsts = index[4 * rows:12 * rows]
         values: dict[int, list[Any]] = {
