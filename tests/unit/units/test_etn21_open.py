@@ -195,6 +195,47 @@ def test_the_last_state_stays_until_the_next_open() -> None:
     assert rig.state() == 2
 
 
+@pytest.mark.parametrize("last", [
+    [Received(1, b"old")], [PeerClosed(1)], [Broken(1, "ECONNRESET")], [Switch.SEND, Failed(1, "send", "EPIPE")]])
+def test_nothing_of_a_connection_is_left_for_the_next_one(last: list[Event | Switch]) -> None:
+    """Neither its bytes nor its end nor an error that nobody has been told."""
+    rig = Rig()
+    rig.open()
+    rig.parameters(count=4)
+    for step in last:
+        rig.scan(step)
+    rig.scan()
+    rig.close()
+    rig.open()
+    rig.parameters(count=4)
+    rig.scan(Switch.RECEIVE)
+    rig.scan()
+    assert (rig.is_on(Switch.RECEIVE), rig.waiting(), rig.state()) == (True, 0, 4)
+    rig.scan(Received(1, b"new!"))
+    rig.scan()
+    assert (rig.code(), rig.d[1000], rig.d[1001]) == ("0000", 0x6E65, 0x7721)
+    assert rig.ask(Switch.SEND, Sent(1, 4)) == "0000"
+
+
+def test_no_datagram_of_before_is_left_for_the_next_port() -> None:
+    rig = Rig()
+    for said in (b"old", b"new!"):
+        rig.parameters(local_port=3000)
+        rig.scan(Switch.UDP_OPEN)
+        rig.scan(Opened(1, 3000, ANYBODY))
+        rig.parameters(count=4)
+        if said == b"new!":
+            rig.scan(Switch.RECEIVE)
+            rig.scan()
+            assert rig.is_on(Switch.RECEIVE)
+        rig.scan(Received(1, said, SERVER))
+        rig.scan()
+        if said == b"old":
+            rig.scan(Switch.CLOSE)
+            rig.scan(Closed(1))
+    assert (rig.code(), rig.d[1000], rig.d[1001]) == ("0000", 0x6E65, 0x7721)
+
+
 # --- the held port ---
 
 
