@@ -107,6 +107,24 @@ def test_less_than_a_header_of_a_late_reply_holds_no_command_up(there: int) -> N
     assert rig.get("conn.ENO"), "the connection has not been opened again"
 
 
+def test_behind_a_whole_late_reply_a_command_is_sent_without_a_pause() -> None:
+    """Frames are told apart by their transactions; the pause of 100 ms is for what nobody has asked for."""
+
+    class Rig(LateRig):
+        def said(self, request: int) -> list[Action]:
+            return [Say(self.kept[-1], 0 if request > 1 else REPLY_NS + 2 * GAP_NS)]
+
+    rig = Rig(one=ONE, three=THREE)
+    assert rig.end_of("one") == "0080"
+    rig.run_until("D30001 = 11", max_s=1)
+    began_ns = rig.plc.elapsed_ns
+    rig.set("three_Cmd", True)
+    while len(rig.kept) < 2:
+        rig.scan()
+    assert rig.plc.elapsed_ns - began_ns < 90_000_000
+    assert rig.end_of("three") == "ok"
+
+
 @pytest.mark.parametrize("surplus", [-3, 0, 4])
 def test_a_reply_that_comes_two_requests_later(surplus: int) -> None:
     """A reply to the second request does not mean that the one to the first will not come."""

@@ -439,3 +439,15 @@ def test_blocks_that_one_call_reads_are_all_wired_to_it() -> None:
     assert text is not None
     assert {typed for typed in ("r.Q", "s.Q", "n + INT#1") if f"<expression>{typed}<" in text} == set()
     assert 'typeName="ADD"' in text
+
+
+def test_a_call_behind_something_else_begins_a_network_of_its_own() -> None:
+    """What stands behind it and names a block of before has a name there, no wire; calls in a row share a network."""
+    text = ("PROGRAM Main\nVAR a, b, x, y : BOOL; t, u : TON; END_VAR\n{}\nLADDER\nRUNG 1\n    LD a\n    OUT b\nEND_LADDER\n"
+            "END_PROGRAM\n")  # fmt: skip
+    calls = "t(IN := a, PT := T#1s);", "u(IN := b, PT := T#1s);"
+    for statements, named in ((f"{calls[0]} x := t.Q; {calls[1]} y := t.Q;", ["t.Q"]),
+                              (f"{calls[0]} {calls[1]} x := t.Q; y := u.Q;", [])):  # fmt: skip
+        made = export_xml([Source("Main.st", text.format(statements))])
+        assert [element.text.strip() for element in document(made).walk() if element.name == "expression"
+                and element.text.strip() in ("t.Q", "u.Q")] == named  # fmt: skip
