@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -15,7 +17,7 @@ from fbvm.campaign.judge import NEVER, Failure
 from fbvm.campaign.plan import EXACT, REAL, Axis, FaultRule, Moments, Plan, PowerRule
 from fbvm.campaign.plan_file import Written, any_faults, read_plan_file
 from fbvm.campaign.shrinking import Part, least, shrink
-from fbvm.campaign.variants import STEP_NS, Cut, NamedFault, Variant, draw
+from fbvm.campaign.variants import STEP_NS, Cut, NamedFault, Variant, _moments, draw
 from fbvm.net.faults import NAMED
 from fbvm.run.project import Project
 
@@ -50,6 +52,17 @@ def test_faults_and_cuts_come_when_their_rules_say_and_as_often() -> None:
     cuts = draw(plan(1, cuts=(PowerRule(Moments((0, 9 * S), (S, S), 5), ("pump",), True),)), 0).cuts
     assert [cut.at_ns for cut in cuts] == sorted(cut.at_ns for cut in cuts)
     assert {(cut.plc, cut.off_ns, cut.is_cold) for cut in cuts} == {("pump", S, True)}
+
+
+@pytest.mark.parametrize("chance", [1, 7, 100])
+def test_a_chance_is_so_many_of_a_hundred_draws(chance: int) -> None:
+    class Dice(Random):
+        draws = count()
+
+        def randrange(self, start: int, *_: object) -> int:  # type: ignore[override]
+            return next(self.draws) % 100 if start == 100 else 0
+
+    assert len([*_moments(Dice(), Moments((0, 0), (0, 0), 300, chance))]) == 3 * chance
 
 
 @pytest.mark.parametrize(("written", "values"), [
