@@ -1,7 +1,8 @@
 """The function of Python that a body becomes, its blocks, and what they hold in local variables.
 
-`p3_Main(b1)` is the body of number 3 for the instance at byte b1; `own3[b1]` are the views that begin with this instance.  Loops
-and blocks nested deeper than Python allows become functions inside the body; what leaves them is a return code."""
+`p3_Main(b1, n)` is the body of number 3 for the instance at byte b1 with n steps left, and returns how many are left then;
+`own3[b1]` are the views that begin with this instance.  Loops and blocks nested deeper than Python allows become functions inside
+the body; what leaves them is a return code."""
 
 from __future__ import annotations
 
@@ -12,11 +13,10 @@ from typing import Any
 from fbvm.base.areas import BUDGET
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import Address, Block, Node
-from fbvm.code.shapes import is_address, statements
 from fbvm.engine.effects import STORES, Effects
 from fbvm.engine.observation import NO_SITE
 from fbvm.engine.python.expressions import ROWS
-from fbvm.engine.python.held import Held, full_range
+from fbvm.engine.python.held import Held, full_range, has_reference
 from fbvm.engine.python.writer import Expressions, bare, view
 from fbvm.engine.ranges import Range, may_trap
 
@@ -24,6 +24,8 @@ MOST_INDENTS = 60
 """Levels of indentation in one function of Python, which takes 100."""
 EXIT, NEXT, RETURN = 1, 2, 3
 """What an outlined block returns if it is left early."""
+IN_MEMORY = f"i64[{BUDGET // 8}]"
+"""The step budget in the memory."""
 STORING = {*STORES, "call"} - {"store"}
 """Statements that may change what is held; a store sees to that itself."""
 LEAVES = {EXIT: "exit", NEXT: "next", RETURN: "return"}
@@ -37,8 +39,9 @@ def function_name(number: int, body: Body) -> str:
 class BodyWriter(Expressions):
     """Writes one body of the plain build, which drops observations.
 
-    `tail` is the tail of the innermost loop of the current function, None outside of any.  `holds_budget` is True for a body
-    whose variable n has the step budget, too, so that a charge need not read it from memory; `held` is what else is held."""
+    `tail` is the tail of the innermost loop of the current function, None outside of any.  `budget` is where the step budget is:
+    handed from body to body in the variable n, and written to the memory at the end of the run, or, in bodies that could find it
+    there by references, and in other builds, in the memory.  `held` is what else is held."""
 
     may_hold = True
     """Whether nobody changes the memory while a body is executed."""
@@ -54,7 +57,7 @@ class BodyWriter(Expressions):
         self.indent = 1
         self.loops = 0
         self.tail: Block | None = None
-        self.holds_budget = False
+        self.budget = IN_MEMORY
         self.outlined = False
         self.leaves: set[int] = set()
         self.assigned: set[int] = set()
@@ -69,15 +72,13 @@ class BodyWriter(Expressions):
         self.base = low if low == high >= 0 else None
         places = (low, high + body.instance_size) if high >= 0 else None
         self.held = Held(body.code if self.may_hold else (), self.effects, self.base, places)
-        if self.may_hold:
-            self.holds_budget = _may_hold_budget(body)
-        else:
+        if not self.may_hold:
             self.held.state = None
+        elif not has_reference(body.code):
+            self.budget = "n"
         self.block(body.code)
-        self.flush()
-        lines = [f"def {function_name(number, body)}(b1):"]
-        if self.holds_budget:
-            lines.append(f"    n = i64[{BUDGET // 8}]")
+        self.line(self.returning())
+        lines = self.head(function_name(number, body))
         if self.own:
             names = [f"{view(machine)}s" for machine in sorted(self.own)]
             lines.append(f"    {', '.join(names)}{',' * (len(names) == 1)} = own{number}[b1]")
@@ -119,6 +120,14 @@ class BodyWriter(Expressions):
 
     # --- what other builds do otherwise
 
+    def head(self, name: str) -> list[str]:
+        """The first lines of the function of a body."""
+        return [f"def {name}(b1, n):"] if self.budget == "n" else [f"def {name}(b1, steps):", f"    {IN_MEMORY} = steps"]
+
+    def returning(self) -> str:
+        """The last line of the function of a body, and that of a RETURN."""
+        return f"return {self.budget}"
+
     def ended(self, lines: list[str]) -> list[str]:
         """The lines of a function, one at least."""
         return [*lines, "    pass"] if _empty(lines) else lines
@@ -129,7 +138,7 @@ class BodyWriter(Expressions):
 
     def call_body(self, pou: int, address: Address | None, place: str) -> None:
         """Writes the call of the body of number `pou`, whose instance begins at `address`; `place` is Python for that byte."""
-        self.line(f"{self.function(pou)}({place})")
+        self.line(f"{self.budget} = {self.function(pou)}({place}, {self.budget})")
 
     def observe(self, kind: str, site: int, detail: Any) -> None:
         """Writes an observation."""
@@ -183,12 +192,11 @@ class BodyWriter(Expressions):
         name, lines, leaves, assigned = self.name("o"), self.out, self.leaves, self.assigned
         self.out, self.indent, self.loops, self.tail, self.outlined, self.leaves, self.assigned = outer
         self.shared |= assigned
-        shared = [f"    nonlocal {', '.join(f't{number}' for number in sorted(assigned))}"] if assigned else []
+        names = [f"t{number}" for number in sorted(assigned)] + ["n"] * (self.budget == "n")
+        shared = [f"    nonlocal {', '.join(names)}"] if names else []
         self.routines.append([f"def {name}():", *shared, *self.ended(lines)])
         call = self.calling(f"{name}()")
         self.line(f"r = {call}" if leaves else call)
-        if self.holds_budget and not self.outlined:
-            self.line(f"n = i64[{BUDGET // 8}]")
         for key in self.held.leave(around):  # what a loop around holds
             self.line(f"{self.held.name(key)} = {self.item((key[1], key[2], ()), key[0])}")
         for code in sorted(leaves):
@@ -224,16 +232,6 @@ class BodyWriter(Expressions):
             self.line("else:")
             self.suite(lambda: self.block(otherwise))
         held.meet([*ends, held.state])
-
-
-def _may_hold_budget(body: Body) -> bool:
-    """True for a body with several charges, but no calls and no stores behind references, which might change the budget."""
-    nodes = list(statements(body.code))
-    return sum(node[0] == "charge" for node in nodes) > 1 and not any(map(_may_change_budget, nodes))
-
-
-def _may_change_budget(node: Node) -> bool:
-    return node[0] in ("call", "mark") or any(is_address(part) and isinstance(part[0], tuple) for part in node[1:3])
 
 
 def _empty(lines: list[str]) -> bool:

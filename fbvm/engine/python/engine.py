@@ -17,7 +17,7 @@ from types import CodeType
 from typing import Any
 from weakref import finalize
 
-from fbvm.base.areas import MOST_FRAMES
+from fbvm.base.areas import BUDGET, MOST_FRAMES
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image, ProgramRun
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
@@ -152,6 +152,7 @@ class PythonEngine:
         if memory.size < image.layout.size:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.observed = image, memory, observed
+        self._system = memory.views["i64"]
         self.counted = [0] * image.counters
         self.marks = bytearray(UNMARKED * image.marks)
         """The notes of power of an image that has them."""
@@ -182,7 +183,7 @@ class PythonEngine:
         for number, function in self.substitutes.items():
             body = self.image.bodies[number]
             names[function_name(number, body)] = log.reporting(function, body) if log else \
-                reporting(function, body) if program.build is Build.STEPPED else function  # fmt: skip
+                reporting(function, body) if program.build is Build.STEPPED else _counting(function, self._system)  # fmt: skip
         sys.setrecursionlimit(max(sys.getrecursionlimit(), program.frames + FRAMES_TO_SPARE))
         return [names[function_name(number, body)] for number, body in enumerate(self.image.bodies)]
 
@@ -234,26 +235,37 @@ class PythonEngine:
         finally:
             self._spaces.pop()
 
-    def _run(self, calls: list[tuple[Callable[[int], Any], int]]) -> Trap | None:
+    def _run(self, calls: list[tuple[Callable[..., Any], int]]) -> Trap | None:
+        left = self._system[BUDGET // 8]
         try:
             for body, base in calls:
-                body(base)
+                if self._log:
+                    body(base)
+                else:
+                    left = body(base, left)
         except Stop as stop:
-            return trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
+            instance, known = self._stopped(stop)
+            if known is not None:
+                self._system[BUDGET // 8] = known
+            return trap(self.image, stop.code, stop.site, stop.values, instance)
         finally:
             if self._log:
                 self._log.entries.clear()
+        if not self._log:
+            self._system[BUDGET // 8] = left
         return None
 
-    def _instance_of(self, stop: Stop) -> int:
-        """Where the instance begins whose body was stopped: that of the innermost body among the Python frames."""
-        found, at = NO_INSTANCE, stop.__traceback__
+    def _stopped(self, stop: Stop) -> tuple[int, int | None]:
+        """Where the instance begins whose body was stopped, that of the innermost body among the Python frames, and how many
+        steps were left then, None if the memory says that."""
+        found, left, at = NO_INSTANCE, None, stop.__traceback__
         while at is not None:
             number = self._numbers.get(at.tb_frame.f_code.co_name)
             if number is not None:
-                found = NO_INSTANCE if self.image.bodies[number].kind == "FUNCTION" else at.tb_frame.f_locals["b1"]
+                names = at.tb_frame.f_locals
+                found, left = NO_INSTANCE if self.image.bodies[number].kind == "FUNCTION" else names["b1"], names.get("n")
             at = at.tb_next
-        return found
+        return found, left
 
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         """Executes a task step by step: a generator of observations, which returns what `run` returns.
@@ -296,7 +308,7 @@ class PythonEngine:
             self.counted[:] = counted
             return (yield from self._told_in_part(log, task_index))
         except Stop as stop:
-            found = trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
+            found = trap(self.image, stop.code, stop.site, stop.values, self._stopped(stop)[0])
         except Exception as error:
             failure = error
         finally:
@@ -340,9 +352,20 @@ class PythonEngine:
                 yield from bodies[run.body](run.offset)
                 yield Observation("return", NO_SITE, (run.body, run.offset))
         except Stop as stop:
-            return trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
+            return trap(self.image, stop.code, stop.site, stop.values, self._stopped(stop)[0])
         return None
 
+
+
+def _counting(function: Callable[[int], None], system: memoryview) -> Callable[[int, int], int]:
+    """A Python function in place of a body of the plain build, which finds the steps that are left in the memory."""
+
+    def counted(base: int, left: int) -> int:
+        system[BUDGET // 8] = left
+        function(base)
+        return system[BUDGET // 8]
+
+    return counted
 
 
 def _ask(names: dict[str, Any], allowance: Allowance, left: int, site: int) -> None:

@@ -205,6 +205,13 @@ def loads(code: Block) -> Iterator[tuple[str, Address]]:
             yield from _loads(node[1:] if not blocks(node) else _operands(node))
 
 
+def has_reference(item: Any) -> bool:
+    """True if something is reached by a reference in a piece of code."""
+    if not isinstance(item, tuple) or not item:
+        return False
+    return (item[0] == "ref" and isinstance(item[1], tuple)) or any(map(has_reference, item))
+
+
 def _operands(node: Node) -> tuple[Any, ...]:
     """What a statement with blocks evaluates."""
     return tuple(condition for condition, _ in node[1]) if node[0] == "if" else (node[2],) if node[0] == "case" else ()

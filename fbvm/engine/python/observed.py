@@ -18,6 +18,12 @@ class ObservedWriter(PlainWriter):
 
     may_hold = False
 
+    def head(self, name: str) -> list[str]:
+        return [f"def {name}(b1):"]
+
+    def returning(self) -> str:
+        return "return"
+
     def block(self, block: Block) -> None:
         nodes: list[Node | None] = [*block, None]
         for number, node in enumerate(block):

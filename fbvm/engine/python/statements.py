@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fbvm.base.areas import BUDGET, DUE
+from fbvm.base.areas import DUE
 from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Block, Node
 from fbvm.engine.case_tables import case_table, single_values
-from fbvm.engine.python.bodies import EXIT, MOST_INDENTS, NEXT, RETURN, BodyWriter
+from fbvm.engine.python.bodies import EXIT, IN_MEMORY, MOST_INDENTS, NEXT, RETURN, BodyWriter
 from fbvm.engine.python.expressions import flag_operands
 from fbvm.engine.python.writer import bare, plus, view
 from fbvm.engine.ranges import may_trap
@@ -228,7 +228,7 @@ def _return(w: BodyWriter) -> None:
     if w.outlined:
         w.leave(RETURN)
     else:
-        w.line("return")
+        w.line(w.returning())
         w.held.state = None
 
 
@@ -237,9 +237,13 @@ def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
 
 
 def _charge(w: BodyWriter, count: int, site: int) -> None:
-    held = "n" if w.holds_budget and not w.outlined else f"i64[{BUDGET // 8}]"
-    w.line(f"i64[{BUDGET // 8}] = n = {held} - {count}")
-    w.line(f"if n < least: ask(n, {site})")
+    name = w.budget
+    if name == IN_MEMORY:
+        name = "steps"
+        w.line(f"{IN_MEMORY} = steps = {IN_MEMORY} - {count}")
+    else:
+        w.line(f"{name} = {name} - {count}")
+    w.line(f"if {name} < least: ask({name}, {site})")
 
 
 def _due(w: BodyWriter, a: Node) -> None:
@@ -255,7 +259,7 @@ def _mark(w: BodyWriter, number: int, rows: tuple[int, ...], a: Node) -> None:
     index = str(number)
     if rows:
         low, size, count, marks = rows
-        index = f"{number} + {marks} * (n if 0 <= (n := ({w.place(('self', 0, ()), 1)} - {low}) // {size}) < {count} else 0)"
+        index = f"{number} + {marks} * (m if 0 <= (m := ({w.place(('self', 0, ()), 1)} - {low}) // {size}) < {count} else 0)"
     w.line(f"marks[{index}] = {bare(w.value(a))}")
 
 

@@ -132,6 +132,30 @@ def test_a_real_is_held_as_the_memory_rounds_it() -> None:
     assert rig.slot("f32", 16) == 6.0
 
 
+def test_the_steps_that_are_left_are_in_the_memory_behind_a_run_and_a_trap() -> None:
+    index = ("check", "i64", ("convert", "i64", "i16", X), 0, 1, "R0102", 3)
+    inner = (("charge", 5, 1), ("store", "u8", at(8, (1, index)), const("u8", 1)), ("charge", 7, 2))
+    code = (("charge", 2, 1), ("call", 1, None), ("charge", 3, 1))
+    for before, wanted in ((b"\1\0", 83), (b"\2\0", 93)):
+        assert execute(code, inner, before={0: before}, budget=100).memory.read(BUDGET, "i64") == wanted
+
+
+def test_steps_are_counted_where_a_reference_may_find_them() -> None:
+    budget = ("load_raw", "i64", behind(const("ref", 1 << 40 | BUDGET << 8 | 255)))
+    inner = (("charge", 5, 1), ("store", "i64", at(8), budget))
+    rig = execute((("charge", 2, 1), ("call", 1, None), ("charge", 3, 1)), inner, budget=100)
+    assert (rig.slot("i64", 8), rig.memory.read(BUDGET, "i64")) == (93, 90)
+
+
+def test_a_function_of_python_finds_the_steps_in_the_memory() -> None:
+    program = image((("charge", 2, 1), ("call", 1, None), ("charge", 3, 1)), (("charge", 50, 1),))
+    engine = PythonEngine(program, memory := power_on(program, budget=100))
+    found = []
+    engine.substitute(1, lambda base: found.append(memory.read(BUDGET, "i64")))
+    assert engine.run(0) is None
+    assert (found, memory.read(BUDGET, "i64")) == ([98], 95)
+
+
 class Maker:
     """Makes code over a few bytes in which all types overlap."""
 
