@@ -16,7 +16,7 @@ from fbvm.code.operations import Address, Block, Node
 from fbvm.engine.effects import STORES, Effects
 from fbvm.engine.observation import NO_SITE
 from fbvm.engine.python.expressions import ROWS
-from fbvm.engine.python.held import Held, full_range, has_reference
+from fbvm.engine.python.held import Held, full_range, uses
 from fbvm.engine.python.writer import Expressions, bare, view
 from fbvm.engine.ranges import Range, may_trap
 
@@ -71,10 +71,11 @@ class BodyWriter(Expressions):
         low, high = self.effects.bases.get(number, (-1, -1))
         self.base = low if low == high >= 0 else None
         places = (low, high + body.instance_size) if high >= 0 else None
-        self.held = Held(body.code if self.may_hold else (), self.effects, self.base, places)
+        loads, references = uses(body.code) if self.may_hold else ([], True)
+        self.held = Held(loads, self.effects, self.base, places)
         if not self.may_hold:
             self.held.state = None
-        elif not has_reference(body.code):
+        elif not references:
             self.budget = "n"
         self.block(body.code)
         self.line(self.returning())

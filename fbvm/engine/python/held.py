@@ -8,13 +8,13 @@ Of integers the least and greatest value are known, too, so that wraps and check
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.base.arithmetic import limits
 from fbvm.code.operations import INTEGERS, SIZES, Address, Block, Node
-from fbvm.code.shapes import blocks, is_address, statements
+from fbvm.code.shapes import statements
 from fbvm.engine.effects import Effects, Spans, located
 from fbvm.engine.python.writer import view
 from fbvm.engine.ranges import Range, RangeOf
@@ -37,16 +37,16 @@ def full_range(machine: str) -> Range | None:
 class Held:
     """What is held while one body is written.
 
-    `state` is None where nothing is to be held, as behind a RETURN.  `instance` is the byte at which the body's only instance
-    begins, if it is known, and `instances` are the bytes between which all lie, None if that is unknown.  `must` are the values
-    that a loop around holds, which every store has to keep up to date."""
+    `loads` are those of the body.  `state` is None where nothing is to be held, as behind a RETURN.  `instance` is the byte at
+    which the body's only instance begins, if it is known, and `instances` are the bytes between which all lie, None if that is
+    unknown.  `must` are the values that a loop around holds, which every store has to keep up to date."""
 
-    def __init__(self, code: Block, effects: Effects, instance: int | None, instances: Range | None) -> None:
+    def __init__(self, loads: Iterable[Node], effects: Effects, instance: int | None, instances: Range | None) -> None:
         self.state: State | None = {}
         self.must: frozenset[Key] = frozenset()
         self.exits: list[list[State | None]] = []
         self._effects, self._instance, self._instances = effects, instance, instances
-        self._loads = Counter(self.key(machine, address) for machine, address in loads(code))
+        self._loads = Counter(self.key(machine, address) for _, machine, address in loads)
         self._names: dict[Key, str] = {}
         self._slots: defaultdict[tuple[str, int], list[Key]] = defaultdict(list)
 
@@ -198,28 +198,17 @@ def _around(ranges: list[Range | None]) -> Range | None:
     return (min(low for low, _ in known), max(high for _, high in known)) if known else None
 
 
-def loads(code: Block) -> Iterator[tuple[str, Address]]:
-    """Machine type and address of each load of a body, once for each place where it stands."""
-    for node in statements(code):
-        if node[0] != "observe":
-            yield from _loads(node[1:] if not blocks(node) else _operands(node))
-
-
-def has_reference(item: Any) -> bool:
-    """True if something is reached by a reference in a piece of code."""
-    if not isinstance(item, tuple) or not item:
-        return False
-    return (item[0] == "ref" and isinstance(item[1], tuple)) or any(map(has_reference, item))
-
-
-def _operands(node: Node) -> tuple[Any, ...]:
-    """What a statement with blocks evaluates."""
-    return tuple(condition for condition, _ in node[1]) if node[0] == "if" else (node[2],) if node[0] == "case" else ()
-
-
-def _loads(parts: tuple[Any, ...]) -> Iterator[tuple[str, Address]]:
-    for part in parts:
-        if isinstance(part, tuple) and part:
-            if part[0] == "load" and len(part) == 3 and is_address(part[2]):
-                yield part[1], part[2]
-            yield from _loads(part)
+def uses(code: Block) -> tuple[list[Node], bool]:
+    """The loads of a body, once for each place where they stand, and whether it reaches something by a reference."""
+    found: list[Node] = []
+    references = False
+    rest: list[tuple[Any, ...]] = [code]
+    while rest:
+        for part in rest.pop():
+            if part.__class__ is tuple and part and part[0] != "observe":
+                if part[0] == "load":
+                    found.append(part)
+                elif part[0] == "ref" and part[1].__class__ is tuple:
+                    references = True
+                rest.append(part)
+    return found, references
