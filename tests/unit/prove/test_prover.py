@@ -60,6 +60,7 @@ def test_the_shortest_run_that_breaks_a_property_is_found_and_simple() -> None:
     assert verdict.run is not None
     writes = [{place.name: value for place, value in scan.items()} for scan in verdict.run.writes]
     assert (verdict.word, writes) == ("broken", [{"Main.In": True}, {}, {}, {}, {}])
+    assert verdict.how == "after 5 scans, by the shortest run"
 
 
 def test_reach_finds_the_shortest_inputs() -> None:

@@ -400,6 +400,17 @@ def test_an_input_came_from_outside() -> None:
     assert "Start is FALSE, written after the last scan" in pump.explain()
 
 
+def test_pins_are_told_of_the_blocks_that_were_read_and_of_nothing_else() -> None:
+    """Not of the block under test, nor of what a global variable or an address belongs to."""
+    block = rig("Gate", "VAR_GLOBAL Open : BOOL := TRUE; END_VAR\nFUNCTION_BLOCK Gate VAR_INPUT Go : BOOL; END_VAR "
+                "VAR_OUTPUT Q : BOOL; END_VAR VAR Edge : R_TRIG; END_VAR\nEdge(CLK := Go);\n"
+                "Q := Go AND Open AND NOT %IX7.0 OR Edge.Q;\nEND_FUNCTION_BLOCK\n")  # fmt: skip
+    block.scan(Go=True)
+    assert block.Q
+    told = [line for line in block.explain().splitlines() if ": " in line and " with " in line and "test.st" not in line]
+    assert told == ["Edge: R_TRIG with CLK = TRUE, Q = TRUE"]
+
+
 def test_stubs_are_not_called_again() -> None:
     calls = []
 
