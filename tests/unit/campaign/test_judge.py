@@ -8,8 +8,8 @@ from fbvm import Plc, compile_text
 from fbvm.base.diagnostics import Source
 from fbvm.campaign.execution import Result
 from fbvm.campaign.executors import LIMIT_NS
-from fbvm.campaign.judge import CRASHED, WITHIN, Failure, Judge
-from fbvm.campaign.plan import Judging, Plan, Response
+from fbvm.campaign.judge import CRASHED, GOLDEN, WITHIN, Failure, Judge
+from fbvm.campaign.plan import Golden, Judging, Plan, Response
 from fbvm.campaign.processes import Crashed, Late
 from fbvm.campaign.runs import Outcome, ended
 from fbvm.campaign.store import columns, rows
@@ -43,6 +43,22 @@ def test_an_answer_is_awaited_from_its_trigger_on() -> None:
     assert judged("", "Asked", "", "", "") == [None] * 4 + [late]
     assert judged("Asked", "", "Asked", "") == [None] * 3 + [late], "who asks again waits since the first time"
     assert judged("Asked", "Asked Told", *["Asked"] * 4) == [None] * 6, "a trigger that stays asks once"
+
+
+def test_a_run_that_is_not_as_its_golden_trace_has_failed_when_it_is_over() -> None:
+    image = compile_text(TEXT).image
+    assert image is not None
+    found = []
+    for asked in (False, True):
+        plc = Plc(image)
+        golden = Golden("asked.txt", "main", ("Main.Asked",), "scans 0 to 1\n\nMain.Asked\n  scan 0      0s        FALSE\n")
+        judge = Judge(Judging(goldens=(golden,)), {"main": SimpleNamespace(plc=plc, reason="")}, True)  # type: ignore[dict-item]
+        plc.scan()
+        plc.write("Main.Asked", asked)
+        plc.scan()
+        found.append(judge.ended())
+    assert found[0] is None
+    assert found[1] is not None and (found[1].kind, found[1].text, found[1].scan) == (GOLDEN, "asked.txt: Main.Asked", 1)
 
 
 def outcome(*results: Result) -> Outcome:
