@@ -46,3 +46,9 @@ def test_a_chart_shows_them() -> None:
         CIO1509.03  ...      TCP Closing Flag
         D30027      0|8720   Response Code
     """
+
+
+@each_of(("code", "said"), [(0x0000, "normal end"), (0x2211, "unit busy"), (0x0045, "ECONNABORTED")])
+def test_response_codes_have_words_also_those_that_no_emulated_unit_ends_with(code: int, said: str) -> None:
+    """W421 6-9 lists them; a recorded real unit may have them."""
+    assert said in Etn21().meanings["D30027"][code]
