@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 from fbvm.base.memory import Snapshot
 from fbvm.processor.contract import Contract
@@ -245,3 +245,25 @@ class FinsUnit(Unit, Protocol):
         """Takes a command of a network instruction, which the next `serve` sends from the unit's node.
 
         Returns an end code, 0000 if it is taken."""
+
+
+_KINDS: dict[type, tuple[bool, bool]] = {}
+"""For each class of units whether it has a processor of its own and whether it serves FINS: Python looks up every name of a
+protocol to find out, which takes longer than all else that attaching a unit takes."""
+
+
+def _kind(unit: Unit) -> tuple[bool, bool]:
+    kind = _KINDS.get(type(unit))
+    if kind is None:
+        kind = _KINDS[type(unit)] = isinstance(unit, ProcessorUnit), isinstance(unit, FinsUnit)
+    return kind
+
+
+def has_processor(unit: Unit) -> TypeGuard[ProcessorUnit]:
+    """True for a unit with a processor of its own, switched on or not; units of one class are alike in this."""
+    return _kind(unit)[0]
+
+
+def serves_fins(unit: Unit) -> TypeGuard[FinsUnit]:
+    """True for a unit that can serve FINS; units of one class are alike in this."""
+    return _kind(unit)[1]

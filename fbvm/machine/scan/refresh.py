@@ -9,7 +9,7 @@ from functools import cached_property
 from fbvm.base.memory import Memory
 from fbvm.machine.scan.inputs import InputRecorder
 from fbvm.net.journal import Journal
-from fbvm.units.contract import ProcessorUnit, Unit
+from fbvm.units.contract import ProcessorUnit, Unit, has_processor
 from fbvm.wire.link import Link, Network, Request
 
 
@@ -24,7 +24,7 @@ class Attached:
     @cached_property
     def own(self) -> ProcessorUnit | None:
         """The unit, if it has a processor of its own, switched on or not; None for any other."""
-        return self.unit if isinstance(self.unit, ProcessorUnit) else None
+        return self.unit if has_processor(self.unit) else None
 
 
 class IORefresh:

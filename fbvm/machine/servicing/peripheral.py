@@ -14,7 +14,7 @@ from fbvm.machine.servicing.clock_setting import clock_setting_of
 from fbvm.machine.servicing.cpu import Machine
 from fbvm.machine.servicing.ports import ports_of
 from fbvm.machine.servicing.registers import Registers
-from fbvm.units.contract import FinsAccess, FinsUnit
+from fbvm.units.contract import FinsAccess, FinsUnit, serves_fins
 from fbvm.wire.fins.codes import EndCode
 from fbvm.wire.fins.frames import CPU_UNIT, Command, Response
 
@@ -37,7 +37,7 @@ class PeripheralServicing:
         `serve`."""
         if self._known != self._machine.units:
             self._known = list(self._machine.units)
-            self._units = [(row.unit, row) for row in self._known if isinstance(row.unit, FinsUnit) and row.unit.has_fins]
+            self._units = [(row.unit, row) for row in self._known if serves_fins(row.unit) and row.unit.has_fins]
         return bool(self._units) or self._ports is not None or self._setting is not None
 
     @property
