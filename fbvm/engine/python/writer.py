@@ -73,13 +73,15 @@ class Expressions:
 
     `constants` are objects by the names under which generated code finds them; `base` is the byte at which the body's only
     instance begins, None if there are several or that is unknown.  Known afterwards: `own`, the types of the views of its
-    instance that the code uses, and `routines`, functions that the body has to define."""
+    instance that the code uses, `views`, the names of those of the whole memory, and `routines`, functions that the body has to
+    define."""
 
     def __init__(self, rows: Rows, constants: dict[str, Any]) -> None:
         self.rows = rows
         self.constants = constants
         self.base: int | None = None
         self.own: set[str] = set()
+        self.views: set[str] = set()
         self.routines: list[list[str]] = []
         self.perhaps = 0
         """How many parts of expressions around may stay unevaluated."""
@@ -220,6 +222,8 @@ class Expressions:
             return view(machine), f"{self.place(address, size)} >> {size.bit_length() - 1}"
         if base == "self":
             self.own.add(machine)
+        else:
+            self.views.add(view(machine))
         return f"{view(machine)}{'s' * (base == 'self')}", bare(self._sum("", offset // size, [(s // size, t) for s, t in terms]))
 
     def item(self, address: Address, machine: str) -> str:
