@@ -6,7 +6,17 @@ import pytest
 from rows import each_of
 
 from fbvm.net.loop import LoopNetwork
-from fbvm.net.misdeeds import FLOOD_BYTES, LATE_NS, MISDEEDS, NEXT_NS, RUDE_PEERS, RudePeer, by_script, by_seed
+from fbvm.net.misdeeds import (
+    FLOOD_BYTES,
+    LATE_NS,
+    MISDEEDS,
+    NEXT_NS,
+    RUDE_PEERS,
+    RudePeer,
+    _next_exception,
+    by_script,
+    by_seed,
+)
 from fbvm.net.peers import ModbusPeer, Say
 from fbvm.wire import modbus
 from fbvm.wire.link import Broken, Connect, Event, Grant, Opened, Peer, PeerClosed, Received, Send, Sent
@@ -220,3 +230,9 @@ def test_misdeeds_by_script_and_by_seed() -> None:
     assert told(1, 0.5) == told(1, 0.5) != told(2, 0.5)
     assert told(1, 0) == [[Say(frame)]] * 40
     assert [Say(frame)] not in told(1, 1)
+
+
+def test_an_exception_that_nobody_has_asked_for_is_one_of_the_same_function() -> None:
+    """Of the request behind this one, by its transaction."""
+    frame = Adu(0x1FF, 17, modbus.data_reply(3, b"\1\2")).to_bytes()
+    assert _next_exception(frame) == Adu(0x200, 17, modbus.exception_reply(3, 2)).to_bytes()

@@ -616,6 +616,8 @@ def test_a_link_is_quiet_only_while_somebody_keeps_an_eye_on_the_host(network: T
     assert (link.events(now_ns()), link.is_quiet) == ([], False)
     network.driven = True
     assert (link.events(now_ns()), link.is_quiet) == ([], True)
+    refreshes = link.refreshes
+    assert (link.events(now_ns()), link.refreshes) == ((), refreshes + 1), "a refresh without events counts, too"
     link.submit([Grant(1, 50)], now_ns())
     assert (link.is_quiet, list(link.events(now_ns()))) == (True, [])
     link.submit([Send(1, b"x")], now_ns())
@@ -653,5 +655,18 @@ def test_why_a_port_cannot_be_used_is_said_in_words() -> None:
 
 def test_the_selector_is_closed_with_the_network() -> None:
     network = TcpNetwork()
+    network.attach(UNIT)
     network.close()
     assert network._selector.get_map() is None
+    assert network.links == {}
+
+
+def test_a_door_at_every_address_is_known_by_that_of_this_host() -> None:
+    network = TcpNetwork()
+    network.own("tcp", Peer("0.0.0.0", 5000), SERVER)
+    network.own("tcp", Peer("127.0.0.2", 5001), SERVER)
+    assert [network.inward("tcp", Peer(host, port)) == SERVER for host, port in (
+        ("127.0.0.1", 5000), ("127.0.0.2", 5001), ("127.0.0.1", 5001))] == [True, True, False]  # fmt: skip
+    network.own("tcp", Peer("0.0.0.0", 5000), None)
+    assert network.inward("tcp", Peer("127.0.0.1", 5000)) != SERVER
+    network.close()

@@ -20,6 +20,8 @@ def lit(front: Front) -> list[str]:
 def test_an_etn21_shows_its_dials_and_what_its_socket_does() -> None:
     rig = Rig(Etn21(12, "192.168.250.172"))
     assert rig.unit.front(rig.memory).settings == (("UNIT No.", "C"), ("NODE No.", "AC"))
+    rig = Rig(Etn21(0, "192.168.250.172", fins=True, fins_node=7))
+    assert rig.unit.front(rig.memory).settings == (("UNIT No.", "0"), ("NODE No.", "07"))
     rig = Rig()
     assert (lit(rig.unit.front(rig.memory)), rig.unit.front(rig.memory).sockets) == (["RUN", "LNK"], ())
     rig.parameters()
