@@ -18,7 +18,7 @@ from typing import Any, Protocol, TextIO
 
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.base.memory import Memory, compare
-from fbvm.wire.link import Broken, Closed, Event, Failed, Opened, Peer, PeerClosed, Received, Sent
+from fbvm.wire.link import Broken, Closed, Event, Failed, Opened, Peer, PeerClosed, Received, Sent, read_peer
 
 FORMAT = 1
 """The version of the format that this module writes and reads."""
@@ -321,7 +321,7 @@ def to_event(told: list[Any]) -> Event:
 @lru_cache
 def _peer(text: str) -> Peer:
     host, _, port = text.rpartition(":")
-    return Peer(host, int(port))
+    return read_peer(host, int(port))
 
 
 _READ: dict[str, Callable[[Any], Any]] = {"int": int, "str": str, "bytes": bytes.fromhex, "Peer": _peer}

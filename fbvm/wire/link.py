@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from ipaddress import IPv4Address
 from typing import Protocol
 
 
@@ -24,6 +25,13 @@ class Peer:
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"
+
+
+def read_peer(host: object, port: object) -> Peer:
+    """An endpoint as a file has it.  Raises ValueError for another one."""
+    if type(port) is not int or not 0 <= port < 1 << 16:
+        raise ValueError(f"{port!r} is no port")
+    return Peer(str(IPv4Address(str(host))), port)
 
 
 # --- requests: unit -> network -------------------------------------------------------------------------------------

@@ -114,6 +114,8 @@ def open_trace(path: Path, plc: str | None = None, libraries: Sequence[Path] = (
             yield source
         except (UnknownPlace, TypeError) as error:
             raise click.UsageError(str(error)) from None
+        except TraceError as error:
+            raise click.UsageError(f"{named(path)}: {error}") from None
 
 
 @contextmanager

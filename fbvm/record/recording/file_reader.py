@@ -141,6 +141,7 @@ class FileRecordedPlc(RecordedPlc):
             """What `trace.description` reads."""
             self.name, self._text = str(self.head["name"]), ProgramText.of(self.head["program"])
             self._substituted = tuple(number(body) for body in self.head["substituted"])
+            self._fingerprint, self._bodies = str(self.head["image"]), list(self.head["bodies"])
             self._engine = "python" if self.head["engine"] == "python" else "auto"
             self.memory_size = describe(_Described(), self.head)
         self._given = images.get(self.name)
@@ -160,11 +161,11 @@ class FileRecordedPlc(RecordedPlc):
             gc.unfreeze()
         if isinstance(found, str):
             return found
-        if found.fingerprint == self.head["image"]:
+        if found.fingerprint == self._fingerprint:
             return found
         here = json.loads(json.dumps(symbols.to_data(found.symbols)))
         if found.layout.size != self.memory_size or any(here[key] != self.head[key] for key in here) or (
-            [[body.name, body.kind] for body in found.bodies] != self.head["bodies"]):  # fmt: skip
+            [[body.name, body.kind] for body in found.bodies] != self._bodies):  # fmt: skip
             return f"its program is another one here; fbvm {self.made_by} made the recording"
         return found
 
@@ -176,7 +177,7 @@ class FileRecordedPlc(RecordedPlc):
     @cached_property
     def is_same(self) -> bool:
         """True if the same version of fbvm executes the same program: then no scan comes out differently."""
-        same = isinstance(self.program, Image) and self.program.fingerprint == self.head["image"]
+        same = isinstance(self.program, Image) and self.program.fingerprint == self._fingerprint
         return same and self.made_by == self.version
 
     @cached_property

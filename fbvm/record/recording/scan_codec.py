@@ -15,7 +15,7 @@ from fbvm.machine.state import State
 from fbvm.net.journal import from_event, to_event
 from fbvm.record.recording.chunks import Chunk, ScanInputs, Times, UnitKeyframe, Write
 from fbvm.record.recording.plain_data import number, parts_of, payload_of
-from fbvm.wire.link import Peer
+from fbvm.wire.link import Peer, read_peer
 from fbvm.wire.tap import TapEvent, TapKind
 
 
@@ -165,4 +165,4 @@ _KINDS = {kind.value: kind for kind in TapKind}
 
 @lru_cache
 def _peer(host: str, port: int) -> Peer:
-    return Peer(str(host), int(port))
+    return read_peer(host, port)

@@ -44,7 +44,7 @@ from fbvm.record.trace.format import (
 )
 from fbvm.record.trace.scan_source import Follower, Moment, ScanSource
 from fbvm.record.trace.writer import FORMAT
-from fbvm.wire.link import Peer
+from fbvm.wire.link import read_peer
 from fbvm.wire.tap import TapEvent, TapKind
 
 
@@ -132,6 +132,7 @@ class Trace(ScanSource):
             player = _Player(self, cursor, memory, follower, part, block.first)
             try:
                 yield from player.play()
+                player.check_end(min(part.stop, self.scans.stop))
             except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError) as error:
                 raise TraceError(f"the block of scan {block.first} is damaged: {error}") from None
 
@@ -173,6 +174,11 @@ class _Player:
                 event = self._event(tag)
                 if self._follower and moment.scans in self._wanted:
                     self._follower.event(moment, event)
+
+    def check_end(self, stop: int) -> None:
+        """Raises ValueError if scans in front of `stop` were missing."""
+        if self._next < stop:
+            raise ValueError(f"scans {self._next} to {stop - 1} are missing")
 
     def _lines(self) -> None:
         """Applies the changes of memory, which include those of recorded writes."""
@@ -234,7 +240,7 @@ class _Player:
 def _passing(text: bytes) -> NetworkEvent:
     try:
         now_ns, what, host, port, other, other_port, out, mirrored, data = json.loads(text)
-        local, remote = Peer(str(host), int(port)), Peer(str(other), int(other_port))
+        local, remote = read_peer(host, port), read_peer(other, other_port)
         return NetworkEvent(int(now_ns), TapEvent(TapKind(what), local, remote, bool(out), bytes.fromhex(data), bool(mirrored)))
     except (ArithmeticError, ValueError, TypeError) as error:
         raise IndexError(f"an event of the network cannot be read: {error}") from None

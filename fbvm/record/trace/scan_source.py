@@ -15,6 +15,7 @@ from fbvm.base.types import Field
 from fbvm.code.image import RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
 from fbvm.record.trace.events import Event, NetworkEvent
+from fbvm.record.trace.format import TraceError
 from fbvm.record.trace.results import Results
 from fbvm.record.trace.writer import Depth
 from fbvm.watch import places
@@ -47,8 +48,12 @@ class Moment:
         return self.source.find(text)
 
     def read(self, where: str | Place | Span) -> Value:
-        """The value of a variable, address or range.  Raises UnknownPlace."""
-        return places.read_found(self.memory, self.find(where) if isinstance(where, str) else where)
+        """The value of a variable, address or range.  Raises UnknownPlace, and TraceError if a reference leads out of memory."""
+        place = self.find(where) if isinstance(where, str) else where
+        try:
+            return places.read_found(self.memory, place)
+        except IndexError as error:
+            raise TraceError(f"the memory of scan {self.scans} is damaged: {error}") from None
 
 
 class ScanSource(ABC):

@@ -377,6 +377,19 @@ def test_data_of_any_form_are_refused_in_words(seed: int) -> None:
 
 
 @pytest.mark.slow
+def test_without_a_part_of_the_description_the_rest_is_read_or_refused_in_words() -> None:
+    whole = blocks(written(scans=3))
+    at, (head, payload) = next((at, row) for at, row in enumerate(whole) if row[0].kind == container.PLC)
+    description = json.loads(payload)
+    said = {}
+    for key in description:
+        less = json.dumps({name: value for name, value in description.items() if name != key}).encode()
+        said[key] = damaged(joined([*whole[:at], (head, less), *whole[at + 1 :]]))
+    assert {key: text for key, text in said.items() if not text.startswith("what the recording tells of a PLC is damaged")} == {
+        key: "" for key in said if key in ("budget", "charts", "format", "objects", "results")}
+
+
+@pytest.mark.slow
 def test_blocks_that_are_much_larger_when_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(container, "LARGEST_BYTES", 1 << 22)
     whole = written(COUNTER, 5, nothing)

@@ -42,7 +42,7 @@ from fbvm.record.trace.selection import select, single_places, symbol_places
 from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.writer import START
 from fbvm.watch.names import Names
-from fbvm.watch.paths import UnknownPlace
+from fbvm.watch.paths import Place, UnknownPlace
 
 # --- values at the end of each scan -----------------------------------------------------------------------------------
 
@@ -328,6 +328,34 @@ def test_scans_with_other_numbers_than_their_block_says_are_told() -> None:
     damaged.seek(0)
     with pytest.raises(TraceError, match="scan 0 stands where scan 1 belongs"):
         list(Trace(damaged).moments())
+
+
+@pytest.mark.parametrize(("scans", "behind", "message"), [
+    (9, 9, "scans 5 to 8 are missing"),
+    (5, 7, "scans 5 to 6 are missing"),
+])
+def test_scans_that_are_missing_are_told(scans: int, behind: int, message: str) -> None:
+    """Charts and tables have a column for each scan."""
+    data = io.BytesIO(record(Plc(image()), 5))
+    data.seek(len(MAGIC))
+    _, block = chunks(data)
+    damaged = io.BytesIO(data.getvalue()[: block.at])
+    damaged.seek(0, io.SEEK_END)
+    write_chunk(damaged, BLOCK, read_chunk(data, block.at), first=0, scans=scans)
+    write_chunk(damaged, BLOCK, b"\0", first=behind, scans=1)
+    damaged.seek(0)
+    with pytest.raises(TraceError, match=message):
+        list(Trace(damaged).moments())
+
+
+def test_a_reference_that_leads_out_of_the_memory_is_told() -> None:
+    plc = Plc(image("PROGRAM Main VAR a : INT; r : REF_TO INT; END_VAR r := REF(a); END_PROGRAM"))
+    moment = Trace(io.BytesIO(record(plc, 2, before=lambda plc: None))).at(1)
+    place = moment.find("Main.r")
+    assert isinstance(place, Place)
+    moment.memory.u8[place.offset : place.offset + 8] = b"\x7f" * 8
+    with pytest.raises(TraceError, match="the memory of scan 1 is damaged"):
+        moment.read("Main.r^")
 
 
 def test_a_damaged_block_is_told() -> None:
