@@ -77,6 +77,8 @@ def _block(block: Block, site: int | None, counters: list[Counter]) -> Block:
             site = node[2]
             out += [node, ("count", len(counters))]
             counters.append(Counter(node[2]))
+        elif not any(map(_has_statement, blocks(node))):  # an IF among them chooses values, such as that of OR_ELSE
+            out.append(node)
         elif node[0] == "if":
             rows = tuple((condition, _branch(inner, site, counters)) for condition, inner in node[1])
             out.append(("if", rows, _branch(node[2], site, counters)))

@@ -97,6 +97,7 @@ END_PROGRAM"""
 @each_of("statements", [
     "IF n = 2 THEN RETURN; END_IF;", "IF n = 1 THEN i := 1; ELSIF n = 3 THEN i := 2; END_IF;",
     "IF n = 2 THEN ; ELSE i := 2; END_IF;",
+    "IF n = 2 OR_ELSE Third(1) > Third(n) THEN i := 1; ELSIF n = 1 AND_THEN Third(2) = 2 THEN i := 2; END_IF;",
     "CASE n OF 1: i := 1; 2, 3: ; END_CASE;", "CASE n OF 1: i := 1; 2: i := 2; ELSE i := 3; END_CASE;",
     "FOR i := 0 TO n DO IF i = 2 THEN EXIT; END_IF; a[1] := i; END_FOR;",
     "WHILE i < n DO i := i + 1; IF i = 1 THEN CONTINUE; END_IF; a[0] := 1; END_WHILE;",
