@@ -49,7 +49,7 @@ async def completion(server: Server, params: types.CompletionParams) -> types.Co
 
 
 def _of_project_file(server: Server, uri: str, position: types.Position) -> list[types.CompletionItem]:
-    source = Source(FILE, server.workspace.get_text_document(uri).source)
+    source = Source(FILE, server.text(uri))
     offset = server.positions(source).offset(position)
     return [types.CompletionItem(label, kind=types.CompletionItemKind.Property, documentation=meaning, insert_text=text)
             for label, meaning, text in project_file.completions(source.text, offset)]

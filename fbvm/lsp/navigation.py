@@ -60,7 +60,7 @@ def declared_location(server: Server, program: Program, declared: Declared) -> t
 async def hover(server: Server, params: types.HoverParams) -> types.Hover | None:
     uri = params.text_document.uri
     if path_of(uri).name == FILE:
-        source = Source(FILE, server.workspace.get_text_document(uri).source)
+        source = Source(FILE, server.text(uri))
         said = project_file.meaning_at(source.text, server.positions(source).offset(params.position))
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
     if foreign.is_container(path_of(uri)):
@@ -78,7 +78,7 @@ async def hover(server: Server, params: types.HoverParams) -> types.Hover | None
 
 def _hover_in_container(server: Server, uri: str, position: types.Position) -> types.Hover | None:
     """What is known about a word of a container: an address, an instruction, a global name."""
-    source = Source("", server.workspace.get_text_document(uri).source)
+    source = Source("", server.text(uri))
     at = server.positions(source).offset(position)
     for project in server.projects.of(path_of(uri)):
         if found := hover_of_word(project.program, source.text, at):

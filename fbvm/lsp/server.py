@@ -63,6 +63,13 @@ class Server(LanguageServer):
         uri = self.open_paths.get(path)
         return self.workspace.get_text_document(uri).source if uri is not None else None
 
+    def text(self, uri: str) -> str:
+        """The text of a file that an editor asks about, open or not; "" for one that cannot be read."""
+        try:
+            return self.workspace.get_text_document(uri).source
+        except (OSError, ValueError):
+            return ""
+
     def uri(self, path: Path) -> str:
         """The URI of a file, as the editor writes it if it has it open; of a source within a container, that of the container."""
         path = foreign.container_of(str(path)) or path

@@ -67,6 +67,15 @@ def test_where_names_are_declared_and_of_what_type(folder: Path) -> None:
     talk(folder, about, "main.st")
 
 
+def test_files_that_are_not_there_are_asked_about(folder: Path) -> None:
+    async def about(desk: Desk) -> None:
+        for name in ("fbvm.toml", "gone/fbvm.toml", "gone.TcPOU", "gone.cxt"):
+            assert await desk.at("hover", name, 3, 4) is None, name
+        assert (await desk.at("completion", "gone/fbvm.toml", 0, 0))["isIncomplete"] is False
+
+    talk(folder, about, "main.st")
+
+
 def test_where_names_are_used(folder: Path) -> None:
     async def about(desk: Desk) -> None:
         for declared, wanted in ((True, [("main.st", 1, 9, 13), PUMP_NAME]), (False, [("main.st", 1, 9, 13)])):
