@@ -48,6 +48,8 @@ from fbvm.watch.paths import Place
 
 SIMULATED_SCANS = 2_000
 """Scans of each random run before the solver is asked."""
+FIRST_SIMULATED = 2_000
+"""Scans of those random runs that come before invariants are guessed: a run that needs more may be looked for in vain."""
 SAMPLED_SCANS = 200
 FIRST_SCANS = 4
 """Scans that are searched before anything is tried that looks back."""
@@ -196,8 +198,9 @@ class Prover:
             self._with_lemmas,
             self._with_copies,
             lambda: self._searched(shallow),
-            self._simulated,
+            lambda: self._simulated(min(FIRST_SIMULATED, self.limits.simulated_scans)),
             lambda: self._with_invariants(FEW_STATE),
+            lambda: self._simulated(self.limits.simulated_scans) if self.limits.simulated_scans > FIRST_SIMULATED else None,
             lambda: self._searched(deeper),
             lambda: self._induced([], self._deepest()),
             lambda: self._with_invariants(MOST_STATE) if has_more else None,
@@ -265,10 +268,10 @@ class Prover:
 
     # --- methods
 
-    def _simulated(self) -> Verdict | None:
-        """Random runs; what they find is made shorter by the solver."""
+    def _simulated(self, scans: int) -> Verdict | None:
+        """Random runs of so many scans; what they find is made shorter by the solver."""
         self.tell("trying random inputs")
-        for found in simulated(self.machine, self.judge, self.inputs, self.limits.simulated_scans, self.limits.seed):
+        for found in simulated(self.machine, self.judge, self.inputs, scans, self.limits.seed):
             if found is not None:
                 self.tell(f"a random run gets there after {_scans(len(found.inputs))}: looking for the shortest")
                 shorter = self._searched(min(len(found.inputs), self.limits.scans))

@@ -18,6 +18,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,11 +28,14 @@ sys.path.insert(0, str(HOUSE))
 from fbvm.code.compiler import compile_files  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
 from fbvm.interchange.plcopen.read.importing import import_xml  # noqa: E402
+from fbvm.machine.plc import STEP_BUDGET  # noqa: E402
 from fbvm.prove.encoding.execution import Refused  # noqa: E402
+from fbvm.prove.encoding.summary import summarize  # noqa: E402
 from fbvm.prove.prover import Limits, SpuriousRun, prove  # noqa: E402
 from fbvm.prove.question import ALWAYS, BROKEN, NEVER, NO_TRAP, PROVED, REACH, REACHED, UNREACHABLE, Question, Verdict  # noqa: E402
 from fbvm.prove.ready import at_most_one  # noqa: E402
 from fbvm.run.time_limit import stopwatch, time_limit  # noqa: E402
+from fbvm.watch.names import Names as PlaceNames  # noqa: E402
 from fbvm.watch.paths import UnknownPlace  # noqa: E402
 from fbvm.watch.scanner import ConditionError  # noqa: E402
 
@@ -89,22 +93,28 @@ class Row(NamedTuple):
 
 def condition(text: str) -> str:
     """A property of the suite as a condition."""
+    before, arrow, behind = re.split(r"(->|\bIMPLIES\b|$)", text, maxsplit=1)
+    if arrow:
+        return f"NOT ({condition(before)}) OR ({condition(behind)})"
     for theirs, ours in SIGNS:
         text = text.replace(theirs, ours)
     return re.sub(r"\s+", " ", text).strip()
 
 
-def question(prop: dict[str, Any], prefix: str) -> Question:
-    """The question that a property of the suite asks.  Raises OutOfScope."""
+def question(prop: dict[str, Any], prefix: str, free: tuple[str, ...]) -> Question:
+    """The question that a property of the suite asks, where these variables are inputs.  Raises OutOfScope."""
+    return replace(_question(prop), prefix=prefix, free=free)
+
+
+def _question(prop: dict[str, Any]) -> Question:
     kind = prop["kind"]
     if kind in ("invariant", "reachability", "reachable"):
         ours = {"invariant": ALWAYS, "reachability": NEVER, "reachable": REACH}[kind]
-        return Question(ours, condition(prop["expression"]), prefix=prefix)
+        return Question(ours, condition(prop["expression"]))
     if kind == "mutual_exclusion":
-        asked = at_most_one([*prop["variables"]])
-        return Question(asked.kind, asked.text, prefix=prefix, title=asked.title)
+        return at_most_one([*prop["variables"]])
     if kind == "termination" or kind == "absence" and prop.get("subtype") not in UNWRITTEN:
-        return Question(NO_TRAP, prefix=prefix)
+        return Question(NO_TRAP)
     raise OutOfScope(UNWRITTEN.get(prop.get("subtype", ""), f"a property of the kind {kind} is not asked here"))
 
 
@@ -127,6 +137,16 @@ def image_of(path: Path, into: Path) -> Image:
     return made.image
 
 
+def undriven(image: Image) -> tuple[str, ...]:
+    """The variables of a program that has no inputs which it reads and never writes: drawings do not say what is an input."""
+    summary = summarize(image, STEP_BUDGET)
+    if summary.inputs:
+        return ()
+    names = PlaceNames.of(image, image.layout.areas)
+    found = [names.at(cell.offset) for cell in sorted(summary.never_written)]
+    return tuple(place.name for place in found if place is not None)
+
+
 def answered(image: Image, asked: Question, seconds: float) -> Verdict:
     """The verdict about one property.  Raises OutOfScope for one that cannot be followed."""
     limits = Limits(scans=40_000, simulated_scans=40_000, expired=time_limit(int(seconds * 1e9)))
@@ -145,8 +165,9 @@ def row_of(folder: Path, task: dict[str, Any], variant: dict[str, Any], properti
         with tempfile.TemporaryDirectory() as into:
             image = image_of(folder / variant["file"], Path(into))
         prefix = f"{image.tasks[0].programs[0].name}."
+        free = undriven(image)
         for prop in properties:
-            verdict = answered(image, question(prop, prefix), seconds)
+            verdict = answered(image, question(prop, prefix, free), seconds)
             is_vacuous = any(mark in note for note in verdict.notes for mark in VACUOUS)
             answers.append(Answer(prop["id"], HOLDS.get(verdict.word), verdict.how, is_vacuous))
     except OutOfScope as error:

@@ -415,3 +415,18 @@ def test_the_type_of_a_moved_literal_is_that_of_the_variable_which_its_sum_reach
     made = imported(pou("".join(moved) + added, variable("a") + variable("b") + variable("n", "INT"), language="FBD"))
     assert made.errors == []
     assert states(made, "n", ["", "a=1", "b=1", "a=0"]) == ["0", "30", "20", "20"]
+
+
+INSTANCES = ('<instances><configurations><configuration name="C"><resource name="R"><task name="t" priority="0" interval="PT0.01S">'
+             '<pouInstance name="i" typeName="Main"/></task></resource></configuration></configurations></instances></project>')
+
+
+def test_an_instance_that_nothing_in_a_whole_project_declares_is_declared() -> None:
+    """Some tools keep the instances of a diagram with its boxes.  POUs alone may belong to a project that has it elsewhere."""
+    drawn = pou(RAIL + contact(2, "1", "a") + value(5, "T#20ms") + block(3, "TON", "IN=2 PT=5", "Q,ET", "late")
+                + coil(4, "3", "x"), "a x")
+    made = import_xml(document(drawn).replace(b"</project>", INSTANCES.encode()))
+    assert codes(made) == ["X0292"]
+    assert "nothing declares late: it becomes a variable of Main of the type TON" in made.diagnostics[0].message
+    assert states(made, "x", ["a=1", "", "", "a=0"]) == ["0", "0", "1", "0"]
+    assert "late : TON" not in imported(drawn).files["Main.st"]

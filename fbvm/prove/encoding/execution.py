@@ -63,6 +63,12 @@ class State:
         """The same state on a path of its own; this one is not written while the child is in use."""
         return State(self.contents.child(), path, dict(self.temporaries), dict(self.known), self.used)
 
+    def is_again(self, ancestor: State) -> bool:
+        """Whether memory, temporaries and path are those of a state that this one descends from."""
+        here, there = self.contents, ancestor.contents
+        return self.path is ancestor.path and self.temporaries == ancestor.temporaries \
+            and all(here.get(cell) is there.get(cell) for cell in here.written_since(there))  # fmt: skip
+
     def join(self, others: list[State], conditions: list[Term]) -> None:
         """Takes over what children hold, each where its condition is TRUE; one of them is."""
         terms = self.contents.terms

@@ -18,6 +18,8 @@ from fbvm.prove.encoding.terms import Term
 
 MOST_SYMBOLIC_ROUNDS = 260
 """Rounds of a loop of which none is certain."""
+FIRST_COMPARED = 64
+"""Rounds behind which a loop is suspected of going round for ever; a power of two."""
 LEAVES = ("exit", "next", "return")
 
 Outcomes = dict[str, list[State]]
@@ -149,10 +151,14 @@ def _labelled(x: Execution, value: Term, machine: str, low: Any, high: Any) -> T
 
 
 def _loop(x: Execution, state: State, head: Block, body: Block, tail: Block) -> tuple[State | None, Outcomes]:
-    """Follows a loop round by round, until no path goes on."""
+    """Follows a loop round by round, until no path goes on.
+
+    One that comes back to a state in which it was never ends, so it uses up the budget; the state behind a power of two of
+    rounds is compared with those up to the next power, which finds a cycle of any length (Brent 1980)."""
     ends: list[State] = []
     returned: list[State] = []
-    begun, site, rounds, at = state.path, x.site, 0, state
+    begun, site, rounds, count, at = state.path, x.site, 0, 0, state
+    seen: State | None = None
     while True:
         following, left = run_block(x, head + body, at)
         ends += left.get("exit", [])
@@ -173,6 +179,12 @@ def _loop(x: Execution, state: State, head: Block, body: Block, tail: Block) -> 
             break
         x.step()
         at = following.child(following.path) if ends or returned else following
+        count += 1
+        if count >= FIRST_COMPARED and count & count - 1 == 0:
+            seen, at = at, at.child(at.path)
+        elif seen is not None and at.is_again(seen):
+            x.trap(at, x.terms.true, "R0104", site)
+            break
     others: Outcomes = {"return": returned} if returned else {}
     if not ends:
         return None, others

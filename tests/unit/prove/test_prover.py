@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.code.compiler import compile_files, compile_text
@@ -365,6 +366,22 @@ def test_a_loop_that_cannot_be_followed_to_its_end_leaves_it_undecided() -> None
     verdict = asked(image, NEVER, "Main.Q AND NOT Main.In")
     assert verdict.word == "undecided"
     assert verdict.how.startswith("a loop goes on for longer than it can be followed (text.st:6:")
+
+
+ENDLESS = {
+    "IF Level = 12 THEN i := 0; WHILE i < 4 DO Q := FALSE; END_WHILE END_IF": "broken",
+    "IF Level = 12 THEN i := 0; WHILE i < 4 DO i := i * i; Q := NOT Q; END_WHILE END_IF": "broken",
+    "i := 0; WHILE i < Level DO IF In THEN i := i + 0; ELSE EXIT; END_IF END_WHILE": "broken",
+    "IF Level = 12 THEN i := 0; WHILE i < 200 DO i := i + 1; END_WHILE END_IF": "proved",
+    "IF Level > 12 THEN i := 0; WHILE i < Level DO EXIT; END_WHILE END_IF": "proved",
+}
+
+
+@each_of("body", ENDLESS)
+def test_a_loop_that_comes_back_to_where_it_was_never_ends(body: str) -> None:
+    verdict = asked(program(body, "i : INT; Q : BOOL;"), NO_TRAP)
+    assert (verdict.word, verdict.run and verdict.run.trap and verdict.run.trap.code) == (
+        ENDLESS[body], "R0104" if ENDLESS[body] == "broken" else None)  # fmt: skip
 
 
 CHECKSUM = """FOR i := 0 TO 30 DO

@@ -63,6 +63,7 @@ class Bodies:
         if len({(item.x, item.y) for item in diagram.objects}) > 1:
             self._lose_places(body)
         self._check_jumps(diagram)
+        self._declare_instances(diagram)
         ours = any(item.mnemonic for item in diagram.objects)
         found = self._networks(diagram)
         rungs = [rung_steps(network, self.scope, ours) if body.language == "LD" and not network.broken
@@ -110,6 +111,17 @@ class Bodies:
                                     f"{producer.order!r}, which was taken since {producer.because}; by {other!r} it is behind",
                                     f"`--order {other}`, if the PLC is built with {ORDERS[other].partition(':')[0]}")
                 return
+
+    def _declare_instances(self, diagram: Diagram) -> None:
+        """Declare instances that nothing in a whole project declares, as tools do that keep them with their boxes."""
+        if not self.scope.document.configurations or self.scope.is_function:
+            return
+        for item in diagram.objects:
+            if item.kind == "block" and item.instance.isidentifier() and self.scope.is_block(item.text) \
+                    and not self.scope.is_taken(item.instance):  # fmt: skip
+                self.scope.declare(item.instance, item.text)
+                self.reading.report("X0292", item.element, f"nothing declares {item.instance}: it becomes a variable of "
+                                    f"{self.pou.name} of the type {item.text}")
 
     def _check_jumps(self, diagram: Diagram) -> None:
         """Report jumps to labels that do not exist."""

@@ -50,10 +50,18 @@ class Scope:
         while self.is_taken(name):
             self._numbers[stem] = number = self._numbers.get(stem, 1) + 1
             name = f"{stem}_{number}"
-        self.taken.add(name.upper())
-        section = "VAR" if keeps or self.pou.kind == "FUNCTION" else "VAR_TEMP"
-        self.made.setdefault((section, kind), []).append(name)
+        self.declare(name, kind, "VAR" if keeps or self.is_function else "VAR_TEMP")
         return name
+
+    def declare(self, name: str, kind: str, section: str = "VAR") -> None:
+        """Declare a variable under a name that is not taken."""
+        self.taken.add(name.upper())
+        self.made.setdefault((section, kind), []).append(name)
+
+    def is_block(self, kind: str) -> bool:
+        """Whether a type is a function block of the document or of a library."""
+        pou = self.pous.get(kind.upper())
+        return pou.kind == "FUNCTION_BLOCK" if pou else bool(_library_pins(kind.upper()))
 
     def is_taken(self, name: str) -> bool:
         """Whether the POU or the document declares a name."""
