@@ -418,7 +418,8 @@ def test_the_type_of_a_moved_literal_is_that_of_the_variable_which_its_sum_reach
 
 
 INSTANCES = ('<instances><configurations><configuration name="C"><resource name="R">'
-             '<task name="t" priority="0" interval="PT0.01S"><pouInstance name="i" typeName="Main"/></task></resource></configuration></configurations></instances></project>')
+             '<task name="t" priority="0" interval="PT0.01S"><pouInstance name="i" typeName="Main"/></task></resource>'
+             '</configuration></configurations></instances></project>')
 
 
 def test_an_instance_that_nothing_in_a_whole_project_declares_is_declared() -> None:
