@@ -10,7 +10,7 @@ from typing import Any
 
 from fbvm.code.image import Image
 from fbvm.code.operations import Address, Node
-from fbvm.prove.encoding.cells import Contents
+from fbvm.prove.encoding.cells import Cell, Contents
 from fbvm.prove.encoding.terms import Term, Terms
 from fbvm.prove.encoding.writes import Writes
 from fbvm.watch.bits import Writer
@@ -46,6 +46,10 @@ class TrapCondition:
     site: int
 
 
+Held = tuple[Term, dict[int, Term], dict[Cell, Term]]
+"""What a state holds at some moment: its path, temporaries, and the cells that were written."""
+
+
 @dataclass
 class State:
     """A path: its condition, counted from the start of the scan, and what memory and temporaries hold on it.
@@ -63,11 +67,17 @@ class State:
         """The same state on a path of its own; this one is not written while the child is in use."""
         return State(self.contents.child(), path, dict(self.temporaries), dict(self.known), self.used)
 
-    def is_again(self, ancestor: State) -> bool:
-        """Whether memory, temporaries and path are those of a state that this one descends from."""
-        here, there = self.contents, ancestor.contents
-        return self.path is ancestor.path and self.temporaries == ancestor.temporaries \
-            and all(here.get(cell) is there.get(cell) for cell in here.written_since(there))  # fmt: skip
+    def held(self) -> Held:
+        """What the state holds now, to be compared with what it holds later."""
+        cells = {cell: self.contents.get(cell) for cell in self.contents.written_since(None)}
+        return self.path, dict(self.temporaries), cells
+
+    def is_again(self, held: Held) -> bool:
+        """Whether the state holds what it held before."""
+        path, temporaries, cells = held
+        return (self.path is path and self.temporaries == temporaries
+                and all(self.contents.get(cell) is term for cell, term in cells.items())
+                and self.contents.written_since(None) == cells.keys())
 
     def join(self, others: list[State], conditions: list[Term]) -> None:
         """Takes over what children hold, each where its condition is TRUE; one of them is."""

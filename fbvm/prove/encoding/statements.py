@@ -12,7 +12,7 @@ from typing import Any
 from fbvm.code.image import Body
 from fbvm.code.operations import SIZES, TEXT_UNITS, WHOLE_BYTES, Address, Block, Node, detail_size
 from fbvm.prove.encoding.addresses import Target, targets
-from fbvm.prove.encoding.execution import UNWOUND, Execution, Refused, Row, State
+from fbvm.prove.encoding.execution import UNWOUND, Execution, Held, Refused, Row, State
 from fbvm.prove.encoding.expressions import is_signed
 from fbvm.prove.encoding.terms import Term
 
@@ -158,7 +158,7 @@ def _loop(x: Execution, state: State, head: Block, body: Block, tail: Block) -> 
     ends: list[State] = []
     returned: list[State] = []
     begun, site, rounds, count, at = state.path, x.site, 0, 0, state
-    seen: State | None = None
+    seen: Held | None = None
     while True:
         following, left = run_block(x, head + body, at)
         ends += left.get("exit", [])
@@ -181,7 +181,7 @@ def _loop(x: Execution, state: State, head: Block, body: Block, tail: Block) -> 
         at = following.child(following.path) if ends or returned else following
         count += 1
         if count >= FIRST_COMPARED and count & count - 1 == 0:
-            seen, at = at, at.child(at.path)
+            seen = at.held()
         elif seen is not None and at.is_again(seen):
             x.trap(at, x.terms.true, "R0104", site)
             break
