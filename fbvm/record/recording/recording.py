@@ -208,31 +208,31 @@ class PlcRecording(RecordedPlc):
         plc, pending = self._plc, self._pending
         self._now_ns = now_ns
         goes_on = not self._has_changed and not self._has_begun and plc.scans == self._chunks[-1].times.end
+        follows = goes_on and not self._note_changes(plc, pending)
         if not goes_on or self._cost_ns > AGAIN_NS:
-            self._begin_chunk(goes_on and not self._is_touched())
-            self._has_begun = True
-            return
+            self._begin_chunk(follows)
         self._has_begun = True
+
+    def _note_changes(self, plc: Plc, pending: ScanInputs) -> bool:
+        """Adds what was changed from outside since the last scan to `pending`; returns True if something was."""
+        found = False
         if not self._is_uncopied and (memory := plc.memory.map[:]) != self._known:
             if self._written:
                 self._written.settle()
             pending.writes = [*pending.writes, *changes(self._known, memory)]
-            self._known = memory
+            self._known, found = memory, True
         if plc.budget != self._budget:
             pending.budget = self._budget = plc.budget
+            found = True
         if (plc.is_forced or self._forces) and (forces := plc.forces) != self._forces:
             pending.forces = self._forces = forces
+            found = True
         for number, unit in enumerate(self._units):
             if unit.times_set != self._times_set[number]:
                 self._times_set[number] = unit.times_set
                 pending.settings = {**pending.settings, number: unit.settings}
-
-    def _is_touched(self) -> bool:
-        """True if something was changed from outside since the last scan, so that this does not lead to the state of now."""
-        plc = self._plc
-        return (plc.budget != self._budget or plc.forces != self._forces
-                or [unit.times_set for unit in self._units] != self._times_set
-                or not self._is_uncopied and plc.memory.map[:] != self._known)
+                found = True
+        return found
 
     def received(self, unit: int, events: Sequence[Event]) -> None:
         """Records events of the network for a unit."""

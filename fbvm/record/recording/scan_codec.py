@@ -15,7 +15,7 @@ from fbvm.machine.state import State
 from fbvm.net.journal import from_event, to_event
 from fbvm.record.recording.chunks import Chunk, ScanInputs, Times, UnitKeyframe, Write
 from fbvm.record.recording.plain_data import number, parts_of, payload_of
-from fbvm.wire.link import Peer, read_peer
+from fbvm.wire.link import read_peer
 from fbvm.wire.tap import TapEvent, TapKind
 
 
@@ -163,6 +163,4 @@ def _passed(now_ns: int, unit: str, kind: str, host: str, port: int, other: str,
 _KINDS = {kind.value: kind for kind in TapKind}
 
 
-@lru_cache
-def _peer(host: str, port: int) -> Peer:
-    return read_peer(host, port)
+_peer = lru_cache(read_peer)
