@@ -237,6 +237,15 @@ def test_values_are_those_of_the_trace(shown: Any, trace: Trace) -> None:
         assert labels == shown_at(trace, scan, labels)
 
 
+def test_a_scan_that_is_written_into_the_address_is_shown(shown: Any) -> None:
+    press(shown, "ArrowRight")
+    shown.evaluate("location.hash = '#7'")
+    shown.wait_for_timeout(300)  # behind that the page has written its own scan there
+    assert (where(shown), shown.evaluate("location.hash")) == ("scan 7, 70 ms", "#7")
+    assert press(shown, "ArrowRight").startswith("scan 8,")
+    shown.wait_for_function("location.hash == '#8'")
+
+
 def test_steps_inside_a_scan(shown: Any) -> None:
     press(shown, "ArrowRight")
     assert press(shown, "ArrowDown").startswith("scan 1, 10 ms, step 1 of ")

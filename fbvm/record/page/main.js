@@ -17,7 +17,7 @@ function start(data, bytes) {
   const panels = {scan: new ScanPanel(run, state, move), memory: new MemoryPanel(run, state, move),
                   frames: new FramesPanel(run, state, move)};
   const where = document.getElementById("where");
-  let waiting = 0, writing = 0, choose = true, shown = null, naming = 0, took = 0;
+  let waiting = 0, writing = 0, choose = true, shown = null, naming = 0, named = location.hash, took = 0;
 
   /** Changes the state and has everything drawn anew with the next picture. */
   function move(change) {
@@ -53,10 +53,24 @@ function start(data, bytes) {
       if (document.getElementById(name).offsetParent) panel.draw();
     }
     clearTimeout(naming);
-    naming = setTimeout(() => history.replaceState(null, "", `#${state.scan}`), 200);
+    naming = setTimeout(name, 200);
     if (isRough) move({});
     else if (later) writing ||= requestAnimationFrame(write);
     took = performance.now() - begun;
+  }
+
+  /** Writes the scan into the address, unless somebody has just written another one there. */
+  function name() {
+    if (location.hash !== named) return;
+    named = `#${state.scan}`;
+    history.replaceState(null, "", named);
+  }
+
+  /** Goes to the scan that the address names. */
+  function follow() {
+    const wanted = parseInt(location.hash.slice(1), 10);
+    named = location.hash;
+    if (Number.isFinite(wanted)) move({scan: wanted});
   }
 
   /** Goes on with the rows beside the chart for which there was no time; the chart itself stays. */
@@ -110,8 +124,9 @@ function start(data, bytes) {
     box.addEventListener("change", () => move({[name]: box.checked}));
   }
   document.getElementById("flow").hidden = !data.pictures;
-  const wanted = parseInt(location.hash.slice(1), 10);
-  move({scan: Number.isFinite(wanted) ? wanted : data.pinned.length ? run.last : run.first});
+  addEventListener("hashchange", follow);
+  move({scan: data.pinned.length ? run.last : run.first});
+  follow();
   draw();
   // for those who measure or test the page
   window.fbvm = {move, count: run.count, drawn: () => took, written: () => !waiting && chart.isWritten, opened: performance.now()};
