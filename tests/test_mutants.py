@@ -95,7 +95,7 @@ def test_a_room_has_files_and_tests() -> None:
     assert Path("fbvm/units/etn21/mail.py") in files
     assert m.files_of("omron/etn21")[0] == Path("fblib/omron/etn21/ETN21_Accept.st")
     tests = m.tests_of(Path("fbvm/record/draw/why.py"))
-    assert tests[0].startswith("tests/unit/record/") and "tests/unit/cli/test_cli.py" in tests
+    assert tests[0].startswith("tests/unit/record/") and {"tests/unit/cli/test_cli.py", "tests/cx/test_diff.py"} <= set(tests)
     with pytest.raises(ValueError, match="no room 'nowhere'"):
         m.files_of("nowhere")
 
@@ -115,10 +115,35 @@ def test_a_copy_runs_the_mutant_and_is_restored(tmp_path: Path) -> None:
     path = Path("fbvm/wire/modbus.py")
     text = (HOUSE / path).read_text(encoding="utf-8")
     tests = ["tests/unit/wire"]
-    assert copy.passes(tests, 100)
+    assert copy.passes(tests, "not slow", 100)
     start = text.index("\nMAX_PDU_BYTES = ") + 1
     broken = m.Mutant(path, start, text.index("\n", start), "MAX_PDU_BYTES = 9")
-    assert not copy.survives(broken, tests, 100)
+    assert not copy.survives(broken, tests, "not slow", 100)
     same = m.Mutant(path, len(text), len(text), "\n")
-    assert copy.survives(same, tests, 100)
+    assert copy.survives(same, tests, "not slow", 100)
     assert (HOUSE / path).read_text(encoding="utf-8") == (copy.folder / path).read_text(encoding="utf-8") == text
+
+
+@pytest.mark.slow
+def test_what_the_quick_tests_do_not_find_is_tried_with_the_slow_ones(tmp_path: Path) -> None:
+    """A file of tests where a quick one looks at `a`, a slow one at `b`, none at `c`; a stage without tests finds nothing."""
+    copy = m.Copy(tmp_path)
+    folder = copy.folder / "tests" / "unit" / "wire"
+    for file in folder.glob("test_*.py"):
+        file.unlink()
+    path = Path("fbvm/wire/made.py")
+    (copy.folder / path).write_text("a = 1\nb = 1\nc = 1\n", encoding="utf-8")
+    quick = "from fbvm.wire import made\n\ndef test_a():\n    assert made.a == 1\n"
+    slow = "import pytest\n\n@pytest.mark.slow\ndef test_b():\n    assert made.b == 1\n"
+    (folder / "test_made.py").write_text(quick + slow, encoding="utf-8")
+    for file in (copy.folder / "tests" / "unit" / "net").glob("test_*.py"):
+        file.unlink()
+    made = [m.Mutant(path, at, at + 1, "2") for at in (4, 10, 16)]
+    stages = [m.Stage(copy, name, 100) for name in m.STAGES]
+    assert [[stage.finds(one) for stage in stages] for one in made] == [[True, False], [False, True], [False, False]]
+    assert m.told(stages, 3) == "1 of 3 by quick tests, 1 by slow ones" and m.told(stages[:1], 3) == "1 of 3 by quick tests"
+    (folder / "test_made.py").write_text(quick, encoding="utf-8")
+    assert not m.Stage(copy, "slow", 100).finds(made[0])
+    (copy.folder / path).write_text("a = 3\n", encoding="utf-8")
+    with pytest.raises(RuntimeError, match="the quick tests fail without a mutant"):
+        m.Stage(copy, "quick", 100).finds(m.Mutant(path, 4, 5, "4"))

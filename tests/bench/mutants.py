@@ -1,12 +1,12 @@
 """Breaks fbvm in small ways and counts how many of them the tests find.  It gates nothing.
 
-    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--slow]
+    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--quick]
 
 ROOM is a folder or file of `fbvm/` or `fblib/`: `check`, `units/etn21`, `omron/mtcp_etn`, `record/draw/why.py`.  A mutant is
 one edit of one file: another relation, AND for OR, a constant plus one, a condition negated, a statement removed, None for a
-result.  Each is written into a copy of the repository in a temporary folder, where the tests of the room run without the slow
-ones (with `--slow` all: some rooms have no others), first those that name the file.  A mutant that no test finds is printed as a
-difference.
+result.  Each is written into a copy of the repository in a temporary folder, where the quick tests of the room run, first those
+that name the file.  A mutant that they do not find is tried again with the slow tests of the same files, unless `--quick` is
+given.  The last line counts both, and a mutant that no test finds is printed as a difference.
 
 A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).
 Those that were looked at and stay are in mutants_survivors.md, each with its reason."""
@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import ast
 import difflib
+import importlib.util
 import math
 import os
 import random
@@ -53,11 +54,15 @@ TESTS = {
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
     "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run"),
-    "record": ("tests/unit/record", "tests/unit/cli"), "run": ("tests/unit/run", "tests/unit/net"),
+    "record": ("tests/unit/record", "tests/unit/cli", "tests/cx/test_diff.py"), "run": ("tests/unit/run", "tests/unit/net"),
     "testing": ("tests/unit/testing", "tests/twincat"), "cli": ("tests/unit/cli",),
     "analysis": ("tests/unit/analysis", "tests/unit/lsp"),
 }  # fmt: skip
-"""The folders of tests that matter for a room; for others that of its own name."""
+"""The folders and files of tests that matter for a room; for others the folder of its own name."""
+STAGES = {"quick": "not slow", "slow": "slow"}
+"""The marks of the tests with which a mutant is tried, one stage after the other until one finds it."""
+NO_TEST = 5
+"""The exit status of pytest if it ran no test: nothing was found."""
 RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is": "is not", "is not": "is",
              "in": "not in", "not in": "in"}  # fmt: skip
 OPERATORS = re.compile(r"\bis\s+not\b|\bnot\s+in\b|\bis\b|\bin\b|[<>!=]=|[<>]")
@@ -199,7 +204,10 @@ def files_of(room: str, house: Path = HOUSE) -> list[Path]:
 def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
     """The test files for a source file, in the order in which they run: first those that name the file, by folder."""
     room = path.parts[0] if path.parts[0] == "fblib" else path.parts[1].removesuffix(".py")
-    files = [file for folder in TESTS.get(room, (f"tests/unit/{room}",)) for file in sorted((house / folder).rglob("test_*.py"))]
+    files: list[Path] = []
+    for name in TESTS.get(room, (f"tests/unit/{room}",)):
+        place = house / name
+        files += [place] if place.is_file() else sorted(place.rglob("test_*.py"))
     files.sort(key=lambda file: re.search(rf"\b{path.stem}\b", file.read_text(encoding="utf-8")) is None)
     return [file.relative_to(house).as_posix() for file in files]
 
@@ -207,9 +215,8 @@ def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
 class Copy:
     """A copy of the repository in which the tests run; the repository itself is only read."""
 
-    def __init__(self, folder: Path, slow: bool = False) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder / "fbvm"
-        self._marks = [] if slow else ["-m", "not slow"]
         self._environment = {**os.environ, "PYTHONPATH": str(self.folder), "XDG_CACHE_HOME": str(folder / "cache")}
         for name in COPIED:
             if (HOUSE / name).is_dir():
@@ -217,30 +224,62 @@ class Copy:
             elif (HOUSE / name).is_file():
                 shutil.copyfile(HOUSE / name, self.folder / name)
 
-    def passes(self, tests: list[str], limit_s: float) -> bool:
-        """True if the tests pass; False for a failure, and for tests that take more than `limit_s` seconds."""
+    def passes(self, tests: list[str], marks: str, limit_s: float) -> bool:
+        """True if the tests with these marks pass, or if there are none; False for a failure, and after `limit_s` seconds."""
         # `ulimit -t` holds for every process that a test starts, also for one in a session of its own, out of killpg's reach.
-        pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *self._marks, *tests]
+        pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", marks, *tests]
         command = ["sh", "-c", f"ulimit -t {math.ceil(limit_s)}; exec {shlex.join(pytest)}"]
         with subprocess.Popen(command, cwd=self.folder, env=self._environment, stdout=subprocess.DEVNULL,
                               stderr=subprocess.DEVNULL, start_new_session=True) as running:
             try:
-                return running.wait(limit_s) == 0
+                return running.wait(limit_s) in (0, NO_TEST)
             except subprocess.TimeoutExpired:
                 return False
             finally:
                 with suppress(ProcessLookupError):
                     os.killpg(running.pid, signal.SIGKILL)
 
-    def survives(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
-        """True if no test finds a mutant; afterwards the file is as it was."""
+    def survives(self, mutant: Mutant, tests: list[str], marks: str, limit_s: float) -> bool:
+        """True if none of the tests finds a mutant; afterwards the file is as it was."""
         file = self.folder / mutant.path
         text = file.read_text(encoding="utf-8")
         try:
-            file.write_text(mutant.apply(text), encoding="utf-8")
-            return self.passes(tests, limit_s)
+            _write(file, mutant.apply(text))
+            return self.passes(tests, marks, limit_s)
         finally:
-            file.write_text(text, encoding="utf-8")
+            _write(file, text)
+
+
+def _write(file: Path, text: str) -> None:
+    """Writes a source.  Its byte code goes: it would pass for that of a text of the same size, written in the same second."""
+    file.write_text(text, encoding="utf-8")
+    Path(importlib.util.cache_from_source(file)).unlink(missing_ok=True)
+
+
+class Stage:
+    """The quick tests, or the slow ones.  How long those of a file take without a mutant is measured once."""
+
+    def __init__(self, copy: Copy, name: str, limit_s: float) -> None:
+        self.name = name
+        self.found = 0
+        self._copy, self._marks, self._limit_s = copy, STAGES[name], limit_s
+        self._whole_s: dict[tuple[str, ...], float] = {}
+
+    def finds(self, mutant: Mutant) -> bool:
+        """True if one of the tests fails, or takes too long.  Raises RuntimeError if they fail without a mutant."""
+        tests = tests_of(mutant.path, self._copy.folder)
+        found = not self._copy.survives(mutant, tests, self._marks, 10 + SLOWEST * self._whole(tests))
+        self.found += found
+        return found
+
+    def _whole(self, tests: list[str]) -> float:
+        key = tuple(sorted(tests))
+        if key not in self._whole_s:
+            start = time.monotonic()
+            if not self._copy.passes(tests, self._marks, self._limit_s):
+                raise RuntimeError("\n".join([f"the {self.name} tests fail without a mutant, or take too long:", *tests]))
+            self._whole_s[key] = time.monotonic() - start
+        return self._whole_s[key]
 
 
 def difference(mutant: Mutant, text: str) -> str:
@@ -256,32 +295,37 @@ def main() -> int:
     options.add_argument("--count", type=int, default=20, help="mutants that are tried (20)")
     options.add_argument("--seed", type=int, default=0, help="which of all mutants (0)")
     options.add_argument("--seconds", type=float, default=600, help="none is begun after this time (600)")
-    options.add_argument("--slow", action="store_true", help="run the slow tests, too")
+    options.add_argument("--quick", action="store_true", help="leave the slow tests out")
     given = options.parse_args()
     begun = time.monotonic()
     texts = {path: (HOUSE / path).read_text(encoding="utf-8") for path in files_of(given.room)}
     found = [mutant for path, text in texts.items() for mutant in mutants(path, text)]
     chosen = random.Random(given.seed).sample(found, min(given.count, len(found)))
     with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(Path(folder), given.slow)
-        survivors, tried, whole_s = [], 0, {}
+        copy = Copy(Path(folder))
+        stages = [Stage(copy, name, given.seconds) for name in STAGES if name == "quick" or not given.quick]
+        survivors, tried = 0, 0
         for mutant in chosen:
-            tests = tests_of(mutant.path, copy.folder)
-            if tuple(sorted(tests)) not in whole_s:
-                start = time.monotonic()
-                if not copy.passes(tests, given.seconds):
-                    print("the tests fail without a mutant", *tests, sep="\n", file=sys.stderr)
-                    return 1
-                whole_s[tuple(sorted(tests))] = time.monotonic() - start
             if time.monotonic() - begun > given.seconds:
                 break
+            try:
+                is_found = any(stage.finds(mutant) for stage in stages)
+            except RuntimeError as error:
+                print(error, file=sys.stderr)
+                return 1
             tried += 1
-            if copy.survives(mutant, tests, 10 + SLOWEST * whole_s[tuple(sorted(tests))]):
-                survivors.append(mutant)
+            if not is_found:
+                survivors += 1
                 print(difference(mutant, texts[mutant.path]), end="\n\n", flush=True)
-    print(f"{given.room}: {tried - len(survivors)} of {tried} mutants found, {len(survivors)} survived; "
+    print(f"{given.room}: {told(stages, tried)}, {survivors} survived; "
           f"{len(found)} exist, seed {given.seed}, {time.monotonic() - begun:.0f} s")
     return 0
+
+
+def told(stages: list[Stage], tried: int) -> str:
+    """How many mutants each stage found: "31 of 40 by quick tests, 6 by slow ones"."""
+    quick, *slow = stages
+    return ", ".join([f"{quick.found} of {tried} by {quick.name} tests", *(f"{one.found} by {one.name} ones" for one in slow)])
 
 
 if __name__ == "__main__":
