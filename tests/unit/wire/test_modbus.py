@@ -236,6 +236,39 @@ def test_messages_read_well() -> None:
     assert str(decode_request(b"\x03\x00")) == "03 read holding registers, data 00, (too short)"
 
 
+def test_a_function_that_is_not_known_is_called_by_its_number() -> None:
+    assert str(decode_request(b"\x63\x01")) == "63 unknown function, data 01, (function code not known)"
+    assert str(decode_reply(b"\x63\x01")) == "63 unknown function, data 01, (function code not known)"
+    assert str(decode_request(b"")) == "00 unknown function, (no function code)"
+
+
+@each_of(("code", "read_max", "write_max"), [
+    (0x01, 2000, 0), (0x02, 2000, 0), (0x03, 125, 0), (0x04, 125, 0), (0x0F, 0, 1968), (0x10, 0, 123), (0x17, 125, 121),
+])  # fmt: skip
+def test_the_most_items_of_a_request(code: int, read_max: int, write_max: int) -> None:
+    """MODBUS Application Protocol V1.1b3, 6.1 to 6.17: the server takes as many, and refuses one more with 03."""
+    def request(reads: int, writes: int) -> bytes:
+        if code == 0x17:
+            return modbus.read_write(0, reads, 0, [0] * writes)
+        if reads:
+            return modbus.read(code, 0, reads)
+        return (modbus.write_coils if code == 0x0F else modbus.write_registers)(0, [0] * writes)
+
+    server = a_server()
+    assert server.answer_pdu(request(read_max, write_max))[0] == code
+    if read_max:
+        assert server.answer_pdu(request(read_max + 1, write_max)) == bytes((code | 0x80, 3))
+    if write_max:
+        assert server.answer_pdu(request(read_max, write_max + 1)) == bytes((code | 0x80, 3))
+
+
+@each_of("code", [1, 2, 3, 4])
+def test_the_tables_of_a_server_have_65536_items(code: int) -> None:
+    server = ModbusServer()
+    assert server.answer_pdu(modbus.read(code, 65_535, 1))[0] == code
+    assert server.answer_pdu(modbus.read(code, 65_535, 2)) == bytes((code | 0x80, 2))
+
+
 def test_the_words_of_exceptions() -> None:
     """MODBUS Application Protocol V1.1b3, section 7; other codes have no words."""
     words = {
