@@ -361,6 +361,17 @@ def test_what_the_last_scans_said_comes_before_the_end(file: Path) -> None:
 
 
 @pytest.mark.slow
+def test_what_the_rest_of_the_last_scan_said_comes_before_the_end(file: Path) -> None:
+    client = Client()
+    client.begin(lines(file, {"line": 18, "condition": "N = 4"}, {"line": 19, "logMessage": "n={N}"}), program=str(file),
+                 **{"for": "50ms"})  # fmt: skip
+    assert client.events("output")[-1]["output"].endswith("n=4\n")
+    client.go("continue")
+    events = [row["event"] for row in client.messages if row.get("event") in ("output", "exited")]
+    assert events[-2:] == ["output", "exited"] and client.events("output")[-1]["output"].endswith("n=5\n")
+
+
+@pytest.mark.slow
 def test_restart_keeps_the_breakpoints(file: Path) -> None:
     client = Client()
     client.begin(lines(file, 22), program=str(file))

@@ -11,15 +11,18 @@ from hypothesis import strategies as st
 
 from fbvm.code.compiler import compile_text
 from fbvm.machine.breakpoints import Breakpoint
-from fbvm.machine.plc import Plc
+from fbvm.machine.plc import Phase, Plc
+from fbvm.record.recording import recording as recording_module
 from fbvm.record.recording.recording import Recording
 from fbvm.record.recording.scans import RecordedScans
+from fbvm.record.trace.events import Event, Statement
+from fbvm.record.trace.scan_source import Moment
 from fbvm.run.running import TimedWrite
 from fbvm.step.debugger import Debugger, Move
 from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position, Reached, Said
 from fbvm.step.session import Session
-from fbvm.step.world import Debugged, World
+from fbvm.step.world import Debugged, ReadOnlyPast, World
 
 TEXT = """\
 FUNCTION_BLOCK Twice
@@ -166,6 +169,59 @@ def test_a_recording_is_gone_through_by_statements() -> None:
         lines.append(session.facts.sites[session.statement.site].line if session.statement else None)
         session.step()
     assert lines == [13, 14, 4, 5] and session.read("Main.N") == 2
+
+
+@pytest.mark.slow
+def test_what_was_attached_to_goes_back_to_the_oldest_scan_that_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The PLC is not executed anew from power-on, because its connections do not travel in time."""
+    image = compile_text(TEXT).image
+    assert image is not None
+    plc = Plc(image)
+    monkeypatch.setattr(recording_module, "AGAIN_NS", 1_000_000)
+    recorded = Recording(limit_bytes=8_000).add("plc", plc)
+    plc.run(scans=400)
+    session = Session(World(lambda: [Debugged("plc", plc, recorded=recorded)], is_fixed=True))
+    session.goto(0)
+    assert 0 < recorded.scans.start < 400 and session.here == Position(recorded.scans.start)
+    assert session.read("Main.N") == recorded.scans.start
+    with pytest.raises(ReadOnlyPast, match="do not travel in time"):
+        session.act(lambda changed: changed.write("Main.N", 7))
+
+
+@pytest.mark.slow
+def test_a_table_of_a_recording_ends_where_one_stands() -> None:
+    """Of the scan that is looked at it has what was executed so far, of the scans before all, and each of those with its end."""
+    image = compile_text(TEXT).image
+    assert image is not None
+    plc = Plc(image)
+    recorded = Recording().add("plc", plc)
+    plc.run(scans=3)
+    session = PastSession(RecordedScans(recorded, {}), "plc")
+    session.goto(2)
+    session.step()
+    seen: list[object] = []
+
+    class Listener:
+        def phase(self, moment: Moment, phase: Phase) -> None:
+            seen.append(phase)
+
+        def event(self, moment: Moment, event: Event) -> None:
+            if isinstance(event, Statement):
+                seen.append((moment.scans, session.facts.sites[event.site].line))
+
+    session.follow(Listener(), range(1, 10))
+    whole = [13, 14, 4, 5, 15, 4, 5, 16]
+    assert seen == [Phase.INPUTS, *((1, line) for line in whole), Phase.PROGRAM, Phase.REFRESH, Phase.INPUTS, (2, 13)]
+    assert session.here == Position(2, 1)
+
+
+@pytest.mark.slow
+def test_hits_of_another_plc_count_on_when_a_run_begins() -> None:
+    found = debugger(names=("a", "b"))
+    found.plcs["b"].put([line("text.st:5", hits="7")])
+    done(found.scan(2))
+    reached = done(found.resume())
+    assert reached and (reached.plc, reached.position.scan) == ("b", 3)
 
 
 def test_an_act_in_the_past_forgets_what_was_done_inside_the_same_scan_of_another_plc() -> None:
