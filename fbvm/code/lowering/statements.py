@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fbvm.base.types import BOOL, machine
+from fbvm.base.types import BOOL, StructType, machine
 from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.builder.places import is_aggregate
 from fbvm.code.image import RungPicture
@@ -36,7 +36,8 @@ def _assign(body: BodyContext, node: tree.Assign, site: int) -> None:
             reference = dispatch.attempted(body, body.value(value), wanted, site)
             body.write(body.place(target), reference, site)
         elif target in body.facts.failed:
-            body.to_temporary(body.value(value))
+            is_instance = isinstance(body.facts.types[value], StructType)
+            body.to_temporary(body.place(value).reference() if is_instance else body.value(value))
             body.write(body.place(target), ("const", "ref", 0), site)
         else:
             _assign_one(body, target, value, site)

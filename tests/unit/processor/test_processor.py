@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from pathlib import Path
 
 import pytest
 
 from fbvm.base.areas import AREAS
 from fbvm.engine.native import engine as native
-from fbvm.processor.processor import OwnProcessor, processor
+from fbvm.processor import processor as processor_module
+from fbvm.processor.processor import OwnProcessor, contract, processor
 from fbvm.units.contract import Processor
 from fbvm.watch.paths import UnknownPlace
 
@@ -72,6 +74,18 @@ def test_what_it_does_not_have(own: OwnProcessor) -> None:
         own.view("Nothing")
     with pytest.raises(ValueError, match="bytes of its own"):
         own.contract.offset("OneBit")
+
+
+@pytest.mark.slow
+def test_a_program_is_compiled_once_and_then_read_from_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path))
+    contract.cache_clear()
+    made = contract(TEXT)
+    assert made.image.tasks and list(tmp_path.rglob("*"))
+    monkeypatch.setattr(processor_module, "compile_sources", None)
+    contract.cache_clear()
+    again = contract(TEXT)
+    assert again is not made and again.image.initial == made.image.initial and again.offset("Runs") == made.offset("Runs")
 
 
 @pytest.mark.parametrize(("text", "said"), [
