@@ -3,22 +3,22 @@
 The names are those of the literature (Enoiu et al. on function block diagrams; STMutants, arXiv 2606.05499): ROR relational
 operator replacement, LRO logical, ARO arithmetic, NIO negation insertion or omission, CRO constant replacement, TRO timers and
 other standard blocks, VRO a variable replaced by another one of its type, SRO set for reset, SDL statement deletion, SWAP two
-statements in the other order.  Rungs have CONTACT (open for closed), COIL (another output instruction), EDGE (a differentiated
-instruction without its edge), RDL (rung deletion); see also `charts_and_lists`.
+statements in the other order.  See also `rungs` and `charts_and_lists`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 
 from fbvm.base.types import fold
 from fbvm.campaign.mutation.charts_and_lists import Replacement, Table, of_association, of_list, of_transition
 from fbvm.campaign.mutation.mutants import Change
+from fbvm.campaign.mutation.rungs import BLOCKS, CYCLE_MS, called, of_ladder
 from fbvm.syntax import tree
 from fbvm.syntax.tree.il import InstructionList
-from fbvm.syntax.tree.ladder import Ladder, Rung, Step
+from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.node import Node, names_of, walk
 from fbvm.syntax.tree.sfc import Association, Sfc, Transition
 
@@ -28,19 +28,6 @@ _ARITHMETIC: Table = {"+": ("-",), "-": ("+",), "*": ("/",), "/": ("*",), "MOD":
 _OPERATORS = {"ROR": _RELATIONS, "LRO": _LOGICAL, "ARO": _ARITHMETIC}
 """What stands for an operator, by the name of the mutation operator."""
 
-_BLOCKS = {"TON": ("TOF", "TP"), "TOF": ("TON",), "TP": ("TON",), "R_TRIG": ("F_TRIG",), "F_TRIG": ("R_TRIG",),
-           "RS": ("SR",), "SR": ("RS",), "CTU": ("CTD",), "CTD": ("CTU",)}  # fmt: skip
-"""Standard blocks and those that are taken for them by mistake."""
-
-_NEGATED = {"LD": "LDNOT", "AND": "ANDNOT", "OR": "ORNOT"} | {"LDNOT": "LD", "ANDNOT": "AND", "ORNOT": "OR"}
-"""Contacts: normally open for normally closed (W474 3-3)."""
-_OUTPUTS = {"OUT": "OUTNOT", "OUTNOT": "OUT", "SET": "OUT", "RSET": "SET", "DIFU": "DIFD", "DIFD": "DIFU"}
-"""Output instructions: a coil negated, a coil that holds for one that does not, set for reset, the other edge (W474 3-4)."""
-_DRAWN = {"┤ ├": "┤/├", "┤/├": "┤ ├", "( )": "(/)", "(/)": "( )", "(S)": "( )", "(R)": "(S)", "┤P├": "┤N├", "┤N├": "┤P├"}
-"""Contacts and coils as they are drawn, three characters each (IEC 61131-3, tables 75 and 76)."""
-_AS_MNEMONIC = re.compile(r"([!@%]*)([A-Z]+(?: NOT)?)(?=[\s(])", re.I)
-
-_NEXT_RUNG = re.compile(r"^[ \t]*((?:RUNG|END_LADDER)\b)", re.I | re.M)
 _WORD = re.compile(r"[A-Z_]+|\S", re.I)
 
 
@@ -55,44 +42,62 @@ def changes(text: str, node: tree.Pou) -> Iterator[Change]:
 
 
 def _replacements(text: str, pou: tree.Pou) -> Iterator[Replacement]:
-    others = _others(text, pou)
+    specs = _specs(pou)
+    others = _others({name: fold(" ".join(text[start:end].split())) for name, (start, end) in specs.items()})
+    in_rungs = {name for part in _written(pou) if isinstance(part, Ladder) for name in called(part)}
     for part in _written(pou):
         if isinstance(part, tree.NameRef) and (other := others.get(fold(part.text))):
             yield "VRO", part.start, part.end, other
-        for kind, rule in _RULES:
-            if isinstance(part, kind):
-                yield from rule(text, part)
-        for name in names_of(part) if not isinstance(part, Rung | Sfc | InstructionList) else ():
-            yield from _of_statements(text, getattr(part, name))
+        elif isinstance(part, Ladder):
+            yield from of_ladder(text, part, specs)
+        elif isinstance(part, tree.VarDecl) and any(fold(name.text) in in_rungs for name in part.names):
+            continue
+        yield from _of_node(text, part)
+
+
+def _of_node(text: str, part: Node) -> Iterator[Replacement]:
+    """What is tried at a node by its class, and with the statements in it."""
+    for kind, rule in _RULES:
+        if isinstance(part, kind):
+            yield from rule(text, part)
+    for name in names_of(part) if not isinstance(part, Ladder | Sfc | InstructionList) else ():
+        yield from _of_statements(text, getattr(part, name))
+
+
+def _specs(pou: tree.Pou) -> dict[str, tuple[int, int]]:
+    """Where the types of the variables of a POU stand, by names as they are declared."""
+    declarations = [each for part in _written(pou) if isinstance(part, tree.VarSection) for each in part.variables]
+    return {name.text: (each.spec.start, each.spec.end) for each in declarations for name in each.names}
 
 
 def _written(pou: tree.Pou) -> Iterator[Node]:
-    """The nodes of a POU that stand in its text: of rungs their steps, not the statements that execute them."""
+    """The nodes of a POU that stand in its text: not the statements that execute a rung or a chart."""
     left: list[object] = [pou]
+    ladders = [each for each in walk(pou) if isinstance(each, Ladder)]
     while left:
         item = left.pop()
         if isinstance(item, tuple):
             left += item
         elif isinstance(item, Ladder):
-            yield from (each for rung in item.rungs for each in (rung, *rung.steps))
+            yield item
         elif isinstance(item, Sfc):
             yield item
             left += [item.steps, item.transitions]
         elif isinstance(item, InstructionList):
             yield item
             yield from (each for each in walk(item) if isinstance(each, tree.Literal | tree.NameRef))  # at their operands
+        elif isinstance(item, tree.Action) and any(item in ladder.subroutines for ladder in ladders):
+            continue
         elif isinstance(item, Node) and not (isinstance(item, tree.VarSection) and item.hidden):
             yield item
             left += [getattr(item, name) for name in names_of(item)]
 
 
-def _others(text: str, pou: tree.Pou) -> dict[str, str]:
-    """For each variable of a POU the next one of the same type, and for the last the first; by folded names."""
+def _others(types: Mapping[str, str]) -> dict[str, str]:
+    """For each variable the next one of the same type, and for the last the first; by folded names."""
     by_type: dict[str, list[str]] = {}
-    for section in (node for node in _written(pou) if isinstance(node, tree.VarSection)):
-        for declared in section.variables:
-            type_ = fold(" ".join(text[declared.spec.start : declared.spec.end].split()))
-            by_type.setdefault(type_, []).extend(name.text for name in declared.names)
+    for name, type_ in types.items():
+        by_type.setdefault(type_, []).append(name)
     return {fold(name): names[(number + 1) % len(names)] for names in by_type.values() if len(names) > 1
             for number, name in enumerate(names)}  # fmt: skip
 
@@ -166,10 +171,6 @@ def _values(node: tree.Literal) -> Iterator[str]:
             yield from (f"{typed}{value}ms" for value in changed if value >= 0)
 
 
-CYCLE_MS = 10
-"""By how much times are changed: one scan of the usual cycle."""
-
-
 # --- declarations -----------------------------------------------------------------------------------------------------
 
 
@@ -177,7 +178,7 @@ def _block(text: str, node: Node) -> Iterator[Replacement]:
     """The type of a timer, a trigger, a flip-flop or a counter, exchanged for its relative."""
     assert isinstance(node, tree.VarDecl)
     if isinstance(node.spec, tree.NamedType):
-        for new in _BLOCKS.get(node.spec.text.upper(), ()):
+        for new in BLOCKS.get(node.spec.text.upper(), ()):
             yield "TRO", node.spec.start, node.spec.end, new
 
 
@@ -205,36 +206,8 @@ def _of_statements(text: str, part: object) -> Iterator[Replacement]:
             yield "SWAP", first.start, second.end, text[second.start : second.end] + between + text[first.start : first.end]
 
 
-# --- rungs ------------------------------------------------------------------------------------------------------------
-
-
-def _step(text: str, node: Node) -> Iterator[Replacement]:
-    assert isinstance(node, Step)
-    written = text[node.start : node.end]
-    operator = "CONTACT" if node.mnemonic in _NEGATED else "COIL"
-    if written in _DRAWN:
-        yield operator, node.start, node.end, _DRAWN[written]
-        return
-    found = _AS_MNEMONIC.match(text, node.start)
-    if found is None or "┤" in written or fold(found[2].replace(" ", "")) != fold(node.mnemonic):
-        return
-    new = _NEGATED.get(node.mnemonic) or _OUTPUTS.get(node.mnemonic)
-    if new:
-        yield operator, found.start(2), found.end(2), new
-    if node.prefix in ("@", "%"):
-        yield "EDGE", found.start(1), found.end(1), ""
-
-
-def _rung(text: str, node: Node) -> Iterator[Replacement]:
-    """A rung left out; a rung that other rungs lean on by a jump or a block makes an invalid program, which is not counted."""
-    assert isinstance(node, Rung)
-    behind = _NEXT_RUNG.search(text, node.end)
-    if behind:
-        yield "RDL", node.start, behind.start(1), ""
-
-
 _RULES: tuple[tuple[type[Node], Callable[[str, Node], Iterator[Replacement]]], ...] = (
     (tree.Binary, _binary), (tree.Binary, _operand), (tree.If, _condition), (tree.While, _condition), (tree.Repeat, _condition),
-    (tree.Unary, _negation), (tree.Assign, _assigned), (tree.Literal, _literal), (tree.VarDecl, _block), (Step, _step),
-    (Rung, _rung), (Transition, of_transition), (Association, of_association), (InstructionList, of_list))  # fmt: skip
+    (tree.Unary, _negation), (tree.Assign, _assigned), (tree.Literal, _literal), (tree.VarDecl, _block),
+    (Transition, of_transition), (Association, of_association), (InstructionList, of_list))  # fmt: skip
 """What is tried at each kind of node."""

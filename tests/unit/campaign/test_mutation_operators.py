@@ -94,21 +94,111 @@ def test_a_standard_block_is_taken_for_its_relatives(block: str) -> None:
     assert {each.change.text for each in mutants_of([Source("main.st", text)])} == BLOCKS[block]
 
 
-def test_rungs_in_mnemonics_have_contacts_coils_edges_and_themselves_changed() -> None:
-    found = lines("LADDER\nRUNG 1\nLD a\nANDNOT b\n@SET c\nEND_LADDER")
-    assert found == {
-        "CONTACT LADDER\nRUNG 1\nLDNOT a\nANDNOT b\n@SET c\nEND_LADDER",
-        "CONTACT LADDER\nRUNG 1\nLD a\nAND b\n@SET c\nEND_LADDER",
-        "COIL LADDER\nRUNG 1\nLD a\nANDNOT b\n@OUT c\nEND_LADDER",
-        "EDGE LADDER\nRUNG 1\nLD a\nANDNOT b\nSET c\nEND_LADDER",
-        "RDL LADDER\nEND_LADDER",
-    }  # fmt: skip
+def of_rows(rows: str, head: str = HEAD) -> set[str]:
+    """The mutants of a LADDER with these rows, each as its operator and the rows that have changed, but for those that leave out
+    a rung."""
+    before = f"LADDER\n{rows}\nEND_LADDER".split("\n")
+    found = [each.partition(" ")[::2] for each in lines("\n".join(before), head, "RDL")]
+    return {"\n".join([operator, *(row for row, old in zip(body.split("\n"), before, strict=True) if row != old)])
+            for operator, body in found}  # fmt: skip
 
 
-def test_drawn_rungs_keep_their_drawing() -> None:
-    found = lines("LADDER\nRUNG 1\n│  a    b       c  │\n├──┤ ├──┤/├────( )─┤\nEND_LADDER")
-    assert {each.split("\n")[3] for each in found if each.startswith("CO")} == {
-        "├──┤/├──┤/├────( )─┤", "├──┤ ├──┤ ├────( )─┤", "├──┤ ├──┤/├────(/)─┤"}  # fmt: skip
+INSTRUCTIONS = {
+    "LD a\nANDNOT c\nOUT b": {"CONTACT\nLDNOT a", "VRO\nLD b", "CONTACT\nAND c", "LRO\nORNOT c", "VRO\nANDNOT a",
+                             "COIL\nOUTNOT b", "VRO\nOUT c"},
+    "@LD a": {"CONTACT\n@LDNOT a", "VRO\n@LD b", "EDGE\nLD a"},
+    "LD NOT 0.01\nOUT 0.02": {"CONTACT\nLD 0.01", "VRO\nLD NOT 0.02", "COIL\nOUTNOT 0.02", "VRO\nOUT 0.01"},
+    "LD> D0 &9": {"ROR\nLD>= D0 &9", "ROR\nLD<= D0 &9", "CRO\nLD> D0 &8", "CRO\nLD> D0 &10"},
+    "AND<=L D0 D2": {"ROR\nAND<L D0 D2", "ROR\nAND>L D0 D2", "LRO\nOR<=L D0 D2", "VRO\nAND<=L D2 D2", "VRO\nAND<=L D0 D0"},
+    "@SET a": {"COIL\n@OUT a", "VRO\n@SET b", "EDGE\nSET a"},
+    "TIM 0001 #0010": {"CRO\nTIM 0001 #0011", "CRO\nTIM 0001 #0009"},
+    "@+(400) D0 #000F D0": {"ARO\n@- D0 #000F D0", "EDGE\n+(400) D0 #000F D0", "CRO\n@+(400) D0 #0010 D0",
+                            "CRO\n@+(400) D0 #000E D0"},
+    "FBCALL TON x IN:=* PT:=T#1s": {"CRO\nFBCALL TON x IN:=* PT:=T#1010ms", "CRO\nFBCALL TON x IN:=* PT:=T#990ms",
+                                    "TRO\nFBCALL TOF x IN:=* PT:=T#1s", "TRO\nFBCALL TP x IN:=* PT:=T#1s"},
+}  # fmt: skip
+
+
+@each_of("rows", INSTRUCTIONS)
+def test_an_instruction_of_a_rung_has_these_mutants(rows: str) -> None:
+    assert of_rows(rows) == INSTRUCTIONS[rows]
+
+
+def test_a_rung_is_left_out_and_of_several_outputs_one() -> None:
+    found = lines("LADDER\nRUNG 1\nLD a\nOUT b\nOUT c\nRUNG 2 x\nLD b\nOUT a\nEND_LADDER")
+    assert {each for each in found if each[1:3] == "DL"} == {
+        "RDL LADDER\nRUNG 2 x\nLD b\nOUT a\nEND_LADDER", "RDL LADDER\nRUNG 1\nLD a\nOUT b\nOUT c\nEND_LADDER",
+        "SDL LADDER\nRUNG 1\nLD a\n\nOUT c\nRUNG 2 x\nLD b\nOUT a\nEND_LADDER",
+        "SDL LADDER\nRUNG 1\nLD a\nOUT b\n\nRUNG 2 x\nLD b\nOUT a\nEND_LADDER"}  # fmt: skip
+
+
+def test_what_a_subroutine_of_rungs_is_lowered_to_has_no_mutants() -> None:
+    assert of_rows("LD a\nSBS 0\nSBN 0\nLD b\n++ D0\nRET") == {
+        "CONTACT\nLDNOT a", "VRO\nLD b", "CONTACT\nLDNOT b", "VRO\nLD c", "ARO\n-- D0"}  # fmt: skip
+
+
+NAMES = "PROGRAM Main\nVAR Go, Valve, Stop : BOOL; n, Full : INT; END_VAR\n"
+DRAWINGS = {
+    """
+│ Go          n &9  Stop │
+├─┤/├──┬──────┤>├───( )──┤
+│ Valve│                 │
+├─┤P├──┘                 │""": {
+        "CONTACT\n├─┤ ├──┬──────┤>├───( )──┤", "CONTACT\n├─┤N├──┘                 │", "EDGE\n├─┤ ├──┘                 │",
+        "COIL\n├─┤/├──┬──────┤>├───(/)──┤", "ROR\n├─┤/├──┬──────┤>=├──( )──┤", "ROR\n├─┤/├──┬──────┤<=├──( )──┤",
+        "VRO\n│ Valve       n &9  Stop │", "VRO\n│ Go       Full &9  Stop │", "VRO\n│ Go          n &9  Go   │",
+        "VRO\n│ Stop │                 │", "CRO\n│ Go          n &8  Stop │", "CRO\n│ Go          n &10 Stop │"},
+    """
+| Go       Stop    Valve |
+|-| |--+---|/|------(S)--|
+| Stop |                 |
+|-|P|--+                 |""": {
+        "CONTACT\n|-|/|--+---|/|------(S)--|", "CONTACT\n|-| |--+---| |------(S)--|", "COIL\n|-| |--+---|/|------( )--|",
+        "CONTACT\n|-|N|--+                 |", "EDGE\n|-| |--+                 |", "VRO\n| Valve    Stop    Valve |",
+        "VRO\n| Go       Go      Valve |", "VRO\n| Go       Stop    Stop  |", "VRO\n| Go   |                 |"},
+    """
+|--[ Go ]--[/Stop]---( Valve )--|""": {
+        "CONTACT\n|--[/Go ]--[/Stop]---( Valve )--|", "CONTACT\n|--[ Go ]--[ Stop ]--( Valve )--|",
+        "COIL\n|--[ Go ]--[/Stop]---(/Valve )--|", "VRO\n|--[ Go ]--[/Go]-----( Valve )--|",
+        "VRO\n|--[ Go ]--[/Stop]---( Stop )---|"},
+    """
+|--[P Go ]----[ Stop ]---(R Valve )--|""": {
+        "CONTACT\n|--[N Go ]----[ Stop ]---(R Valve )--|", "EDGE\n|--[ Go ]-----[ Stop ]---(R Valve )--|",
+        "CONTACT\n|--[P Go ]----[/Stop ]---(R Valve )--|", "COIL\n|--[P Go ]----[ Stop ]---(S Valve )--|",
+        "VRO\n|--[P Valve ]-[ Stop ]---(R Valve )--|", "VRO\n|--[P Go ]----[ Go ]-----(R Valve )--|",
+        "VRO\n|--[P Go ]----[ Stop ]---(R Stop )---|"},
+    """
+│ Go          ┌──────────┐ │
+├──┤ ├────────┤ @MOV     │ │
+│             │ &10      │ │
+│             │ n        │ │
+│             └──────────┘ │""": {
+        "CONTACT\n├──┤/├────────┤ @MOV     │ │", "EDGE\n├──┤ ├────────┤ MOV      │ │", "VRO\n│ Valve       ┌──────────┐ │",
+        "CRO\n│             │ &11      │ │", "CRO\n│             │ &9       │ │", "VRO\n│             │ Full     │ │"},
+}  # fmt: skip
+
+
+@each_of("rows", DRAWINGS)
+def test_a_drawn_rung_keeps_its_columns(rows: str) -> None:
+    assert of_rows(rows.strip("\n"), NAMES) == DRAWINGS[rows]
+
+
+CALL = """
+│ Go             ┌─ Late : TON ─┐    Valve │
+├──┤ ├───────────┤IN           Q├─────( )──┤
+│        T#100ms─┤PT            │          │
+│                └──────────────┘          │"""
+
+
+def test_the_type_of_a_drawn_block_changes_with_its_declaration() -> None:
+    found = of_rows(CALL.strip("\n"), NAMES.replace("n, Full", "Late, Wait : TON; n, Full"))
+    assert {each for each in found if each[:3] in ("CRO", "VRO")} == {
+        "CRO\n│        T#110ms─┤PT            │          │", "CRO\n│         T#90ms─┤PT            │          │",
+        "VRO\n│ Go             ┌─ Wait : TON ─┐    Valve │", "VRO\n│ Valve          ┌─ Late : TON ─┐    Valve │",
+        "VRO\n│ Go             ┌─ Late : TON ─┐    Stop  │"}  # fmt: skip
+    text = f"{NAMES.replace('n, Full', 'Late : TON; n, Full')}LADDER{CALL}\nEND_LADDER\nEND_PROGRAM\n"
+    types = [each.applied(text) for each in mutants_of([Source("main.st", text)]) if each.change.operator == "TRO"]
+    assert types == [text.replace("TON ─", "TOF ─").replace("TON", "TOF"), text.replace("TON ─", "TP  ─").replace("TON", "TP")]
 
 
 def test_a_diff_names_the_file_and_the_line() -> None:
