@@ -14,6 +14,7 @@ from fbvm.base.areas import BUDGET
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import Address, Block, Node
 from fbvm.engine.effects import STORES, Effects
+from fbvm.engine.inlining import Inlining
 from fbvm.engine.observation import NO_SITE
 from fbvm.engine.python.expressions import ROWS
 from fbvm.engine.python.held import Held, full_range, uses
@@ -26,6 +27,8 @@ EXIT, NEXT, RETURN = 1, 2, 3
 """What an outlined block returns if it is left early."""
 IN_MEMORY = f"i64[{BUDGET // 8}]"
 """The step budget in the memory."""
+BEGIN, END = "#+ ", "#- "
+"""Beginnings of the comments around the code of a body in place of a call, with the number of the call."""
 STORING = {*STORES, "call"} - {"store"}
 """Statements that may change what is held; a store sees to that itself."""
 LEAVES = {EXIT: "exit", NEXT: "next", RETURN: "return"}
@@ -41,7 +44,8 @@ class BodyWriter(Expressions):
 
     `tail` is the tail of the innermost loop of the current function, None outside of any.  `budget` is where the step budget is:
     handed from body to body in the variable n, and written to the memory at the end of the run, or, in bodies that could find it
-    there by references, and in other builds, in the memory.  `held` is what else is held."""
+    there by references, and in other builds, in the memory.  `held` is what else is held.  `inlined` are the calls in place of
+    which the code of a body stands, with the operands of the call; comments with their numbers are around it."""
 
     may_hold = True
     """Whether nobody changes the memory while a body is executed."""
@@ -49,10 +53,12 @@ class BodyWriter(Expressions):
     emitters: Mapping[str, Callable[..., None]]
     """How each statement is written: called with the writer and the operands of its row."""
 
-    def __init__(self, image: Image, constants: dict[str, Any], effects: Effects) -> None:
+    def __init__(self, image: Image, constants: dict[str, Any], effects: Effects, inlining: Inlining | None = None) -> None:
         super().__init__(ROWS, constants)
         self.image = image
         self.effects = effects
+        self.inlining = inlining
+        self.inlined: list[tuple[int, Address | None]] = []
         self.out: list[str] = []
         self.indent = 1
         self.loops = 0
@@ -71,13 +77,14 @@ class BodyWriter(Expressions):
         low, high = self.effects.bases.get(number, (-1, -1))
         self.base = low if low == high >= 0 else None
         places = (low, high + body.instance_size) if high >= 0 else None
-        loads, references = uses(body.code) if self.may_hold else ([], True)
+        code = self.inlining.code(number) if self.inlining else body.code
+        loads, references = uses(code) if self.may_hold else ([], True)
         self.held = Held(loads, self.effects, self.base, places)
         if not self.may_hold:
             self.held.state = None
         elif not references:
             self.budget = "n"
-        self.block(body.code)
+        self.block(code)
         self.line(self.returning())
         lines = self.head(function_name(number, body))
         if self.own:

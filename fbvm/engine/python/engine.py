@@ -8,26 +8,28 @@ from __future__ import annotations
 import linecache
 import marshal
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
 from itertools import count
 from types import CodeType
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import finalize
 
 from fbvm.base.areas import BUDGET, MOST_FRAMES
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image, ProgramRun
+from fbvm.code.operations import Address
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.apart import run_apart
 from fbvm.engine.bases import base_ranges, recursive_bodies
 from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.effects import Effects
+from fbvm.engine.inlining import Inlining
 from fbvm.engine.observation import NO_SITE, Observation
 from fbvm.engine.powered import UNMARKED
-from fbvm.engine.python.bodies import function_name
+from fbvm.engine.python.bodies import BEGIN, END, function_name
 from fbvm.engine.python.logged import ENDLESS, MOST_ENTRIES, Full, Log, LoggedWriter, Row
 from fbvm.engine.python.runtime import OwnViews, environment
 from fbvm.engine.python.statements import PlainWriter
@@ -53,6 +55,16 @@ class Build(Enum):
     LOGGED = "logged"
 
 
+class Inlined(NamedTuple):
+    """Lines of a part in which the code of a body stands in place of its call, with the operands of that."""
+
+    part: str
+    first: int
+    last: int
+    body: int
+    address: Address | None
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """The Python code of an image, which engines over any number of memories share."""
@@ -69,6 +81,8 @@ class Program:
     frames: int
     """Python frames that a run takes at most: every body once, and every part outlined; all that the stack of frames holds of
     bodies that may be called again while they run."""
+    inlined: tuple[Inlined, ...]
+    """Where the code of bodies stands in place of calls, what is inside others behind these."""
     table: tuple[Row, ...]
     """What the numbers in the log mean; empty for other builds."""
 
@@ -107,11 +121,16 @@ def _written(image: Image, build: Build, anywhere: bool, strangers: bool, name: 
     lines: list[str] = []
     recursive = recursive_bodies(image)
     effects = Effects(image, bases, range(len(image.bodies)) if strangers else recursive)
+    inlining = Inlining(image, recursive) if build is Build.PLAIN and not strangers else None
+    inlined: list[Inlined] = []
     frames = most = size = 0
     for number in range(len(image.bodies)):
         writer = LoggedWriter(image, constants, effects, table) if build is Build.LOGGED else \
-            (SteppedWriter if build is Build.STEPPED else PlainWriter)(image, constants, effects)  # fmt: skip
+            SteppedWriter(image, constants, effects) if build is Build.STEPPED else \
+            PlainWriter(image, constants, effects, inlining)  # fmt: skip
         body = [*writer.write(number), ""]
+        if writer.inlined:
+            inlined += _inlined(writer.inlined, body, _part_name(name, len(texts)), 1 + len(lines))
         lines += body
         own[number] = tuple(sorted(writer.own))
         frames += 1 + len(writer.routines)
@@ -121,9 +140,27 @@ def _written(image: Image, build: Build, anywhere: bool, strangers: bool, name: 
             texts.append("\n".join(lines))
             lines, size = [], 0
     texts.append("\n".join(lines))
-    parts = tuple(_compiled(text, f"<{name} {number}>" if number else f"<{name}>") for number, text in enumerate(texts))
+    parts = tuple(_compiled(text, _part_name(name, number)) for number, text in enumerate(texts))
     source = "\n".join(texts)
-    return Program(build, source, parts, constants, bases, own, frames + MOST_FRAMES * most, tuple(table))
+    return Program(build, source, parts, constants, bases, own, frames + MOST_FRAMES * most, tuple(inlined), tuple(table))
+
+
+def _part_name(name: str, number: int) -> str:
+    return f"<{name} {number}>" if number else f"<{name}>"
+
+
+def _inlined(calls: list[tuple[int, Address | None]], lines: list[str], part: str, first: int) -> Iterator[Inlined]:
+    """Where the code of bodies stands in the lines of a function, the first of which has that number."""
+    around: list[tuple[int, int]] = []
+    found: dict[int, Inlined] = {}
+    for number, line in enumerate(lines, first):
+        mark = line.lstrip()
+        if mark.startswith(BEGIN):
+            around.append((int(mark[len(BEGIN):].partition(":")[0]), number))
+        elif mark.startswith(END):
+            call, begin = around.pop()
+            found[call] = Inlined(part, begin, number, *calls[call])
+    return (found[call] for call in sorted(found))
 
 
 def _compiled(text: str, name: str) -> CodeType:
@@ -258,14 +295,22 @@ class PythonEngine:
     def _stopped(self, stop: Stop) -> tuple[int, int | None]:
         """Where the instance begins whose body was stopped, that of the innermost body among the Python frames, and how many
         steps were left then, None if the memory says that."""
-        found, left, at = NO_INSTANCE, None, stop.__traceback__
+        found, base, left, at = NO_INSTANCE, 0, None, stop.__traceback__
         while at is not None:
             number = self._numbers.get(at.tb_frame.f_code.co_name)
             if number is not None:
                 names = at.tb_frame.f_locals
-                found, left = NO_INSTANCE if self.image.bodies[number].kind == "FUNCTION" else names["b1"], names.get("n")
+                base, left = names["b1"], names.get("n")
+                found = self._instance(number, base)
+            for code in self._program.inlined:
+                if code.part == at.tb_frame.f_code.co_filename and code.first <= at.tb_lineno <= code.last:
+                    start, offset, _ = code.address or ("abs", 0, ())
+                    found = self._instance(code.body, base + offset if start == "self" else offset)
             at = at.tb_next
         return found, left
+
+    def _instance(self, body: int, base: int) -> int:
+        return NO_INSTANCE if self.image.bodies[body].kind == "FUNCTION" else base
 
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         """Executes a task step by step: a generator of observations, which returns what `run` returns.

@@ -10,7 +10,7 @@ from typing import Any
 from fbvm.base.areas import DUE
 from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Block, Node
 from fbvm.engine.case_tables import case_table, single_values
-from fbvm.engine.python.bodies import EXIT, IN_MEMORY, MOST_INDENTS, NEXT, RETURN, BodyWriter
+from fbvm.engine.python.bodies import BEGIN, END, EXIT, IN_MEMORY, MOST_INDENTS, NEXT, RETURN, BodyWriter
 from fbvm.engine.python.expressions import flag_operands
 from fbvm.engine.python.writer import bare, plus, view
 from fbvm.engine.ranges import may_trap
@@ -236,6 +236,15 @@ def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
     w.call_body(pou, address, bare(w.place(address, max(1, w.image.bodies[pou].instance_size))) if address else "0")
 
 
+def _begin(w: BodyWriter, pou: int, address: Address | None) -> None:
+    w.comment(f"{BEGIN}{len(w.inlined)}: {w.image.bodies[pou].name}{f' at {bare(w.place(address, 1))}' if address else ''}")
+    w.inlined.append((pou, address))
+
+
+def _end(w: BodyWriter, pou: int) -> None:
+    w.comment(f"{END}{w.image.bodies[pou].name}")
+
+
 def _charge(w: BodyWriter, count: int, site: int) -> None:
     name = w.budget
     if name == IN_MEMORY:
@@ -284,6 +293,7 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
+    "begin": _begin, "end": _end,
     "charge": _charge, "due": _due, "stop": _stop,
     "observe": _observe, "count": _count, "mark": _mark,
 }
