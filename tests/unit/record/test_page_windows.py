@@ -66,15 +66,16 @@ def test_the_form_of_a_number_is_that_of_its_type_and_its_area(forms: Image) -> 
     plc = Plc(forms)
 
     def form(name: str, meanings: tuple[tuple[int, str], ...] = ()) -> tuple[str, dict[str, str]]:
-        place = plc.find(f"Main.{name}")
+        place = plc.find(name if name.startswith("CIO") else f"Main.{name}")
         assert isinstance(place, Place)
         found = form_of(Signal(place, "", meanings=meanings))
         return found["form"], found["texts"]
 
-    found = {name: form(name) for name in ("n", "w", "r", "t", "lt", "code")}
-    assert found == {"n": ("", {}), "w": ("hex", {}), "r": ("", {}), "t": ("time", {}), "lt": ("time", {}), "code": ("hex", {})}
+    found = {name: form(name)[0] for name in ("n", "w", "CIO 1500", "r", "t", "lt", "code")}
+    assert found == {"n": "", "w": "", "CIO 1500": "hex", "r": "", "t": "time", "lt": "time", "code": "hex"}
+    assert form("n") == ("", {})
     assert form("e") == ("", {"0": "Low", "1": "High"})
-    assert form("w", ((5, "waits"),)) == ("hex", {"5": "waits"})
+    assert form("CIO 1500", ((5, "waits"),)) == ("hex", {"5": "waits"})
 
 
 def test_what_a_trace_keeps_of_a_symbol_is_what_the_image_says(forms: Image) -> None:
