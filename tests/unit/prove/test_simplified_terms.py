@@ -214,6 +214,7 @@ def test_what_is_plain_becomes_plain(made: Term | str, wanted: Term | str) -> No
     (T.bitwise("bvand", A, number(9)), 0, 9), (T.bitwise("bvor", T.extend(A, 16, False), number(256, 16)), 0, 511),
     (T.shift("shr", T.extend(A, 16, False), T.extend(B, 16, False)), 0, 255), (T.shift("shl", A, B), 0, 255),
     (T.extract(T.extend(T.add(A, B), 16, False), 0, 9), 0, 255),
+    (T.extract(T.divide("udiv", A, number(10)), 0, 5), 0, 25), (T.extract(T.divide("udiv", A, number(10)), 1, 5), 0, 31),
     (T.concat(T.add(T.extend(A, 9, False), number(1, 9)), B), 256, 65791),
 ])  # fmt: skip
 def test_the_bounds_of_a_result_come_from_those_of_its_operands(term: Term, low: int, high: int) -> None:

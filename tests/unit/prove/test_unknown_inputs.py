@@ -56,11 +56,33 @@ VAR
     w AT CIO 10 : WORD; b0 AT CIO 10.00 : BOOL; b9 AT CIO 10.09 : BOOL; long AT CIO 10 : DWORD; odd AT %MW5 : UINT;
     low AT %MB10 : BYTE; high AT %MB11 : BYTE; bit AT %MX11.3 : BOOL; both AT %MD2 : DWORD;
     i, k : INT; c : BOOL; ps : ARRAY[0..2] OF P; q : P; u : ARRAY[0..3] OF DINT; r : REF_TO INT; x, y : INT; n : WORD; on : BOOL;
+    bits AT CIO 20.05 : ARRAY[0..12] OF BOOL;
 END_VAR
-b9 := c; n := w; w.3 := b0; long := long OR 16#8000_0000; on := w.15 XOR b9;
+bits[k] := c; on := bits[i + 3]; b9 := c; n := w; w.3 := b0; long := long OR 16#8000_0000; on := w.15 XOR b9;
 low := 16#5A; bit := c; odd := odd + 1; both := ROL(both, 8); high := high XOR low;
 ps[i].x := k; ps[i].b := c; ps[1].c[k] := 7; q := ps[i]; ps[2] := q; q.y := ps[k].x; u[i] := u[k] + 5;
 r := REF(x); IF c THEN r := REF(y); END_IF r^ := k + 1; IF i = 1 THEN r := NULL; END_IF IF k = 1 THEN x := r^; END_IF
+END_PROGRAM"""
+KNOWN = """PROGRAM Main
+VAR
+    k, h, n : BOOL := TRUE; s, t : STRING[12] := 'ab'; w : WSTRING[5] := "xy"; i, j : INT := 5; r, x : REAL := 2.5; l : LREAL;
+    a : INT; d : DINT; q : ARRAY[0..9] OF BOOL; e : REAL := 1.0E30; z : REAL; u : UINT; st : STRING[3];
+END_VAR
+s := CONCAT(s, BOOL_TO_STRING(k)); t := MID(s, 2, 2); j := FIND(s, 'bT') + LEN(t); r := r * x + 1.0 / x - SQRT(r);
+l := EXPT(x, 2.0); a := REAL_TO_INT(x * 3.0); d := TRUNC(-x); z := e * e; z := z - z;
+q[0] := s > t; q[1] := s = 'abTRUE'; q[2] := w < "xz"; q[3] := r > x; q[4] := k AND_THEN h; q[5] := NOT k OR_ELSE NOT h;
+q[6] := NOT k AND_THEN 1 / (i - 5) = 1; q[7] := k OR_ELSE 1 / (i - 5) = 1; q[8] := x = r; u := STRING_TO_UINT('17');
+st := RIGHT(INSERT(s, t, 1), 9); s := MAX(s, t); t := SEL(n, s, t); w := LEFT(w, 1); z := ATAN2(z, x);
+END_PROGRAM"""
+OVERLAY = """TYPE S : STRUCT a : DWORD; b : WORD; END_STRUCT END_TYPE
+PROGRAM Main
+VAR one AT %MD100 : S; two AT %MD110 : S; low AT %MB441 : BYTE; high AT %MB443 : BYTE; k : WORD; other AT %MW201 : WORD; x : BOOL;
+    three AT %MD102 : S; END_VAR
+one.a := one.a OR 16#8000_0001; one.b := k; two := one; low := NOT low; high := high AND BYTE#16#7F; two.b := k XOR other;
+three := one; one := two; x := three.b.1; three.b.1 := NOT x;
+END_PROGRAM"""
+DAYS = """PROGRAM Main VAR n : INT; d : DATE; t : DT; w : ARRAY[0..2] OF TOD; k : DINT; END_VAR
+t := DT#1990-01-01-00:00:00 + INT_TO_TIME(n) * 77777; d := DT_TO_DATE(t); w[0] := DT_TO_TOD(t); k := n;
 END_PROGRAM"""
 CALLS = """FUNCTION_BLOCK Sum VAR_INPUT x : INT; go : BOOL; END_VAR VAR_OUTPUT s, n : INT; END_VAR VAR t : TON; END_VAR
 IF NOT go THEN RETURN; END_IF s := s + x; n := n + 1; t(IN := go, PT := T#5ms);
@@ -88,6 +110,10 @@ NAN, INF = float("nan"), float("inf")
     pytest.param(LAZY, "a b", SMALL, id="lazy"),
     pytest.param(PATHS, "a b", SMALL, id="paths"),
     pytest.param(MEMORY, "i k c w odd", WORDS, id="memory"),
+    pytest.param(KNOWN, "", [()], id="known"),
+    pytest.param(OVERLAY, "one.a k low",
+                 [(a, k, b) for a in (0, 0x12345678) for k in (0, 0xABCD) for b in (0, 0x5A)], id="overlay"),
+    pytest.param(DAYS, "n", [(n,) for n in (-32768, -1, 0, 1, 86, 32767)], id="days"),
     pytest.param(CALLS, "a b c", [(a, b, a != 1) for a in (-1, 0, 1, 2) for b in (0, 1, 2, 3)], id="calls"),
     pytest.param(REALS, "a b l", [(a, b, a) for a in (-1.5, -0.0, 0.0, 2.0, INF, NAN) for b in (-INF, -1.5, 0.0, 2.5, NAN)],
                  id="reals"),

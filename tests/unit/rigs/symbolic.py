@@ -60,7 +60,7 @@ _PLAIN: dict[str, Any] = {
 }  # fmt: skip
 
 
-def _encoded(plc: Plc, inputs: Sequence[Place]) -> tuple[Scanned, dict[Term, Cell]]:
+def encoded(plc: Plc, inputs: Sequence[Place]) -> tuple[Scanned, dict[Term, Cell]]:
     """The first scan, and the variables of the cells that lie in the inputs."""
     memory, terms, numbers = bytes(plc.memory.u8), Terms(), frozenset[int]()
     clock = FixedCycle(terms, plc.image.tasks, CYCLE_NS)
@@ -91,7 +91,8 @@ def _encoded(plc: Plc, inputs: Sequence[Place]) -> tuple[Scanned, dict[Term, Cel
             numbers |= {reshape.offset}
 
 
-def _held(cell: Cell, memory: bytes) -> int:
+def held(cell: Cell, memory: bytes) -> int:
+    """What lies in a cell, as an unsigned number."""
     if cell.kind == BIT:
         return memory[cell.offset] >> cell.bit & 1
     return int.from_bytes(memory[cell.offset : cell.offset + cell.size], "little")
@@ -102,7 +103,7 @@ def compare_inputs(image: Image, names: Sequence[str], rows: Sequence[Sequence[A
     and the trap that the engine leaves."""
     plc = Plc(image, CYCLE_NS, budget=BUDGET, engine="python")
     places = [plc.find(name) for name in names]
-    scanned, variables = _encoded(plc, places)  # type: ignore[arg-type]
+    scanned, variables = encoded(plc, places)  # type: ignore[arg-type]
     begin = plc.snapshot()
     cells = {cell for cells in scanned.contents.partition.at.values() for cell in cells if cell.offset >= FROM_BYTE}
     for row in rows:
@@ -110,7 +111,7 @@ def compare_inputs(image: Image, names: Sequence[str], rows: Sequence[Sequence[A
         for name, value in zip(names, row, strict=True):
             plc.write(name, value)
         memory = bytes(plc.memory.u8)
-        values = {term: _held(cell, memory) for term, cell in variables.items()}
+        values = {term: held(cell, memory) for term, cell in variables.items()}
         assert all(value < 2 for term, value in values.items() if variables[term].kind == BOOL)
         plc.scan()
         known: dict[Term, int] = {}
@@ -120,4 +121,4 @@ def compare_inputs(image: Image, names: Sequence[str], rows: Sequence[Sequence[A
         if trap is None:
             after = bytes(plc.memory.u8)
             found = {cell: term_value(scanned.contents.get(cell), values, known) for cell in cells}
-            assert found == {cell: _held(cell, after) for cell in cells}, row
+            assert found == {cell: held(cell, after) for cell in cells}, row
