@@ -107,7 +107,8 @@ class Cluster(Generic[Task, Result]):
     def __init__(self, bench: Workable[Task, Result | Late | Crashed], address: str, jobs: int) -> None:
         self._bench, self._address, self._jobs = bench, address, jobs
         self._stack = ExitStack()
-        self._threads = jobs
+        self.count = jobs
+        """How many tasks are done at once: the threads of all workers that there were in the beginning."""
 
     def __enter__(self) -> Cluster[Task, Result]:
         with ExitStack() as stack:
@@ -115,7 +116,7 @@ class Cluster(Generic[Task, Result]):
             self._client = client
             self._client.register_plugin(_Prepared(self._bench))
             stack.callback(self._leave)
-            self._threads = sum(self._client.nthreads().values())
+            self.count = sum(self._client.nthreads().values())
             self._stack = stack.pop_all()
         return self
 
@@ -140,7 +141,7 @@ class Cluster(Generic[Task, Result]):
                 made.append(future)
             return made
 
-        if not (first := sent(TASKS_A_WORKER * self._threads)):
+        if not (first := sent(TASKS_A_WORKER * self.count)):
             return
         running: Any = as_completed(first, loop=self._client.loop)  # type: ignore[no-untyped-call]
         for future in running:

@@ -20,12 +20,18 @@ LIMIT_NS = 600_000_000_000
 class Executor(AbstractContextManager["Executor"], Protocol):
     """Does tasks."""
 
+    @property
+    def count(self) -> int:
+        """How many tasks it does at once; known inside the `with` statement."""
+
     def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | Late | Crashed]]:
         """Each task with what came of it, in the order in which they end."""
 
 
 class InThisProcess(Executor):
     """Does one task after the other, in this process."""
+
+    count = 1
 
     def __init__(self, bench: AnyBench) -> None:
         self._bench = bench
@@ -41,6 +47,10 @@ class InThisProcess(Executor):
 class Workers(AbstractContextManager["Workers"], Protocol):
     """Who does tasks elsewhere: processes of this machine, or a cluster."""
 
+    @property
+    def count(self) -> int:
+        """How many tasks they do at once; known inside the `with` statement."""
+
     def results(self, tasks: Sequence[Task], limit_ns: int) -> Iterator[tuple[Task, Done | Late | Crashed]]:
         """Each task with what came of it, in the order in which they end."""
 
@@ -50,6 +60,10 @@ class ByWorkers(Executor):
 
     def __init__(self, workers: Workers) -> None:
         self._workers = workers
+
+    @property
+    def count(self) -> int:
+        return self._workers.count
 
     def __enter__(self) -> ByWorkers:
         self._workers.__enter__()

@@ -72,14 +72,14 @@ def conduct(bench: AnyBench, outcome: Outcome, jobs: int, take: Callable[[Sequen
     if bench.ends_processes:
         with others or in_processes(bench, jobs) as those:
             left, once_ns = _first_runs(those, outcome.left, take)
-            _execute(those, left, _size(bench, once_ns, len(left), jobs), take)
+            _execute(those, left, _size(bench, once_ns, len(left), those.count), take)
             if shrinks:
                 _shrink(those, outcome)
         return
     left, once_ns = _first_runs(InThisProcess(bench), outcome.left, take)
     is_quick = others is None and (jobs == 1 or once_ns * len(left) < QUICK_NS)
     with InThisProcess(bench) if is_quick else others or in_processes(bench, jobs) as those:
-        _execute(those, left, 1 if is_quick else _size(bench, once_ns, len(left), jobs), take)
+        _execute(those, left, 1 if is_quick else _size(bench, once_ns, len(left), those.count), take)
         if shrinks:
             _shrink(those, outcome)
 
@@ -98,9 +98,9 @@ def _first_runs(executor: Executor, left: Sequence[int], take: Callable[[Sequenc
     return left, once_ns
 
 
-def _size(bench: AnyBench, once_ns: int, count: int, jobs: int) -> int:
-    """How many runs a batch has, if each of so many takes so long."""
-    return max(1, min(bench.batch_ns // max(once_ns, 1), MOST_IN_BATCH, count // jobs))
+def _size(bench: AnyBench, once_ns: int, count: int, workers: int) -> int:
+    """How many runs a batch has, if each of so many takes so long, and so many workers share them."""
+    return max(1, min(bench.batch_ns // max(once_ns, 1), MOST_IN_BATCH, count // workers))
 
 
 def _execute(executor: Executor, numbers: Sequence[int], size: int, take: Callable[[Sequence[Result]], None]) -> None:

@@ -12,7 +12,7 @@ from fbvm.base.types import BOOL, Elementary, EnumType, SubrangeType, base
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.bounded import Inputs
-from fbvm.prove.encoding.cells import BIT, Cell
+from fbvm.prove.encoding.cells import BIT, NUMBER, Cell
 from fbvm.prove.encoding.terms import Term
 from fbvm.prove.invariants import Sample, Values
 from fbvm.prove.question import ALWAYS, NO_TRAP, WITHIN, WRITTEN_ONCE, Question, Run
@@ -282,7 +282,7 @@ def stepped(plc: Plc, writer: InputWriter, inputs: Inputs) -> Iterator[dict[Plac
 def replayed(machine: Machine, judge: Judge, inputs: Inputs, is_shortest: bool) -> Run | None:
     """The run with these inputs, done on the engine; None if it does not meet the goal in its last scan, or earlier only."""
     plc = machine.plc()
-    writer = InputWriter(plc, list(inputs.values[0]) if inputs.values else [])
+    writer = InputWriter(plc, [*dict.fromkeys(cell for now in inputs.values for cell in now)])
     writes: list[dict[Place, Value]] = []
     with judge.judging(plc) as judging:
         for number, written in enumerate(stepped(plc, writer, inputs)):
@@ -298,6 +298,20 @@ def replayed(machine: Machine, judge: Judge, inputs: Inputs, is_shortest: bool) 
             if plc.trap:
                 return None
     return None
+
+
+def inputs_of(machine: Machine, run: Run) -> Inputs:
+    """What a run is given, as `replayed` takes it: of each scan only what is written before it."""
+    plc, inputs = machine.plc(), Inputs([], [*run.times_ns])
+    for writes, now_ns in zip(run.writes, run.times_ns, strict=True):
+        for place, value in writes.items():
+            plc.write(place, value)
+        cells = [Cell(place.offset, 1, BIT, place.bit) if place.bit is not None else Cell(place.offset, place.type.size, NUMBER)
+                 for place in writes]  # fmt: skip
+        writer = InputWriter(plc, cells)
+        inputs.values.append({cell: writer.read(cell) for cell in cells})
+        plc.scan(now_ns)
+    return inputs
 
 
 def repeated(plc: Plc, run: Run) -> None:

@@ -143,6 +143,28 @@ def test_processes_give_the_results_of_this_process(folder: Path) -> None:
 
 
 
+class Six(InThisProcess):
+    """Says that it does six tasks at once, as a cluster does, and keeps which there were."""
+
+    count = 6
+
+    def __init__(self, bench: Bench) -> None:
+        super().__init__(bench)
+        self.sizes: list[int] = []
+
+    def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Any]]:
+        self.sizes += [len(task.numbers) for task in tasks if isinstance(task, Batch)]
+        return super().done(tasks)
+
+
+@pytest.mark.slow
+def test_runs_are_shared_by_all_who_do_them_whatever_the_processes_of_this_machine_are(folder: Path) -> None:
+    bench = replace(bench_of(runs=20), batch_ns=1 << 60)
+    executor = Six(bench)
+    conduct(bench, outcome := Outcome(bench.plan), 1, outcome.add, executor)
+    assert executor.sizes == [3] * 6
+
+
 class KillsRun(Bench):
     """A bench whose processes end when they come to run 7, as a defect of machine code would end them."""
 
@@ -236,6 +258,8 @@ PLANTED = ("Failures := Failures + 1;", "Failures := Failures + 1; Level := Want
 class Interrupted(InThisProcess):
     """Is interrupted by Ctrl-C after two batches."""
 
+    count = 5
+
     def done(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Done | None]]:
         for number, found in enumerate(super().done(tasks)):
             if number == 2:
@@ -252,7 +276,7 @@ def test_what_was_done_before_ctrl_c_is_kept(folder: Path) -> None:
         outcome.add(found)
 
     with closing(store), pytest.raises(KeyboardInterrupt):
-        conduct(bench, outcome, 5, take, Interrupted(bench))
+        conduct(bench, outcome, 1, take, Interrupted(bench))
     with closing(Store(folder / "kept", bench.mark)) as again:
         assert again.known == outcome.rows
         assert 3 <= len(again.known) < 20

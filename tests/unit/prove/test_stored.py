@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from rows import each_of
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
@@ -50,7 +51,7 @@ def made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Question]:
 def test_a_proof_is_made_once(made: list[Question]) -> None:
     first, second = (stored.proved_once(image_of(TEXT), ASKED, Limits()) for _ in range(2))
     assert (len(made), first.is_kept, second.is_kept) == (1, False, True)
-    assert replace(second, is_kept=False, places=first.places) == first
+    assert replace(second, is_kept=False) == first
 
 
 LATER = Question(WITHIN, "Main.b >= 0", trigger="Main.a > 3", within_ns=10_000_000)
@@ -75,10 +76,52 @@ def test_what_the_type_of_an_input_says_belongs_to_the_proof(made: list[Question
     assert stored.proved_once(image_of(TEXT.replace("0..10", "0..20")), ASKED, Limits()).word == "broken"
 
 
-def test_what_no_run_reaches_is_kept_and_what_a_run_does_is_not(made: list[Question]) -> None:
-    never, run = Question(REACH, "Main.b > 10"), Question(REACH, "Main.b > 9")
-    assert [stored.proved_once(image_of(TEXT), never, Limits()).is_kept for _ in range(2)] == [False, True]
-    assert [stored.proved_once(image_of(TEXT), run, Limits()).is_kept for _ in range(2)] == [False, False]
+REACHES = [Question(REACH, "Main.b > 10"), Question(REACH, "Main.b > 9"), Question(NEVER, "Main.b > 9")]
+
+
+@each_of("question", REACHES)
+def test_what_no_run_reaches_is_kept_and_the_shortest_run_that_does(made: list[Question], question: Question) -> None:
+    first, second = (stored.proved_once(image_of(TEXT), question, Limits()) for _ in range(2))
+    assert (first.is_kept, second.is_kept, made.count(question)) == (False, True, 1)
+    assert replace(second, is_kept=False) == first
+
+
+MIX = """PROGRAM Main
+VAR
+    Go AT %IX0.0 : BOOL;
+    Stop AT %IX0.1 : BOOL;
+    r  AT %ID4 : REAL;
+    Number AT %IW2 : INT;
+    Sum : DINT;
+END_VAR
+    IF Go AND NOT Stop AND r > 1.5 THEN
+        Sum := Sum + INT_TO_DINT(Number);
+        Number := 0;
+    END_IF;
+END_PROGRAM
+"""
+
+
+@pytest.mark.slow
+def test_a_run_of_many_inputs_that_the_program_writes_too_is_kept_as_it_is(made: list[Question]) -> None:
+    question, limits = Question(REACH, "Main.Sum = 40000"), Limits(longest_ns=20_000_000)
+    first, second = (stored.proved_once(image_of(MIX), question, limits) for _ in range(2))
+    assert (first.word, second.is_kept, first.run and first.run.scans) == ("reached", True, 2)
+    assert replace(second, is_kept=False) == first
+
+
+def test_a_run_that_does_something_else_by_now_is_looked_for_again(made: list[Question]) -> None:
+    stored.proved_once(image_of(TEXT), REACHES[1], Limits())
+    [file] = stored.PROOFS.folder.iterdir()
+    content = json.loads(stored.PROOFS.read(file.name) or b"")
+    offset = content["run"][1][0][0][0]
+    runs = [[[0], []], [[0], [[]]], [[0], [[[offset, 2, 0, 0, 4]]]], [[0], [[[offset, 2, 0, 0, -4]]]],
+            [[0], [[[1 << 40, 2, 0, 0, 4]]]],
+            [[0], [[[-2, 2, 0, 0, 4]]]], [["x"], [[[offset, 2, 0, 0, 10]]]], [[], []], None, "run"]  # fmt: skip
+    for number, run in enumerate(runs):
+        stored.PROOFS.write(file.name, json.dumps(content | {"run": run}).encode())
+        assert not stored.proved_once(image_of(TEXT), REACHES[1], Limits()).is_kept, run
+        assert len(made) == number + 2
 
 
 def test_a_note_that_names_a_line_is_made_anew_where_lines_have_moved(made: list[Question]) -> None:
