@@ -254,6 +254,16 @@ def test_bits_of_a_word_are_told_apart(plc: Plc, names: Names) -> None:
     assert [isinstance(signal, Signal) and signal in made.writers for signal in made.signals] == [True, False, True]
 
 
+def test_a_write_is_one_of_the_bytes_that_it_covers_alone() -> None:
+    image = compile_text("PROGRAM Main VAR a, b, c : INT; x, y, z : BOOL; END_VAR b := 1; y := TRUE; END_PROGRAM").image
+    assert image is not None
+    plc = Plc(image)
+    made = table(plc, Names.of(image, plc.memory.areas), *[f"Main.{name}" for name in "abcxyz"])
+    with observing(plc, made):
+        plc.scan()
+    assert [signal.label for signal in made.writers] == ["Main.b", "Main.y"]
+
+
 # --- double writes ----------------------------------------------------------------------------------------------------
 
 

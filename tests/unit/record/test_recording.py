@@ -289,6 +289,7 @@ def test_a_scan_that_did_not_end_can_be_followed_to_its_end(image: Image) -> Non
     assert kept.scans == range(4)
     kept.follow(again, range(4, 5))
     assert again.rows[0][:2] == (4, 40_000_000)
+    assert [done.read("Main.Steps.Count") for done in kept.again(range(4, 5))] == [1], "with the input that it was given"
     plc.run(scans=2)
     assert contents(kept.at(6)) == contents(plc)
 
@@ -306,6 +307,18 @@ def test_a_scan_that_stood_at_a_breakpoint_does_not_lead_astray(image: Image) ->
     assert plc.read("Main.Steps.Count") == 4
     assert contents(kept.at(plc.scans)) == contents(plc)
     assert kept.at(2).read("Main.n") == 2
+
+
+def test_many_inputs_lead_to_a_keyframe(image: Image, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_INPUT_BYTES", 1000)
+    plc = Plc(image)
+    kept = recorded(plc)
+    for value in range(40):
+        plc.memory.u8[-100:] = bytes([value + 1]) * 100
+        plc.scan()
+    firsts = sorted({kept.chunk(scan).first for scan in kept.scans})
+    assert firsts[0] == 0 and 3 <= len(firsts) <= 10
+    assert [done.memory.u8[-1] for done in kept.again(range(28, 32))] == [29, 30, 31, 32]
 
 
 # --- units ------------------------------------------------------------------------------------------------------------
