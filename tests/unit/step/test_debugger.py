@@ -135,6 +135,16 @@ def test_reverse_goes_to_the_last_change_and_then_to_the_beginning() -> None:
     assert done(found.reverse()) is None and found.session.here == Position(0, 0)
 
 
+def test_reverse_stops_at_an_earlier_statement_of_the_same_scan() -> None:
+    found = debugger()
+    found.session.goto(1)
+    for _ in range(4):
+        done(found.into())
+    found.here.put([line("text.st:14")])
+    reached = done(found.reverse())
+    assert reached and reached.position == Position(1, 1) and where(found) == (1, 14)
+
+
 @pytest.mark.slow
 def test_a_hit_count_belongs_to_the_past() -> None:
     found = debugger()

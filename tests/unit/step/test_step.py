@@ -145,6 +145,13 @@ def test_what_is_written_in_the_past_leads_elsewhere() -> None:
     assert commands.session.read("Main.N") == 2
 
 
+def test_what_is_written_in_the_past_takes_back_what_was_written_later() -> None:
+    commands = made()
+    said(commands, "scan 6", "Main.R := 7", "scan 2", "goto 3", "Main.N := 40", "scan 3")
+    assert commands.session.here == Position(6)
+    assert (commands.session.read("Main.N"), commands.session.read("Main.R")) == (43, 0)
+
+
 def test_a_write_in_mid_scan_stays_when_the_scan_is_done_again() -> None:
     commands = made()
     said(commands, "run 5", "Main.T.Q = 7", "step")

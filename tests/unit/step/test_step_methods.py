@@ -116,6 +116,13 @@ def test_a_property_is_read_through_its_accessor_without_a_trace(commands: Comma
         list(commands.run("why Main.slow.Actual"))
 
 
+@pytest.mark.parametrize("name", ["Main.n.Actual", "Main.nobody.Actual", "nobody.Actual", "Actual", "Main.Actual"])
+def test_what_has_no_property_is_not_there(commands: Commands, name: str) -> None:
+    list(commands.run("scan"))
+    with pytest.raises(CommandError, match="there is no|has no"):
+        list(commands.run(f"print {name}"))
+
+
 def test_a_property_whose_accessor_ends_with_a_trap_says_so_and_leaves_the_memory() -> None:
     compilation = compile_text(TEXT.replace("Actual := Speed * 2;", "Speed := Speed + 1; Actual := 8 / (Speed - 1);"))
     image = compilation.image
