@@ -11,6 +11,7 @@ from fbvm.machine.plc import Plc
 from fbvm.record.trace.packets import add_tap
 from fbvm.watch.paths import Place
 from fbvm.watch.values import show_time
+from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu, Splitter, decode_reply
 from fbvm.wire.tap import DATA, TapEvent
 
@@ -60,7 +61,7 @@ class BetweenScans:
 
     def attached(self, plc: Plc) -> None:
         """Listens to the networks of a PLC."""
-        self._streams: dict[tuple[object, object], Splitter] = {}
+        self._streams: dict[tuple[Peer, Peer, bool], Splitter] = {}
         self._passed: list[str] = []
         self._codes = {place.name: place for place in _response_codes(plc)}
         self._before = {name: plc.read(place) for name, place in self._codes.items()}
@@ -105,9 +106,9 @@ class BetweenScans:
         return True
 
     def _tap(self, now_ns: int, unit: str, event: TapEvent) -> None:
-        if event.kind is not DATA:
+        if event.kind is not DATA or event.mirrored and not event.out:  # its other end has told of it
             return
-        stream = self._streams.setdefault((event.local, event.remote) if event.out else (event.remote, event.local), Splitter())
+        stream = self._streams.setdefault((event.local, event.remote, event.out), Splitter())
         for frame in stream.feed(event.data) if not stream.broken else ():
             if isinstance(frame, Adu) and frame.pdu and frame.pdu[0] & 0x80:
                 reply = decode_reply(frame.pdu)

@@ -146,6 +146,18 @@ def test_reverse_stops_at_an_earlier_statement_of_the_same_scan() -> None:
 
 
 @pytest.mark.slow
+def test_reverse_goes_over_to_the_plc_whose_breakpoint_was_reached_last() -> None:
+    found = debugger(names=("a", "b"))
+    done(found.scan(4))
+    found.plcs["a"].put([line("text.st:14", "N = 2")])
+    found.plcs["b"].put([line("text.st:14", "N = 3")])
+    reached = done(found.reverse())
+    assert reached and (reached.plc, found.focus, where(found)) == ("b", "b", (2, 14))
+    reached = done(found.reverse())
+    assert reached and (reached.plc, found.focus, where(found)) == ("a", "a", (1, 14))
+
+
+@pytest.mark.slow
 def test_a_hit_count_belongs_to_the_past() -> None:
     found = debugger()
     found.here.put([line("text.st:5", hits="7")])

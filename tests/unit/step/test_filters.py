@@ -17,6 +17,7 @@ from fbvm.step.session import Session
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
+from fbvm.wire.tap import TapEvent, TapKind
 
 HOUSE = Path(__file__).resolve().parents[3]
 
@@ -63,6 +64,24 @@ def test_a_response_code_of_the_unit_stops_it() -> None:
     found.session.goto(0)
     found.checks = {"plc": BetweenScans({"response": frozenset((0x9999,))})}
     assert done(found.resume(reached.position.scan + 1)) is None
+
+
+@pytest.mark.slow
+def test_an_exception_between_two_units_of_one_plc_is_seen_however_tcp_cuts_it() -> None:
+    """Both ends tell of each piece."""
+    found = demo()
+    plc = found.plcs["plc"].session.world["plc"]  # type: ignore[union-attr]
+    check = BetweenScans({"modbus": frozenset()})
+    check.attached(plc)
+    tell = plc.units[0].network.tap
+    assert tell is not None
+    client, server = Peer("192.168.250.21", 1025), Peer("192.168.250.22", 502)
+    for piece in (b"\0\x07\0\0\0\3\x05", b"\x83\x02"):
+        tell(0, server.host, TapEvent(TapKind.DATA, server, client, True, piece, mirrored=True))
+        tell(0, client.host, TapEvent(TapKind.DATA, client, server, False, piece, mirrored=True))
+        tell(0, client.host, TapEvent(TapKind.DATA, client, server, True, b"\0"))
+    assert check.checked(plc) and check.found == "Modbus 7, unit 5: 03 read holding registers, exception 02 illegal data address"
+    assert not check.checked(plc)
 
 
 def late_scans(wanted: frozenset[int], *began_ms: int) -> list[str]:

@@ -119,7 +119,7 @@ def test_a_property_is_read_through_its_accessor_without_a_trace(commands: Comma
 @pytest.mark.parametrize("name", ["Main.n.Actual", "Main.nobody.Actual", "nobody.Actual", "Actual", "Main.Actual"])
 def test_what_has_no_property_is_not_there(commands: Commands, name: str) -> None:
     list(commands.run("scan"))
-    with pytest.raises(CommandError, match="there is no|has no"):
+    with pytest.raises(CommandError, match=r"there is no|has no"):
         list(commands.run(f"print {name}"))
 
 
