@@ -117,7 +117,7 @@ def test_behind_a_power_cut_a_plc_begins_anew(program: tuple[Project, Any], cold
 
 def test_a_bench_refuses_other_programs_and_versions(program: tuple[Project, Any]) -> None:
     bench = Bench.of(plan(program), program[1])
-    with pytest.raises(Mismatch, match="not 0.0"):
+    with pytest.raises(Mismatch, match=r"not 0\.0"):
         replace(bench, version="0.0", mark="a").execution()
     with pytest.raises(Mismatch, match="plc has arrived as another program"):
         replace(bench, images=tuple((name, "other", data) for name, _, data in bench.images), mark="b").execution()
@@ -165,7 +165,8 @@ def test_an_axis_is_named_by_what_it_varies() -> None:
 
 
 def test_the_type_of_a_column_is_that_of_its_values() -> None:
-    kinds = [_kind(Axis("a", "value", values, "", "a", 0)) for values in ((1, 2), (1, 2.5), (1.5,), (1, "T#1s"), ("TRUE",), (True,))]
+    values = ((1, 2), (1, 2.5), (1.5,), (1, "T#1s"), ("TRUE",), (True,))
+    kinds = [_kind(Axis("a", "value", each, "", "a", 0)) for each in values]
     assert kinds == [int, float, float, str, str, str]
     assert _kind(Axis("cycle", "cycle", (10, 20), "", "", 0)) is str
 
@@ -229,8 +230,8 @@ class Answers:
 
 def test_what_came_of_mutants_is_entered_and_survivors_are_proved_equal() -> None:
     mutants = [mutant(number, "a + 1", "a", "Twin") for number in range(1, 6)]
-    workers = Answers(plain=(0, ""), tried1=(KILLED, "test_a"), tried2=Late(), tried3=Crashed("by SIGKILL"), tried4=(SURVIVED, ""),
-                      tried5=(SURVIVED, ""), equal4="proved by induction", equal5="")  # fmt: skip
+    workers = Answers(plain=(0, ""), tried1=(KILLED, "test_a"), tried2=Late(), tried3=Crashed("by SIGKILL"),
+                      tried4=(SURVIVED, ""), tried5=(SURVIVED, ""), equal4="proved by induction", equal5="")  # fmt: skip
     outcome, told = Outcome(len(mutants)), list[int]()
     settings = Settings(budget_ns=1000 * MS)
     session._try_all(workers, mutants, settings, outcome, lambda seen: told.append(len(seen.tried)))  # type: ignore[arg-type]
@@ -275,7 +276,7 @@ def test_conditions_are_judged_once_all_their_variables_are_there() -> None:
     assert watched.judge is not None and watched.why == ""
     varied.plc.write("Main.Up", True)
     varied.plc.scan()
-    with pytest.raises(Violated, match="Main.Up behind scan 1 of plc") as raised:
+    with pytest.raises(Violated, match=r"Main\.Up behind scan 1 of plc") as raised:
         watched(run, varied.plc.now_ns)
     assert (raised.value.failure.kind, raised.value.failure.plc, raised.value.failure.scan) == (NEVER, "plc", 1)
 
@@ -290,7 +291,8 @@ def test_a_project_is_copied_without_what_is_no_part_of_it(tmp_path: Path, monke
     copy_project(tmp_path / "p", tmp_path / "copy")
     unpack_project(pack_project(tmp_path / "p"), tmp_path / "unpacked" / "deep")
     for folder in ("copy", "unpacked/deep"):
-        found = sorted(path.relative_to(tmp_path / folder).as_posix() for path in (tmp_path / folder).rglob("*") if path.is_file())
+        there = [path for path in (tmp_path / folder).rglob("*") if path.is_file()]
+        found = sorted(path.relative_to(tmp_path / folder).as_posix() for path in there)
         assert found == kept and (tmp_path / folder / "tests/test_a.py").read_text() == "tests/test_a.py"
     assert pack_project(tmp_path / "p") == pack_project(tmp_path / "copy")
     monkeypatch.setattr(project_copies, "MOST_BYTES", 20)
