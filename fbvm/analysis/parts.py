@@ -42,8 +42,8 @@ class Part:
 
     source: Source
     """The text of the part under the name of its file."""
-    base: int
-    """Where the part begins in its file, in characters from 0; changes when text in front of it does."""
+    base: int = field(init=False)
+    """Where the part begins in its file, in characters from 0: its file says so, again when text in front of it changes."""
 
     @cached_property
     def _parsed(self) -> tuple[tree.SourceText, list[Diagnostic]]:
@@ -51,7 +51,7 @@ class Part:
 
     def copied(self) -> Part:
         """The same part, with the same tree, which moves apart from this one."""
-        other = Part(Source(self.source.name, self.source.text, first_line=self.source.first_line), self.base)
+        other = Part(Source(self.source.name, self.source.text, first_line=self.source.first_line))
         vars(other).update({name: known for name, known in vars(self).items() if name != "source"})
         return other
 
@@ -135,7 +135,7 @@ class File:
 
         Returns the pairs that `replace` does.  Of as many texts as parts, each part whose text is the same stays."""
         kept = {at for at, part in enumerate(gone) if len(gone) == len(texts) and part.source.text == texts[at]}
-        between = [gone[at] if at in kept else Part(Source(self.name, part), 0) for at, part in enumerate(texts)]
+        between = [gone[at] if at in kept else Part(Source(self.name, part)) for at, part in enumerate(texts)]
         self.parts = [*self.parts[:head], *between, *self.parts[len(self.parts) - tail:]]
         moved = self._place_parts()
         new = [part for at, part in enumerate(self.parts[head:len(self.parts) - tail]) if at not in kept]
@@ -164,8 +164,9 @@ class File:
         base, line = 0, 1
         for at, part in enumerate(self.parts):
             if part.source.first_line != line and part.names_lines:
-                made.append((part, Part(Source(self.name, part.source.text), 0)))
-                self.parts[at] = part = made[-1][1] or part
+                self.parts[at] = Part(Source(self.name, part.source.text))
+                made.append((part, self.parts[at]))
+                part = self.parts[at]
             part.base, part.source.first_line = base, line
             base, line = base + len(part.source.text), line + len(part.source.line_starts) - 1
         return made

@@ -53,7 +53,7 @@ TESTS = {
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
-    "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run"),
+    "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run", "tests/fblib/test_network_instructions.py"),
     "record": ("tests/unit/record", "tests/unit/cli", "tests/cx/test_diff.py"), "run": ("tests/unit/run", "tests/unit/net"),
     "testing": ("tests/unit/testing", "tests/twincat"), "cli": ("tests/unit/cli",),
     "analysis": ("tests/unit/analysis", "tests/unit/lsp"),

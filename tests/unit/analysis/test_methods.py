@@ -121,6 +121,11 @@ def test_what_an_instance_has_behind_a_point() -> None:
     assert [each.label for each in complete(program, "pump.st", offset)] == ["Turn"]
 
 
+def test_a_method_without_a_result_has_nothing_behind_a_point() -> None:
+    program, offset = at_line(f"quick.Secret.{MARK};")
+    assert complete(program, "pump.st", offset) == []
+
+
 @pytest.mark.slow
 def test_what_can_be_named_in_a_method() -> None:
     program, offset = plant("held := held + amount", "held")

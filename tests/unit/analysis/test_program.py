@@ -59,6 +59,34 @@ def test_a_new_pin_concerns_others_and_needs_a_whole_check() -> None:
     assert codes(program) == [("S0201", 4), ("S0402", 9)]
 
 
+FUNCTION = "FUNCTION Twice : INT\nVAR_INPUT x : INT; END_VAR\n    Twice := x * 2;\nEND_FUNCTION\n"
+
+
+@each_of("text, old, new", [
+    (TWO.replace("END_VAR\n    Runs", "END_VAR\nVAR n : INT; END_VAR\n    Runs"), "n : INT", "n : DINT"),
+    (FUNCTION, "x * 2", "x * 3"),
+    (TWO, "Level := 100", "Level := 101"),
+    (TWO + "ACTIONS Main\nACTION Stop: On := FALSE; END_ACTION\nEND_ACTIONS\n", "On := FALSE", "On := TRUE"),
+])
+def test_a_change_inside_of_a_pou_concerns_nobody_else(text: str, old: str, new: str) -> None:
+    assert edited(text, (old, new)).check_changes()
+
+
+@each_of("text, old, new", [
+    (FUNCTION, "Twice : INT", "Twice : DINT"),
+    (FUNCTION.replace("x : INT", "x : ANY_INT"), "x * 2", "x * 3"),
+    (FUNCTION + FUNCTION.replace("* 2", "* 4"), "x * 4", "x * 5"),
+    (TWO + "FUNCTION_BLOCK Big EXTENDS Pump\nEND_FUNCTION_BLOCK\n", "Level < 200", "Level < 300"),
+    (TWO.replace("    Runs :=", "METHOD Stop\n    ;\nEND_METHOD\n    Runs :="), "Level < 200", "Level < 300"),
+    (TWO + "ACTIONS Main\nACTION Stop: On := FALSE; END_ACTION\nEND_ACTIONS\n", "ACTION Stop", "ACTION Halt"),
+    (TWO.replace("%QX0.0", "%Q*") + "CONFIGURATION C\nPROGRAM P : Main;\nVAR_CONFIG P.On AT %QX0.0 : BOOL; END_VAR\n"
+     "END_CONFIGURATION\n", "Level < 200", "Level < 300"),
+    ("TYPE T : INT; END_TYPE\n" + FUNCTION, "T : INT", "T : DINT"),
+])
+def test_a_change_that_others_may_notice_needs_a_whole_check(text: str, old: str, new: str) -> None:
+    assert not edited(text, (old, new)).check_changes()
+
+
 def test_a_file_that_is_new_needs_a_whole_check() -> None:
     program = edited(TWO)
     program.replace("other.st", "VAR_GLOBAL shared : INT; END_VAR\n")
@@ -73,6 +101,13 @@ def test_a_local_variable_of_a_block_concerns_nobody_else() -> None:
 
 def test_lines_in_front_move_messages_and_the_line_numbers_in_them() -> None:
     program = edited(TWO.replace("On := P1.Runs;", "IF On THEN"), ("PROGRAM", "// one\n// two\nPROGRAM"))
+    program.check_all()
+    assert [(each.line, each.message) for each in program.diagnostics("pump.st")] == [
+        (13, "END_IF expected before `END_PROGRAM`: the IF of line 12 is still open")]
+
+
+def test_lines_in_an_earlier_declaration_move_the_line_numbers_in_messages() -> None:
+    program = edited(TWO.replace("On := P1.Runs;", "IF On THEN"), ("    Runs :=", "    // one\n    // two\n    Runs :="))
     program.check_all()
     assert [(each.line, each.message) for each in program.diagnostics("pump.st")] == [
         (13, "END_IF expected before `END_PROGRAM`: the IF of line 12 is still open")]

@@ -62,6 +62,11 @@ def test_a_name_leads_to_its_declaration_and_to_all_its_places(before: str, word
     check_declaration(PLANT, before, word, line, count)
 
 
+def test_names_of_a_generic_function_that_nobody_calls_have_declarations() -> None:
+    text = PLANT.replace("x : INT", "x, y : ANY_INT").replace("Twice(x := Total)", "1")
+    check_declaration(text, "x * 2", "x", 7, 2)
+
+
 def test_places_know_whether_they_read_or_write() -> None:
     program, offset = plant("Total := Total", "Total")
     used = use_at(program, "pump.st", offset)

@@ -72,6 +72,12 @@ def test_completion_offers_what_fits(line: str, first: list[str], absent: list[s
     assert not set(absent) & set(offered)
 
 
+@each_of("line", ["// the pump ‸", "(* the pump ‸", "P1.hidden.‸", "P1.Runs.‸", "nobody.‸"])
+def test_completion_offers_nothing_in_a_comment_and_behind_what_has_no_parts(line: str) -> None:
+    program, offset = at_mark(HEAD + line + "\nEND_PROGRAM\n")
+    assert complete(program, "pump.st", offset) == []
+
+
 @each_of("line, some", [
     ("x : ‸", {"Pump", "Tank", "INT", "TON"}), ("x AT ‸", {"D210", "CIO", "%M"}), ("‸", {"END_VAR"}),
     ("x : ARRAY [0..1] OF ‸", {"Tank", "WORD"}),
@@ -90,9 +96,12 @@ def test_completion_between_declarations_offers_declarations() -> None:
     ("P1(‸", "Pump(Level := INT, Runs => BOOL)", 0),
     ("P1(Level := (1 + 2), ‸", "Pump(Level := INT, Runs => BOOL)", 1),
     ("P1(Runs => On, Level := ‸", "Pump(Level := INT, Runs => BOOL)", 0),
+    ("P1(1, On, ‸", "Pump(Level := INT, Runs => BOOL)", None),
+    ("P1(Runs => On, Height := ‸", "Pump(Level := INT, Runs => BOOL)", None),
+    ("D[0] := SEL(On, 1, 2, ‸", "SEL(G : BOOL, IN0 : T, IN1 : T) : T  (T: ANY)", 2),
     ("D[0] := SEL(On, ‸1, 2);", "SEL(G : BOOL, IN0 : T, IN1 : T) : T  (T: ANY)", 1),
 ])
-def test_the_signature_of_a_call_marks_the_present_argument(line: str, label: str, active: int) -> None:
+def test_the_signature_of_a_call_marks_the_present_argument(line: str, label: str, active: int | None) -> None:
     program, offset = at_mark(HEAD + line + "\nEND_PROGRAM\n")
     shown = signature(program, "pump.st", offset)
     assert shown is not None
