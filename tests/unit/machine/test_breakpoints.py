@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from rows import each_of
 
 from fbvm import Plc, compile_text
 from fbvm.code.image import Image
@@ -110,6 +111,39 @@ def test_a_line_with_a_condition(plc: Plc) -> None:
     plc.breakpoints.line("text.st:4", when="Main.f.a = 3 AND Main.f.n > 10")
     first = next(halts(plc, 3))
     assert (first.scan, first.frames[0].base) == (1, plc.find("Main.g").offset)  # type: ignore[union-attr]
+
+
+@each_of("where, when, stops", [
+    ("Main", "i = 0 AND x = 0.0", [(0, 0)]),
+    ("Main", "g.n = 2", [(2, 0)]),
+    ("Adder", "n = 1", [(0, 1), (1, 3)]),
+    ("Main.g", "n = 1", [(1, 3)]),
+])
+def test_a_condition_names_variables_of_its_pou_without_a_path(where: str, when: str, stops: list[tuple[int, int]]) -> None:
+    """`stops` are the scan and how often the block had been called in it before."""
+    plc = Plc(image(), engine="python")
+    plc.breakpoints.line(where, when=when)
+    assert [(halt.scan, int(str(plc.read("Main.i"))) - 1 if where != "Main" else 0) for halt in halts(plc, 3)] == stops
+
+
+def test_a_condition_names_variables_of_a_function() -> None:
+    plc = Plc(image("""FUNCTION Twice : INT VAR_INPUT x : INT; END_VAR
+  Twice := x * 2;
+END_FUNCTION
+PROGRAM Main VAR n : INT; END_VAR n := n + Twice(n) + 1; END_PROGRAM"""), engine="python")
+    plc.breakpoints.line("Twice", when="x = 4")
+    assert [halt.scan for halt in halts(plc, 4)] == [2]
+
+
+def test_a_log_point_tells_once_and_does_not_stop() -> None:
+    plc = Plc(image(), engine="python")
+    plc.breakpoints.line("Main", message="i is {i}, {{D}} {D100:x} {D100..D101:x}, {nobody}")
+    assert plc.run(scans=2) == "scans"
+    told = plc.breakpoints.take_told()
+    assert [(each.scan, each.text) for each in told] == [
+        (0, "i is 0, {D} 16#0000 [16#0000, 16#0000], <there is no nobody; known here: Main>"),
+        (1, "i is 4, {D} 16#0006 [16#0006, 16#0000], <there is no nobody; known here: Main>")]
+    assert plc.breakpoints.take_told() == []
 
 
 @pytest.mark.parametrize(("where", "words"), [

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import pytest
 from images import D200, counter_image, task
+from rows import each_of
 
 from fbvm.base.areas import DUE
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Mode, Plc, Stopped
+from fbvm.net.loop import LoopNetwork
 from fbvm.units.contract import AreaMemory
 from fbvm.watch.conditions import ConditionError
-from fbvm.watch.paths import UnknownPlace
+from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.link import Event, Link, Request, Send, Sent
 
 MS = 1_000_000
@@ -306,6 +308,46 @@ def test_a_snapshot_is_a_way_back(plc: Plc) -> None:
     assert (plc.scans, plc.now_ns, plc.read("Main.n"), plc.forces) == (3, 20 * MS, 3, {"D7": 7})
     plc.run(scans=4)
     assert bytes(plc.memory.snapshot()) == bytes(after)
+
+
+class _Told:
+    """A recorder that counts what is no input."""
+
+    wants_plain_scans = False
+
+    def __init__(self) -> None:
+        self.changes = 0
+
+    def changed(self) -> None:
+        self.changes += 1
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *told: None
+
+
+@each_of("change", [
+    lambda plc: plc.warm_start(), lambda plc: plc.cold_start(), lambda plc: setattr(plc, "mode", Mode.PROGRAM),
+    lambda plc: plc.restore(plc.snapshot()), lambda plc: plc.attach(_Echo(), LoopNetwork()),
+], ids=["warm start", "cold start", "mode", "restore", "unit"])
+def test_a_recorder_is_told_of_a_change_that_is_no_input(change: Callable[[Plc], None]) -> None:
+    plc, recorder = Plc(counter_image()), _Told()
+    plc.record_inputs(recorder)
+    assert plc.input_recorder is recorder
+    plc.run(scans=2)
+    assert recorder.changes == 0
+    change(plc)
+    assert recorder.changes == 1
+
+
+def test_a_reader_reads_a_place_again_and_again(plc: Plc) -> None:
+    place = plc.find("Main.n")
+    assert isinstance(place, Place)
+    read = plc.reader(place)
+    seen = []
+    for _ in range(3):
+        plc.scan()
+        seen.append(read())
+    assert seen == [1, 2, 3]
 
 
 def test_a_fork_goes_its_own_way(plc: Plc) -> None:

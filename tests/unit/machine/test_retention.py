@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from rows import each_of
+
 from fbvm import Plc, compile_text
 from fbvm.machine.endings import end_instances
 from fbvm.machine.retention import start_with_retained
@@ -65,6 +67,31 @@ def objects(text: str) -> Plc:
     image = compile_text(text, dialect="codesys").image
     assert image is not None
     return Plc(image)
+
+
+@each_of("block", [
+    "VAR_IN_OUT x : INT; END_VAR", "VAR x : INT := 50; END_VAR", "VAR x : REF_TO INT; END_VAR",
+])
+def test_a_value_that_was_behind_a_reference_is_not_kept(block: str) -> None:
+    main = "PROGRAM Main VAR RETAIN n : INT; b : B; END_VAR b({}); END_PROGRAM"
+    old = plc("FUNCTION_BLOCK B VAR_IN_OUT x : INT; END_VAR x := x + 1; END_FUNCTION_BLOCK " + main.format("x := n"))
+    new = plc(f"FUNCTION_BLOCK B {block} END_FUNCTION_BLOCK " + main.format("x := n" if "IN_OUT" in block else ""))
+    old.run(scans=2)
+    assert {place.name for place in start_with_retained(new, old)} == {"Main.n"}
+    assert new.read("Main.n") == 2
+
+
+def test_an_area_that_only_one_of_them_has_is_no_hindrance() -> None:
+    with_bank = "PROGRAM Main VAR e AT E0_5 : INT; n : INT; END_VAR n := e; END_PROGRAM"
+    old, new = plc(OLD), plc(with_bank)
+    old.write("D100", 7)
+    start_with_retained(new, old)
+    new.write("E0_5", 6)
+    assert (new.read("D100"), new.read("E0_5")) == (7, 6)
+    again = plc(with_bank)
+    start_with_retained(again, new)
+    start_with_retained(old, new)
+    assert (again.read("E0_5"), old.read("D100")) == (6, 7)
 
 
 def test_fb_exit_ends_instances_in_the_opposite_order_of_fb_init() -> None:
