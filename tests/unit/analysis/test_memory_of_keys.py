@@ -87,3 +87,24 @@ def test_garbage_is_collected_when_memory_has_grown_by_a_part(monkeypatch: pytes
     finally:
         known.end()
         gc.collect()
+
+
+def test_growth_counts_from_the_last_collection(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = garbage.Garbage()
+    collected: list[int] = []
+
+    def collections(way: Callable[[], None], *blocks: int) -> list[int]:
+        """At which of these numbers of blocks all is collected."""
+        collected.clear()
+        for now in blocks:
+            monkeypatch.setattr(sys, "getallocatedblocks", lambda now=now: now)
+            monkeypatch.setattr(gc, "collect", lambda now=now: collected.append(now))
+            way()
+        return list(collected)
+
+    try:
+        collections(known.collect, 1_000_000)
+        assert collections(known.typed, 1_900_000, 2_100_000, 2_700_000, 4_100_000, 4_300_000) == [2_100_000, 4_300_000]
+        assert collections(known.checked, 5_300_000, 5_400_000, 5_500_000) == [5_400_000]
+    finally:
+        known.end()

@@ -171,6 +171,12 @@ def test_a_task_that_a_variable_starts_is_looked_at_in_every_scan() -> None:
     many.write("Go", True)
     many.run(scans=50)
     assert many.read("Q.n") == 1
+    many.breakpoints.line("Main" if "PROGRAM Main" in text else "Other", when="Q.n = 99")
+    many.write("Go", False)
+    many.run(scans=50)
+    many.write("Go", True)
+    many.run(scans=50)
+    assert many.read("Q.n") == 2
 
 
 @pytest.mark.slow

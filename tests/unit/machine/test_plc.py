@@ -317,9 +317,13 @@ class _Told:
 
     def __init__(self) -> None:
         self.changes = 0
+        self.times_ns: list[int] = []
 
     def changed(self) -> None:
         self.changes += 1
+
+    def after(self, scans: int, now_ns: int, step_ns: int = 0) -> None:
+        self.times_ns += [now_ns + step_ns * number for number in range(scans)]
 
     def __getattr__(self, name: str) -> Callable[..., None]:
         return lambda *told: None
@@ -334,7 +338,7 @@ def test_a_recorder_is_told_of_a_change_that_is_no_input(change: Callable[[Plc],
     plc.record_inputs(recorder)
     assert plc.input_recorder is recorder
     plc.run(scans=2)
-    assert recorder.changes == 0
+    assert recorder.changes == 0 and recorder.times_ns == [0, 10 * MS]
     change(plc)
     assert recorder.changes == 1
 

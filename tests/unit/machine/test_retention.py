@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from rows import each_of
-
 from fbvm import Plc, compile_text
 from fbvm.machine.endings import end_instances
 from fbvm.machine.retention import start_with_retained
@@ -69,16 +67,16 @@ def objects(text: str) -> Plc:
     return Plc(image)
 
 
-@each_of("block", [
-    "VAR_IN_OUT x : INT; END_VAR", "VAR x : INT := 50; END_VAR", "VAR x : REF_TO INT; END_VAR",
-])
-def test_a_value_that_was_behind_a_reference_is_not_kept(block: str) -> None:
-    main = "PROGRAM Main VAR RETAIN n : INT; b : B; END_VAR b({}); END_PROGRAM"
-    old = plc("FUNCTION_BLOCK B VAR_IN_OUT x : INT; END_VAR x := x + 1; END_FUNCTION_BLOCK " + main.format("x := n"))
-    new = plc(f"FUNCTION_BLOCK B {block} END_FUNCTION_BLOCK " + main.format("x := n" if "IN_OUT" in block else ""))
-    old.run(scans=2)
-    assert {place.name for place in start_with_retained(new, old)} == {"Main.n"}
-    assert new.read("Main.n") == 2
+def test_what_was_or_is_behind_a_reference_is_not_kept() -> None:
+    main = "PROGRAM Main VAR RETAIN n : INT; r : {} INT; END_VAR {} n := n + 1; END_PROGRAM"
+    refers, holds = main.format("REFERENCE TO", "r REF= n;"), main.format("", "")
+    for before, after in ((refers, holds), (holds, refers), (refers, refers)):
+        old, new = objects(before), objects(after)
+        old.run(scans=2)
+        assert {place.name for place in start_with_retained(new, old)} == {"Main.n"}
+        assert new.read("Main.n") == 2
+        if after == holds:
+            assert new.read("Main.r") == 0
 
 
 def test_an_area_that_only_one_of_them_has_is_no_hindrance() -> None:
