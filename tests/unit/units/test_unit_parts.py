@@ -1,0 +1,197 @@
+"""Parts of units alone: settings and state of FINS, commands for the unit, faults, data areas, lines of a mailbox."""
+
+from __future__ import annotations
+
+from array import array
+from typing import Any
+
+import pytest
+from fins_rig import FinsRig, TcpClient
+from test_fins_connections import ClientRig
+
+from fbvm.units.etn21 import data
+from fbvm.units.etn21.faults import Fault
+from fbvm.units.etn21.fins.state import Connection, FinsSettings, FinsState, endpoints_of
+from fbvm.units.etn21.fins.unit_commands import Asked, execute
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21
+from fbvm.wire.fins import tcp
+from fbvm.wire.fins.tcp import Kind, Message
+from fbvm.wire.link import Peer, Received, Send, SendTo
+
+UNIT = "192.168.250.3"
+SERVER = Peer("192.168.250.26", 9600)
+
+# --- FINS: settings and state -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("given", "said"), [
+    ({"port": 65_536}, "port 65536"), ({"port": 0}, "port 0"), ({"node": 255}, "node 255"), ({"node": -1}, "node -1"),
+    ({"nodes": {0: SERVER}}, "node 0"), ({"nodes": {255: SERVER}}, "node 255"), ({"clients": {0: SERVER}}, "connection 0"),
+    ({"clients": {17: SERVER}}, "connection 17"), ({"clients": {1: Peer(UNIT, 9601)}}, "leads to the unit itself"),
+])  # fmt: skip
+def test_settings_out_of_their_ranges_are_refused(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        FinsSettings(UNIT, **given)
+
+
+def test_settings_at_the_ends_of_their_ranges_are_taken() -> None:
+    for port in (1, 65_535):
+        assert FinsSettings(UNIT, port=port).port == port
+    for node in (1, 254):
+        made = FinsSettings(UNIT, node=node, nodes={node: SERVER})
+        assert (made.own_node, made.disagrees) == (node, False)
+    assert {*FinsSettings(UNIT, clients={1: SERVER, 16: SERVER}).clients} == {1, 16}
+
+
+@pytest.mark.parametrize(("node", "nodes", "own", "disagrees"), [
+    (None, {}, 3, False), (3, {}, 3, False), (0, {}, 3, False), (7, {}, 7, True), (7, {9: SERVER}, 7, False),
+])  # fmt: skip
+def test_a_node_disagrees_with_the_address_if_no_table_says_why(
+    node: int | None, nodes: dict[int, Peer], own: int, disagrees: bool
+) -> None:
+    made = FinsSettings(UNIT, node=node, nodes=nodes)
+    assert (made.own_node, made.disagrees, made.host_part) == (own, disagrees, 3)
+
+
+def test_endpoints_as_projects_write_them() -> None:
+    assert endpoints_of({"2": "10.0.0.2", "30": "10.255.0.255:1", "4": "0.0.0.4:65535"}) == {
+        2: Peer("10.0.0.2", 9600), 30: Peer("10.255.0.255", 1), 4: Peer("0.0.0.4", 65_535)}
+
+
+@pytest.mark.parametrize("written", [
+    {"x": "10.0.0.2"}, {"2": "10.0.0"}, {"2": "10.0.0.2.3"}, {"2": "10.0.0.256"}, {"2": "10.0.0.2:0"}, {"2": "10.0.0.2:65536"},
+    {"2": "10.0.0.2:y"}, {"2": "10.0.0.z"},
+])  # fmt: skip
+def test_what_is_no_endpoint_is_refused(written: dict[str, str]) -> None:
+    with pytest.raises(ValueError, match="is no node with its address"):
+        endpoints_of(written)
+
+
+def test_the_state_of_the_service_is_the_same_behind_its_plain_values() -> None:
+    state = FinsState(
+        {1, 5}, {5}, {6}, True, {3: Connection(2, 9600, SERVER, True, 40, 26, b"FI")}, {7: SERVER}, [Received(1, b"x")],
+        [Send(3, b"a"), SendTo(1, SERVER, b"b")], 8, 9, {4: SERVER}, {4: 77}, {2: SERVER})  # fmt: skip
+    assert FinsState.of(state.plain) == state
+
+
+# --- FINS: commands for the unit --------------------------------------------------------------------------------------
+
+
+def done(code: int, parameters: str = "", state: FinsState | None = None, **settings: Any) -> tuple[int, str]:
+    made = Asked(FinsSettings(UNIT, **settings), state or FinsState(), 0xFFFF, bytes.fromhex(parameters))
+    end_code, answer = execute(code, made)
+    return end_code, answer.hex(" ")
+
+
+def test_packets_are_counted_up_to_what_four_bytes_hold() -> None:
+    most, state = "ff ff ff ff", FinsState(received=(1 << 32) + 5, sent=(1 << 32) - 1)
+    nothing = "00 00 00 00"
+    assert done(0x0601, state=state) == (0, f"c1 de {most} {nothing} {most} {nothing} {nothing}")
+
+
+@pytest.mark.parametrize(("code", "parameters", "end_code"), [
+    (0x0501, "00", 0x1001), (0x2102, "0000 00", 0x1002), (0x2102, "0000 0000 00", 0x1001), (0x2102, "0040 0001", 0x1103),
+    (0x2102, "003f 0001", 0), (0x2102, "0000 0000", 0x110C), (0x2730, "0000 0a000001 2580", 0x1100),
+    (0x2730, "0011 0a000001 2580", 0x1100), (0x2730, "0001 00000000 2580", 0x1100), (0x2730, "0001 0a000001 0000", 0x1100),
+    (0x2731, "0000", 0x1100), (0x2731, "0011", 0x1100), (0x2731, "0010", 0), (0x2765, "", 0),
+])  # fmt: skip
+def test_parameters_of_commands_for_the_unit(code: int, parameters: str, end_code: int) -> None:
+    assert f"{done(code, parameters, clients={1: SERVER})[0]:04X}" == f"{end_code:04X}"
+
+
+def test_another_server_is_taken_for_a_connection_that_is_a_client_and_leads_elsewhere() -> None:
+    other, connected = "0002 c0a8fa1a 2580", FinsState(connections={9: Connection(1, 9600, SERVER, True, 0, 26)})
+    state = FinsState()
+    assert done(0x2730, "0001 0a000001 0fa1", state, clients={1: SERVER}) == (0, "")
+    assert state.changed_servers == {1: Peer("10.0.0.1", 0x0FA1)}
+    assert done(0x2730, other, connected, clients={1: SERVER, 2: Peer("10.0.0.9", 9600)})[0] != 0, "it leads there already"
+    assert done(0x2730, other, FinsState(), clients={2: Peer("10.0.0.9", 9600)})[0] == 0
+    assert done(0x2730, other, FinsState(), clients={1: SERVER})[0] != 0, "connection 2 waits for clients"
+
+
+# --- FINS over connections --------------------------------------------------------------------------------------------
+
+
+def test_a_server_may_have_node_1() -> None:
+    rig = ClientRig(fins_node=7, fins_nodes={"30": "192.168.250.30"})
+    rig.plc.run(for_ns=4_000_000_000)
+    rig.server.scan(4)
+    rig.server.say(tcp.server_node(7, 1))
+    assert rig.plc.read("CIO 1523") == 1 << 2 and not rig.server.ended
+
+
+def test_who_begins_another_message_has_ten_seconds_for_it_again() -> None:
+    rig = FinsRig()
+    client = TcpClient(rig)
+    client.connect()
+    whole = Message(Kind.FRAME, bytes.fromhex("80 00 02 00 01 00 00 EF 00 09 01 01 82 00 64 00 00 01")).to_bytes()
+    client.say(whole[:5])
+    rig.plc.run(for_ns=8_000_000_000)
+    client.say(whole[5:] + whole[:5])
+    rig.plc.run(for_ns=8_000_000_000)
+    assert client.hear() and not client.ended, "the second message was begun 8 seconds ago"
+    rig.plc.run(for_ns=3_000_000_000)
+    client.hear()
+    assert client.ended
+
+
+# --- faults and data of an ETN21 --------------------------------------------------------------------------------------
+
+
+def test_faults_are_a_list_of_codes_with_what_they_fit() -> None:
+    unit = Etn21(0)
+    faults, first, second = unit.faults, Fault(0, Switch.SEND, 3), Fault(0xFFFF)
+    before = unit.times_set
+    faults.append(first)
+    faults.insert(0, second)
+    assert unit.times_set == before + 2
+    assert list(faults) == [second, first] and len(faults) == 2 and faults[1] == first and faults[:1] == [second]
+    faults[0] = Fault(5, Switch.UDP_OPEN)
+    assert faults == [Fault(5, Switch.UDP_OPEN), first] and "code=5" in repr(faults)
+    del faults[0]
+    assert faults == [first]
+    unit.faults = [second]
+    assert unit.faults == [second]
+    for code in (-1, 0x10000):
+        with pytest.raises(ValueError, match=f"response code {code} is not"):
+            faults.append(Fault(code))
+    faults[:] = [first] * 255
+    with pytest.raises(ValueError, match="room for 255 faults; 256 were given"):
+        faults.append(first)
+
+
+class Areas:
+    """Memory areas with so many words."""
+
+    def __init__(self, **words: int) -> None:
+        self.held = {name: array("H", range(count)) if count <= 0x10000 else array("H", bytes(2 * count))
+                     for name, count in words.items()}  # fmt: skip
+
+    def words(self, area: str) -> memoryview:
+        return memoryview(self.held[area])
+
+
+def test_a_data_address_reaches_the_words_that_an_area_has() -> None:
+    found = data.lengths(Areas(CIO=6144, D=32768, E0=40_000, E2=100, H=1536))  # type: ignore[arg-type]
+    assert found == {0xB0: 6144, 0x82: 32768, 0x98: 32768, 0xA0: 32768, 0xA2: 100, 0xB2: 512}
+
+
+def test_bytes_come_from_and_go_to_the_words_of_a_data_address() -> None:
+    memory = Areas(D=1000, CIO=10)
+    assert data.fetch(memory, 0x8201, 0x0200, 5) == bytes.fromhex("01 02 01 03 01")  # type: ignore[arg-type]
+    assert data.fetch(memory, 0xB000, 0x0300, 2) == bytes.fromhex("00 03")  # type: ignore[arg-type]
+    data.store(memory, 0x8200, 0x0500, b"\x11\x22\x33", 0xEE)  # type: ignore[arg-type]
+    assert list(memory.held["D"][4:8]) == [4, 0x1122, 0x33EE, 7]
+    memory.held["D"][6] = 0xABCD
+    data.store(memory, 0x8200, 0x0500, b"\x44\x55\x66", None)  # type: ignore[arg-type]
+    assert list(memory.held["D"][4:8]) == [4, 0x4455, 0x66CD, 7]
+
+
+@pytest.mark.parametrize("bit", [2, 3, 4, 5, 6, 11, 12, 13, 14, 15])
+def test_each_error_of_n_18_has_a_name_of_its_own(bit: int) -> None:
+    """W420 4-1 p84."""
+    names = Etn21(0).descriptions
+    own = names[f"CIO 1518.{bit:02}"]
+    assert own and [address for address, name in names.items() if name == own] == [f"CIO 1518.{bit:02}"]
+    assert f"CIO 1518.{bit + 1:02}" in names or bit in (6, 15)
