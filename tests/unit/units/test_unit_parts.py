@@ -6,8 +6,10 @@ from array import array
 from typing import Any
 
 import pytest
+import test_noc as noc
 from fins_rig import FinsRig, TcpClient
 from test_fins_connections import ClientRig
+from test_noc import COMMAND, LINE, STATE, ScriptedPeer
 
 from fbvm.units.etn21 import data
 from fbvm.units.etn21.faults import Fault
@@ -17,7 +19,7 @@ from fbvm.units.etn21.map import Switch
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.fins import tcp
 from fbvm.wire.fins.tcp import Kind, Message
-from fbvm.wire.link import Peer, Received, Send, SendTo
+from fbvm.wire.link import Broken, Close, Closed, Connect, Failed, Opened, Peer, Received, Send, SendTo
 
 UNIT = "192.168.250.3"
 SERVER = Peer("192.168.250.26", 9600)
@@ -195,3 +197,80 @@ def test_each_error_of_n_18_has_a_name_of_its_own(bit: int) -> None:
     own = names[f"CIO 1518.{bit:02}"]
     assert own and [address for address, name in names.items() if name == own] == [f"CIO 1518.{bit:02}"]
     assert f"CIO 1518.{bit + 1:02}" in names or bit in (6, 15)
+
+
+# --- lines of a mailbox -----------------------------------------------------------------------------------------------
+
+
+def test_a_line_that_closes_shows_nothing_to_send_and_hears_nothing_until_that_is_confirmed() -> None:
+    rig = noc.Rig()
+    rig.network.place(noc.SERVER, ScriptedPeer())
+    words, line = noc.slot(rig.memory), rig.noc._port._lines[0]
+    noc.command(words, COMMAND.connect)
+    rig.step(3)
+    noc.say(words, b"late")
+    words[LINE.command] = COMMAND.close
+    assert line.exchange(words, True) == [Close(0)] and not line.is_idle
+    assert (words[LINE.state], words[LINE.sending]) == (STATE.closing, 0)
+    for event in (Opened(0, 1, Peer("10.0.0.1", 1)), Received(0, b"old"), Failed(0, "open", "EIO"), Broken(0, "ECONNRESET")):
+        line.take(event, words)
+    assert (words[LINE.state], words[LINE.error], words[LINE.received]) == (STATE.closing, 0, 0)
+    assert line.exchange(words, True) == [] and words[LINE.state] == STATE.closing
+    line.take(Closed(0), words)
+    words[LINE.sending] = 4
+    assert line.is_idle and line.exchange(words, True) == [] and (words[LINE.state], words[LINE.sending]) == (STATE.closed, 0)
+    line.take(Closed(0), words)
+    noc.command(words, COMMAND.connect)
+    assert [type(request) for request in line.exchange(words, True)] == [Connect], "a confirmation too many changes nothing"
+    line.take(Opened(0, 9, noc.SERVER), words)
+    assert words[LINE.state] == STATE.open
+    words[LINE.command] = COMMAND.close
+    line.exchange(words, True)
+    line.take(Closed(0), words)
+    assert line.is_idle
+
+
+def test_a_line_that_is_not_the_unit_s_any_more_is_closed_and_its_words_are_left() -> None:
+    rig = noc.Rig()
+    rig.network.place(noc.SERVER, ScriptedPeer())
+    words, line = noc.slot(rig.memory), rig.noc._port._lines[0]
+    noc.command(words, COMMAND.connect)
+    rig.step(3)
+    assert line.exchange(words, False) == [Close(0)]
+    line.take(Closed(0), words)
+    words[LINE.state], words[LINE.sending] = STATE.open, 5
+    assert line.exchange(words, False) == [] and (words[LINE.state], words[LINE.sending]) == (STATE.open, 5)
+
+
+@pytest.mark.parametrize(("peer", "remote", "shown"), [
+    ((0xC0A8, 0xFA02, 502), (0, 0, 0), "192.168.250.2:502"), ((0, 2, 0), (1, 1, 1), "0.0.0.2:0"),
+    ((0x0A00, 0, 0), (1, 1, 1), "10.0.0.0:0"),
+    ((0, 0, 7), (1, 1, 1), "0.0.0.0:7"), ((0, 0, 0), (0x0A00, 3, 44), "10.0.0.3:44"), ((0, 0, 0), (0, 0, 5), "0.0.0.0:5"),
+    ((0, 0, 0), (0, 0, 0), ""),
+])  # fmt: skip
+def test_people_see_the_peer_of_a_line_or_whom_it_is_to_reach(
+    peer: tuple[int, ...], remote: tuple[int, ...], shown: str
+) -> None:
+    rig = noc.Rig()
+    words = noc.slot(rig.memory, 2)
+    words[LINE.module], words[LINE.state], words[LINE.error], words[LINE.received] = 8, STATE.failed, 0x36, 3
+    for at, values in ((LINE.peer_ip, peer[:2]), (LINE.remote_ip, remote[:2])):
+        words[at], words[at + 1] = values
+    words[LINE.peer_port], words[LINE.remote_port] = peer[2], remote[2]
+    [socket] = rig.noc.front(rig.memory).sockets
+    assert (socket.name, socket.state, socket.peer, socket.result) == ("line 2", "FAILED", shown, "ECONNRESET")
+    words[LINE.error], words[LINE.state] = 0x99, 77
+    [socket] = rig.noc.front(rig.memory).sockets
+    assert (socket.state, socket.result) == ("77", "16#99")
+
+
+def test_lamps_and_counters_of_a_module_are_read_from_its_head() -> None:
+    rig = noc.Rig()
+    rig.step()
+    front = rig.noc.front(rig.memory)
+    assert [(lamp.name, lamp.is_on) for lamp in front.lamps] == [("RUN", True), ("LINK", True), ("100 MB", True)]
+    rig.noc.link_up = rig.noc.configured = False
+    rig.step()
+    front = rig.noc.front(rig.memory)
+    assert [(lamp.name, lamp.said) for lamp in front.lamps] == [("RUN", "off"), ("LINK", "off"), ("100 MB", "on")]
+    assert ("sent", "0") in front.settings and ("slot", "7") in front.settings
