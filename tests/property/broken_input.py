@@ -39,6 +39,8 @@ from fbvm.record.recording import container
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 2.0
 """Processor time that a verb may take for a small file."""
+HANGS_S = 300
+"""Real time after which the search ends, for all verbs on one file: nothing is expected to wait, but the machine may be busy."""
 STATUSES = range(6)
 GOOD_CX = Cxt(
     symbols=["start,0.00,BOOL,,,", "level,D100,INT,,,"], local=["lamp,W1.00,BOOL,,,"],
@@ -353,8 +355,9 @@ def search(first: int, count: int, keep: Path) -> int:
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         os.environ["FBVM_CACHE"] = folder
         furnish()
+        seeds()
         for number in range(first, first + count):
-            faulthandler.dump_traceback_later(60, exit=True)
+            faulthandler.dump_traceback_later(HANGS_S, exit=True)
             kind, data = broken(Random(number))
             if wrong := complaint(kind, data):
                 last = wrong.strip().splitlines()[-2 if "Error" in wrong else -1]
