@@ -86,6 +86,7 @@ class StoppableEngine:
             self._native.allowance = self._python.allowance
         if self._native is None:
             return self._observe(task_index)
+        self.seen = None  # of a run that was given up where it stood
         seen = self._keep()
         trap = self._native.run(task_index)
         if not self._undone(trap, seen):

@@ -248,6 +248,20 @@ def test_pause_is_answered_first_and_stands_between_two_scans(file: Path) -> Non
     assert client.events("stopped")[-1]["reason"] == "pause"
 
 
+def test_what_is_not_under_way_is_not_cancelled(file: Path) -> None:
+    client = Client()
+    client.begin(program=str(file))
+    stops = len(client.events("stopped"))
+    client.ask("cancel")
+    client.ask("cancel", requestId=1)
+    assert len(client.events("stopped")) == stops
+    client.ask("continue", threadId=1)
+    client.adapter.tell_progress()
+    client.ask("cancel", progressId="another")
+    assert client.adapter.is_running and len(client.events("stopped")) == stops
+    client.ask("pause", threadId=1)
+
+
 # --- moving -------------------------------------------------------------------------------------------------------------
 
 
@@ -257,6 +271,7 @@ def test_steps_in_over_out_and_back(file: Path) -> None:
     client.go("next")
     client.go("stepIn")
     assert client.line == 5 and [row["name"] for row in client.frames] == ["Twice  Main.T", "Main", "scan 0, 0s"]
+    assert [row.get("canRestart", False) for row in client.frames] == [True, True, False]
     stop = client.go("stepOut")
     assert client.line == 20 and stop["reason"] == "step"
     assert client.go("stepBack")["description"] == "back in scan 0, 0s" and client.line == 19

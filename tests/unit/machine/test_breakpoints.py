@@ -360,6 +360,20 @@ def test_a_restart_leaves_the_scan_that_stands(plc: Plc) -> None:
     assert plc.scans == 1
 
 
+def test_a_scan_that_was_given_up_stops_no_later_one(plc: Plc) -> None:
+    where = plc.breakpoints.line("text.st:15")
+    later = plc.breakpoints.change("D100", when="D100 > 12")
+    plc.scan()
+    assert plc.halted
+    plc.warm_start()
+    plc.breakpoints.remove(where)
+    for _ in range(2):
+        plc.scan()
+        assert plc.halted is None
+    plc.scan()
+    assert plc.halted and plc.halted.breakpoints == (later,)
+
+
 def test_a_block_in_python_stands_in_with_breakpoints_too() -> None:
     from fbvm.engine.choice.tiers import python_of
 

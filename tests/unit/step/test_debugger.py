@@ -294,6 +294,71 @@ def test_a_trap_ends_the_run_and_can_be_gone_back_from() -> None:
     assert where(found) == (4, 17)
 
 
+@pytest.mark.slow
+def test_a_trap_in_the_rest_of_a_scan_ends_the_run_too() -> None:
+    found = debugger(writes=[("CIO 0.00", True, 0)])
+    found.session.goto(4)
+    done(found.into())
+    reached = done(found.resume())
+    assert reached and (reached.kind, reached.position.scan, found.session.here.scan) == ("trap", 4, 4)
+    assert "divided by 0" in reached.reasons[0]
+    assert done(found.resume()) == reached, "nothing goes on behind a trap"
+
+
+@pytest.mark.slow
+def test_machine_code_goes_to_the_same_places() -> None:
+    image = compile_text(TEXT).image
+    assert image is not None
+    world = World(lambda: [Debugged("plc", Plc(image, engine="native"), [TimedWrite(Plc(image).find("D7"), 3, 2_000_000_000)])])
+    said: list[Said] = []
+    found = Debugger({"plc": Session(world, "plc")}, said.append)
+    found.here.put([line("text.st:13", "N = 150"), line("text.st:14", "N MOD 100 = 0", message="n {N} {D7}")])
+    reached = done(found.resume())
+    assert reached and reached.position == Position(150, 0) and [one.text for one in said] == ["n 100 0"]
+    found.here.put([line("text.st:14", "N MOD 100 = 0", message="n {N} {D7}")])
+    assert done(found.resume(500)) is None and found.session.here == Position(500) and found.session.read("D7") == 3
+    assert [one.text for one in said] == ["n 100 0", "n 200 0", "n 300 3", "n 400 3", "n 500 3"]
+    found.here.put([line("text.st:14", "N < 120")])
+    reached = done(found.reverse())
+    assert reached and reached.position == Position(118, 1) and found.session.read("D7") == 0
+
+
+@pytest.mark.slow
+def test_a_recording_is_gone_through_to_its_end_and_no_further() -> None:
+    image = compile_text(TEXT).image
+    assert image is not None
+    plc = Plc(image)
+    recorded = Recording().add("plc", plc)
+    plc.run(scans=20)
+    found = Debugger({"plc": PastSession(RecordedScans(recorded, {}), "plc")})
+    end = found.session.here
+    assert (end.scan, found.session.statement) == (19, None)
+    found.session.goto(3)
+    found.here.put([line("text.st:5", hits="% 7")])
+    reached = done(found.resume())
+    assert reached and where(found) == (6, 5) and found.session.read("Main.N") == 7
+    found.here.put([])
+    assert done(found.resume()) is None and found.session.here == end and found.session.read("Main.N") == 20
+    reached = done(found.reverse({"plc": [Breakpoint("change", "Main.T.Q")]}))
+    assert reached and reached.position.scan == 19 and found.here.breakpoints == ()
+    found.session.goto(100)
+    assert found.session.here.scan == 19
+    with pytest.raises(ValueError, match="nothing is recorded"):
+        PastSession(RecordedScans(Recording().add("plc", Plc(image)), {}))
+
+
+def test_what_was_done_last_takes_effect_when_the_session_ends() -> None:
+    found = debugger()
+    done(found.scan(3))
+    session = found.session
+    assert isinstance(session, Session)
+    session.act(lambda plc: plc.write("Main.R", 9))
+    plc = session.world["plc"]
+    assert (plc.scans, plc.read("Main.R"), plc.input_recorder is None) == (3, 0, False)
+    session.world.leave()
+    assert (plc.scans, plc.read("Main.R"), plc.input_recorder) == (4, 9, None)
+
+
 def test_steps_stop_at_breakpoints_in_what_they_pass_over() -> None:
     found = debugger()
     found.here.put([line("text.st:5")])

@@ -229,6 +229,22 @@ def test_breakpoints_are_written_as_those_of_run(text: str, scan: int, line: int
     assert (commands.session.here.scan, line_of(commands)) == (scan, line)
 
 
+@pytest.mark.slow
+def test_what_is_not_reached_is_said_and_moves_nothing_back() -> None:
+    commands = made()
+    assert said(commands, "// a remark", "  //") == ""
+    said(commands, "scan 3", "step")
+    here = commands.session.here
+    with pytest.raises(CommandError, match="set breakpoints first"):
+        said(commands, "back run")
+    assert said(commands, "back Main.N = 40").startswith("Main.N = 40 was never reached before")
+    assert commands.session.here == here
+    assert "no breakpoint was reached in" not in said(commands, "break Main.N = 30000", "run 50ms")
+    assert commands.session.here == Position(8)
+    with pytest.raises(CommandError, match="no Nobody"):
+        said(commands, "why Nobody")
+
+
 def test_a_time_of_day_in_a_condition_is_no_line() -> None:
     commands = made("PROGRAM Main VAR t : TOD := TOD#12:29:59; END_VAR t := t + T#1s; END_PROGRAM")
     said(commands, "break Main.t = TOD#12:30:01", "run")
@@ -264,6 +280,22 @@ def test_the_scan_table_the_cause_and_the_calls() -> None:
     assert ">3" not in said(commands, "scan", "scan", "goto 2", "table Main.N")
     calls = said(commands, "run 5", "calls").splitlines()[-2:]
     assert [row.split()[1] for row in calls] == ["Main.T", "Main"]
+
+
+def test_between_two_scans_nothing_is_called_and_no_chart_is_here() -> None:
+    commands = made()
+    said(commands, "scan 2", "back")
+    assert commands.session.statement is None and said(commands, "calls") == ""
+    with pytest.raises(CommandError, match="no chart here"):
+        said(commands, "sfc")
+
+
+def test_a_reference_and_what_it_refers_to_are_printed() -> None:
+    commands = made("""TYPE Pair : STRUCT a : INT := 3; b : BOOL; END_STRUCT END_TYPE
+PROGRAM Main VAR p : Pair; r : REF_TO Pair; n, none : REF_TO INT; END_VAR r := REF(p); n := REF(p.a); END_PROGRAM""")
+    said(commands, "scan")
+    assert said(commands, "print Main.p Main.r^.a Main.r Main.n Main.none").splitlines() == [
+        "Main.p = Pair (a := 3, b := FALSE)", "Main.r^.a = 3", "Main.r = -> Main.p", "Main.n = -> Main.p.a", "Main.none = NULL"]
 
 
 def test_mode_and_power_between_scans_only() -> None:
@@ -310,6 +342,8 @@ def test_completion() -> None:
     assert commands.completions("print Main.T.") == ["Main.T.A", "Main.T.Q"]
     assert commands.completions("help br") == ["break"]
     assert commands.completions("print Nobody.") == []
+    assert commands.completions("mode R") == [] and commands.completions("D2") == []
+    assert commands.completions("watch Main.R Main.T.") == ["Main.T.A", "Main.T.Q"]
 
 
 LADDER = """\
