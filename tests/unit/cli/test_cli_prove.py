@@ -142,7 +142,7 @@ def test_a_program_that_cannot_be_followed_has_status_3_and_its_line(tmp_path: P
 
 
 def test_without_the_solver_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # another test may have kept the answer
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path))  # another test may have kept the answer
 
     def missing(name: str) -> object:
         raise ImportError(name)
