@@ -32,21 +32,36 @@ class Snapshot:
         return b"".join(page or _ZERO_PAGE for page in self.pages)
 
 
+class _Views(dict[str, memoryview]):
+    """Views of a whole buffer by machine type."""
+
+    __slots__ = ("_whole",)
+
+    def __init__(self, whole: memoryview) -> None:
+        super().__init__()
+        self._whole = whole
+
+    def __missing__(self, machine: str) -> memoryview:
+        view: memoryview = self._whole.cast(FORMATS[machine])  # type: ignore[call-overload]
+        self[machine] = view
+        return view
+
+
 class Memory:
     """A buffer of `size` bytes (whole pages), all zeros at first, and the areas in it.
 
-    `views` are writable memoryviews by machine type, each over the whole buffer (item i lies at i * its size).  Values
-    are little-endian.  Reading and writing outside the buffer raises IndexError."""
+    `views` are writable memoryviews by machine type, each over the whole buffer (item i lies at i * its size), made when somebody
+    asks for them.  Values are little-endian.  Reading and writing outside the buffer raises IndexError.  `areas` must not be
+    changed."""
 
     def __init__(self, size: int, areas: Mapping[str, Area]) -> None:
         if size <= 0 or size % PAGE_BYTES:
             raise ValueError(f"a memory has whole pages of {PAGE_BYTES} bytes; {size} bytes are none")
         self.size = size
-        self.areas = dict(areas)
+        self.areas = areas
         self.map = anonymous_memory(size)
         self.u8 = memoryview(self.map)
-        self.views: dict[str, memoryview] = {
-            machine: self.u8.cast(letter) for machine, letter in FORMATS.items()}  # type: ignore[call-overload]
+        self.views: Mapping[str, memoryview] = _Views(self.u8)
         self._words: dict[str, memoryview] = {}
         self._last: Snapshot | None = None
 

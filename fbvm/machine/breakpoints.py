@@ -112,7 +112,15 @@ class BreakpointRows:
         self._rows: dict[Breakpoint, LineStop | Watchpoint] = {}
         self._watched: dict[Breakpoint, Place | Span] = {}
         """What breakpoints of kind "change" watch."""
-        self._stops = StopTable(plc.memory, len(image.sites))
+        self._memory = plc.memory
+        self._table: StopTable | None = None
+
+    @property
+    def _stops(self) -> StopTable:
+        """What machine code looks into: made when it is needed, since most PLCs never have a breakpoint."""
+        if self._table is None:
+            self._table = StopTable(self._memory, len(self._image.sites))
+        return self._table
 
     @cached_property
     def _names(self) -> Names:
@@ -187,7 +195,8 @@ class BreakpointRows:
         """Removes all breakpoints; a scan that stands goes on all the same with the next `Plc.scan`."""
         self._rows.clear()
         self._watched.clear()
-        self._stops.put(())
+        if self._table:
+            self._table.put(())
 
     def _put(self, breakpoint: Breakpoint, row: LineStop | Watchpoint) -> Breakpoint:
         self._rows[breakpoint] = row
@@ -272,7 +281,9 @@ class BreakpointRows:
 
     def use(self, memory: Memory) -> None:
         """Looks at another memory of the same program from now on; only where no machine code runs with these breakpoints."""
-        self._stops.memory = memory
+        self._memory = memory
+        if self._table:
+            self._table.memory = memory
 
     def begin(self, passes: Mapping[Breakpoint, int] | None = None) -> None:
         """From now on a change is a difference from what the memory is now; passes count on from `passes`, or from 0."""

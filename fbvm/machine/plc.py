@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 
@@ -57,6 +56,11 @@ class Plc(NamedValues):
     (3, 30000000, 3)
     """
 
+    # what few PLCs ever set is no attribute before: Python keeps up to 30 of an object close together, more take 1.5 KB
+    _next_mode: Mode | None = None
+    """That from the next scan on."""
+    _recorder: InputRecorder | None = None
+
     def __init__(
         self,
         image: Image,
@@ -94,16 +98,14 @@ class Plc(NamedValues):
         """How late they began, where time is real."""
         self.trap: Trap | None = None
         self._mode, self._first = RUN, True
-        self._due: deque[int] = deque()
+        self._due: list[int] = []
         self.breakpoints = Breakpoints(self)
         self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
         self._io = IORefresh(self.units, self.memory)
         self._fast_paths = FastPaths(self._io, self._schedule)
         self.servicing = PeripheralServicing(self, image)
         """FINS commands, and the PLC's clock."""
-        self._next_mode: Mode | None = None  # from the next scan on
         write(self.memory, image.initial)
-        self._recorder: InputRecorder | None = None
         if journal:
             journal.begin(image.fingerprint, cycle_ns, budget, self.memory)
 
@@ -173,7 +175,7 @@ class Plc(NamedValues):
                 places.write_all(self.memory, self._forces)
             if self.phases:
                 self._over(Phase.INPUTS)
-            self._due = deque(self._schedule.due(now_ns))  # nothing is left of a scan that a listener has interrupted
+            self._due = list(self._schedule.due(now_ns))  # nothing is left of a scan that a listener has interrupted
 
     def _end(self) -> None:
         """The part of a plain scan behind its program: the I/O refresh, and counting the scan."""
@@ -244,7 +246,7 @@ class Plc(NamedValues):
             trap = breakpoints.run(due[0], self.engine) if breakpoints.armed else self.engine.run(due[0])
             if breakpoints.halted:
                 return None
-            fresh.discard(due.popleft())
+            fresh.discard(due.pop(0))
             if trap:
                 due.clear()
                 return trap

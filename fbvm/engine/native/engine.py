@@ -59,8 +59,8 @@ class NativeEngine:
         self.counted = [0] * image.counters
         """What another engine has counted in place of this one."""
         self._stops = stops  # which stays while machine code looks into it
-        self._place = (ctypes.c_char * memory.size).from_buffer(memory.map)  # which stays while this does
-        self._memory_at = ctypes.addressof(self._place)
+        self._whole = memory.u8[:]  # without which the mapping could end
+        self._memory_at = ctypes.addressof(ctypes.c_char.from_buffer(memory.map))
         self._entries = [self._entry(number) for number in range(len(image.tasks))]
         self._calls = [entry.call for entry in self._entries]
         self._scans: dict[tuple[tuple[tuple[int, int], ...], ClockWordTable], NativeScans] = {}

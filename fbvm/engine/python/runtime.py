@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from fbvm.base import arithmetic, strings
 from fbvm.base.arithmetic import Undefined
-from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
+from fbvm.base.memory import FORMATS, STRUCTS, WHOLE_BYTES, Memory
 from fbvm.code.image import Objects
 from fbvm.code.operations import (
     BIT_MASK,
@@ -125,8 +125,8 @@ def environment(memory: Memory, objects: Objects) -> dict[str, Any]:
 
     A view is named by its machine type (`i16`), that of BOOL `u1`; `get_i16` and `put_i16` work at any byte of `buffer`."""
     names: dict[str, Any] = dict(_PURE)
-    for machine, view in memory.views.items():
-        names["u1" if machine == "b" else machine] = view
+    for machine in FORMATS:
+        names["u1" if machine == "b" else machine] = memory.views[machine]
         names[f"get_{machine}"], names[f"put_{machine}"] = STRUCTS[machine].unpack_from, STRUCTS[machine].pack_into
     names["buffer"] = memory.map
     names["r32"] = memoryview(bytearray(4)).cast("f")  # rounds what is stored in it

@@ -42,11 +42,10 @@ class Context:
     `stops_at` the address of the stop table, if the code has stops."""
 
     def __init__(self, kept_bytes: int, context_bytes: int, memory_bytes: int, stops_at: int = 0) -> None:
-        self._content = bytearray(kept_bytes + context_bytes)
+        self._content = (ctypes.c_char * (kept_bytes + context_bytes))()
         self._start = kept_bytes
-        self._place = (ctypes.c_char * len(self._content)).from_buffer(self._content)
-        self.at = ctypes.addressof(self._place) + kept_bytes
-        self._ask: object = None
+        self.at = ctypes.addressof(self._content) + kept_bytes
+        self._ask: ctypes._FuncPointer | None = None
         self._put("<q", "size", memory_bytes)
         self._put("<q", "stops", stops_at)
         self._put("<f", "f32", NAN)
@@ -56,7 +55,7 @@ class Context:
         """Sets the allowance of the runs from now on."""
         self._ask = _ASK(allowance.ask) if allowance.ask else None  # which stays while machine code may call it
         self._put("<q", "least", allowance.least)
-        self._put("<q", "ask", ctypes.cast(self._ask, ctypes.c_void_p).value or 0 if self._ask else 0)
+        self._put("<q", "ask", ctypes.c_int64.from_buffer(self._ask).value if self._ask else 0)
 
     def _put(self, form: str, field: str, value: float) -> None:
         struct.pack_into(form, self._content, self._start + FIELDS[field], value)

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import count
 
-from fbvm.base.memory import Memory
+from fbvm.base.memory import STRUCTS, Memory
 from fbvm.engine.clock import Clock
 from fbvm.engine.native.llvm import cache as native_cache
 from fbvm.engine.native.llvm.cache import Stored, name_of
 from fbvm.engine.native.llvm.compiler import Linked, compile_text
 from fbvm.engine.native.llvm.entry_points import EntryPoint
 from fbvm.engine.native.scans import code as native_scan_code
-from fbvm.engine.native.scans.code import NEXT_NS, TASK_ROW, WATCHED_BYTES, WATCHED_ROW, ClockWordTable
+from fbvm.engine.native.scans.code import NEXT_NS, TASK_ROW, WATCHED_ROW, ClockWordTable
 from fbvm.engine.native.scans.parameters import COUNT, Parameters
 from fbvm.engine.native.scans.units import Shape, UnitInCode
 
@@ -35,6 +35,7 @@ class ScheduledTask:
     """From which time on it is due, if it has an interval."""
 
 
+_number = STRUCTS["i64"].unpack_from
 NO_LIMIT = 1 << 62
 """As many statements as nobody spends."""
 
@@ -65,13 +66,13 @@ class NativeScans:
         for task in tasks:
             numbers.extend((entries[task.task].function_at, task.interval_ns, task.next_ns, 0))
         at = count(len(numbers) + 1, WATCHED_ROW)
-        self._expected = [[(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), next(at)) for offset in group]
-                          for group in watched]  # fmt: skip
-        """For each unit the bytes that it watches, and where among the numbers the expected ones are."""
+        self._memory = memory
+        self._expected = [[(offset, next(at)) for offset in group] for group in watched]
+        """For each unit the offsets of what it watches, and where among the numbers the expected bytes are."""
         for offset in offsets:
             numbers.extend((offset, 0))
         for unit in units:
-            self._expected.append([(view, len(numbers) + at) for view, at in unit.expected(memory)])
+            self._expected.append([(offset, len(numbers) + at) for offset, at in unit.expected])
             numbers.extend(unit.parameters(memory_at))
         self._numbers = numbers
         """The parameters, and the rows behind them."""
@@ -99,8 +100,9 @@ class NativeScans:
 
     def expect(self, unit: int) -> None:
         """From now on the bytes that a unit (by its number) watches are expected to stay as they are."""
-        for view, at in self._expected[unit]:
-            self._numbers[at] = view[0]
+        content = self._memory.map
+        for offset, at in self._expected[unit]:
+            self._numbers[at] = _number(content, offset)[0]
 
     def set_clock(self, clock: Clock, most: int) -> None:
         """From now on bursts have at most so many scans, at the times that this clock tells."""

@@ -12,7 +12,6 @@ from enum import IntEnum, auto
 from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
-from fbvm.base.memory import Memory
 from fbvm.engine.native.scans.parameters import addresses
 from fbvm.engine.trap import Trap
 
@@ -144,12 +143,11 @@ class UnitInCode:
             yield from (memory_at + offset, 0)
         yield from (own + offset for offset in exchange.unfinished)
 
-    def expected(self, memory: Memory) -> list[tuple[memoryview, int]]:
-        """For each watched group a view of it in the PLC's memory, and the number of the parameter that says what is expected
-        there."""
+    @property
+    def expected(self) -> list[tuple[int, int]]:
+        """For each watched group its offset in the PLC's memory, and the number of the parameter with what is expected there."""
         first = len(UnitSlot) + 2 * len(self.exchange.copies) + 1
-        return [(memory.u8[offset : offset + 8].cast("q"), first + 2 * number)
-                for number, offset in enumerate(self.exchange.watched)]  # fmt: skip
+        return [(offset, first + 2 * number) for number, offset in enumerate(self.exchange.watched)]
 
 
 _UNIT = Template(f"""
