@@ -35,6 +35,11 @@ def processor(text: str, engine: str = "auto") -> OwnProcessor:
     return _first(text, engine).another()
 
 
+def prepare(text: str, engine: str = "auto") -> None:
+    """Compiles the program `text` for an engine, unless that has been done.  Raises ValueError as `processor` does."""
+    _first(text, engine)
+
+
 @cache
 def contract(text: str, libraries: tuple[Path, ...] = ()) -> Contract:
     """What the program `text` (ST) says of its variables and types, for those who run it elsewhere or not at all.

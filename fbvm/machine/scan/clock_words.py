@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from array import array
 from datetime import datetime, timedelta
+from functools import lru_cache
 
 from fbvm.base.areas import AREAS, CLOCK, DATE_SECOND
 from fbvm.base.memory import Memory
@@ -102,8 +103,9 @@ class ClockWords:
         return bool(self._a[word] >> bit & 1)
 
 
+@lru_cache(maxsize=16)
 def _date_words(second: int) -> array[int]:
-    """The four words of a second since 2000-01-01 00:00:00."""
+    """The four words of a second since 2000-01-01 00:00:00.  Many PLCs have the same time."""
     now = EPOCH + timedelta(seconds=second)
     pairs = (now.minute, now.second), (now.day, now.hour), (now.year % 100, now.month), (0, now.isoweekday() % 7)
     return array("H", (bcd(high) << 8 | bcd(low) for high, low in pairs))

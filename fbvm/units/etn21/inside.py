@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fbvm.processor.processor import OwnProcessor, processor
+from fbvm.processor.processor import prepare as prepare_processor
 from fbvm.units.addresses import words_of
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.faults import Faults
@@ -14,7 +15,7 @@ PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
 
 def prepare(engine: str) -> None:
     """Compiles the program of all ETN21s for an engine, unless that has been done."""
-    processor(PROGRAM, engine)
+    prepare_processor(PROGRAM, engine)
 
 
 def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wait_ns: int, odd_filler: int | None,
