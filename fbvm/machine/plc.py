@@ -56,10 +56,8 @@ class Plc(NamedValues):
     (3, 30000000, 3)
     """
 
-    # what few PLCs ever set is no attribute before: Python keeps up to 30 of an object close together, more take 1.5 KB
-    _next_mode: Mode | None = None
-    """That from the next scan on."""
-    _recorder: InputRecorder | None = None
+    _next_mode: Mode | None = None  # from the next scan on
+    _recorder: InputRecorder | None = None  # both stand here, since more than 30 attributes of an object take it 1.5 KB
 
     def __init__(
         self,
