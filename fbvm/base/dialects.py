@@ -6,6 +6,7 @@ correct program of the standard mean something else but where its switches say s
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 
 
@@ -89,8 +90,8 @@ class Dialect:
     times_are_numbers: bool = False
     short_names: bool = False
     own_time: bool = False
-    no_short_circuit_words: bool = False
-    no_jumps: bool = False
+    short_circuit_words: bool = False
+    jumps_in_text: bool = False
     functions_have_inputs: bool = False
     plain_names: bool = False
     locals_hide_results: bool = False
@@ -209,8 +210,8 @@ QUESTIONS = {
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
     "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
-    "no_short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken", "taken, with a warning (S0195)"),
-    "no_jumps": ("JMP in Structured Text", "taken", "taken, with a warning (S0195)"),
+    "short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken, with a warning (S0195)", "taken"),
+    "jumps_in_text": ("JMP in Structured Text", "taken, with a warning (S0195)", "taken"),
     "functions_have_inputs": ("FUNCTION f : INT without an input", "taken", "taken, with a warning (S0195)"),
     "plain_names": ("names that begin with _ or P_", "taken", "taken, with a warning (S0195)"),
     "any_width_at": ("x AT %IW4 : DINT, x AT %ML2 : DWORD: an address of another size than the type", "an error",
@@ -241,7 +242,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
-                   own_time=True)
+                   own_time=True, short_circuit_words=True, jumps_in_text=True)
 _ROWS = (
     STANDARD,
     _CODESYS,
@@ -253,8 +254,7 @@ _ROWS = (
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
-            wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True, no_short_circuit_words=True, no_jumps=True,
-            functions_have_inputs=True),
+            wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True, functions_have_inputs=True),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional", "strucpp"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
@@ -269,10 +269,9 @@ _ROWS = (
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
             generic_functions=True, times_are_numbers=True, places_for_all=True, own_time=True,
-            round_arrays=True, nested_repetitions=True, no_short_circuit_words=True, no_jumps=True,
-            dates_in_nanoseconds=True),
+            round_arrays=True, nested_repetitions=True, dates_in_nanoseconds=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
-            comments_end_at_once=True, no_jumps=True, plain_names=True,
+            comments_end_at_once=True, plain_names=True,
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
 DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}
@@ -288,7 +287,12 @@ def dialect(name: str) -> Dialect:
 
 def takers(switch: str, value: bool = True) -> str:
     """The option for a dialect with a switch set, or not set, for hints: `--dialect codesys, twincat or rusty`."""
-    *names, last = (row.name for row in DIALECTS.values() if bool(getattr(row, switch)) is value)
+    return option(row for row in DIALECTS.values() if bool(getattr(row, switch)) is value)
+
+
+def option(rows: Iterable[Dialect]) -> str:
+    """The option for one of some dialects, for hints."""
+    *names, last = (row.name for row in rows)
     return f"--dialect {', '.join(names)} or {last}" if names else f"--dialect {last}"
 
 

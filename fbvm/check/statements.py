@@ -152,8 +152,8 @@ class _Statements:
                 self.scope.settle(node.call)
                 self.error("S0193", node.call, "this statement does nothing", "`=` compares, `:=` assigns" if compares else "")
                 return
-            self.error("S0401", node.call, "this is no statement: it does nothing", "`=` compares, `:=` assigns" if compares else
-                       f"write () behind an instance to call it, := to assign, or take {takers('idle_statements')}")
+            self.error("S0401", node.call, "this is no statement: it does nothing", ("`=` compares, `:=` assigns" if compares else
+                       "write () behind an instance to call it, := to assign") + f", or take {takers('idle_statements')}")
 
     def _bare_action(self, node: tree.CallStatement) -> None:
         """Check an ACTION that is named without (): a call in some dialects."""
@@ -230,7 +230,7 @@ class _Statements:
         if low is None or high is None:
             return []
         if low > high:
-            self.error("S0503", label[0], f"the range {low}..{high} is empty")
+            self.error("S0503", label[0], f"the range {low}..{high} is empty", f"write {high}..{low}")
             return []
         free = _untaken(taken, low, high)
         if _take(taken, low, high):

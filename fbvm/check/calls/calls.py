@@ -102,6 +102,13 @@ def _arguments_alone(scope: Scope, call: tree.Call) -> None:
             scope.infer(argument.value)
 
 
+def _warn_of_copy(scope: Scope, call: tree.Call, called: Variable | None) -> None:
+    """Warn of the call of an input that is an instance: a block has a copy of the argument where dialects let it be called."""
+    if called is not None and called.kind == "VAR_INPUT" and not scope.source.library:
+        scope.error("S0193", call, f"{called.name} is an input, a copy of the argument: this call leaves the argument as it is",
+                    "make it a VAR_IN_OUT to call the instance that is passed")
+
+
 def _instance(scope: Scope, call: tree.Call, as_value: bool) -> Type | str | None:
     kind = objects.instance_of(scope, call.callee) if objects.is_self(scope, call.callee) else scope.infer(call.callee)
     if kind is None:
@@ -129,6 +136,7 @@ def _instance(scope: Scope, call: tree.Call, as_value: bool) -> Type | str | Non
         scope.error("S0401", call.callee, f"{pou.name} is a CLASS and has no body to call",
                     "call one of its methods: name.method()")
         return None
+    _warn_of_copy(scope, call, called)
     bound = PouCall(pou, call.callee, dynamic=objects.may_be_derived(scope, call.callee))
     if not _may_call(scope, call.callee, bound):
         return None

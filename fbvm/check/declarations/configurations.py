@@ -184,6 +184,7 @@ class Configurations:
         if pou is None or pou.kind != "PROGRAM":
             names = [p.name for p in self.project.pous.values() if p.kind == "PROGRAM"]
             self.report.add("S0204", source, program.type_name, f"there is no PROGRAM {program.type_name.text}",
+                            f"a task runs a PROGRAM, which calls an instance of the {pou.kind}" if pou is not None else
                             self.project.nearest(program.type_name.text, names))
         elif pou.type is not None:
             self._instance(program.name.text, pou, task, source, program.name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fbvm.base.dialects import DIALECTS, option
 from fbvm.base.types import (
     ANYTHING,
     BOOL,
@@ -91,7 +92,8 @@ def _refuse_by_dialect(scope: Scope, spec: tree.TypeSpec, name: str = "") -> Non
         form = "alias" if name and isinstance(spec, tree.NamedType) else ""
     if form in dialect.refused and not scope.source.library:
         what = f"another name for {spec.text}" if isinstance(spec, tree.NamedType) else form
-        scope.error("S0903", spec, f"{what} is not taken by the dialect {dialect.name}: {dialect.for_whom}")
+        scope.error("S0903", spec, f"{what} is not taken by the dialect {dialect.name}: {dialect.for_whom}",
+                    f"take {option(row for row in DIALECTS.values() if form not in row.refused)}")
 
 
 def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.base.dialects import Dialect
+from fbvm.base.dialects import DIALECTS, Dialect, option
 from fbvm.base.types import (
     BOOL,
     ELEMENTARY,
@@ -195,8 +195,11 @@ def mismatch_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
     if isinstance(expr, tree.Literal) and isinstance(expr.value, str) and isinstance(wanted, StringType):
         return f"a {wanted.name.partition('[')[0]} literal stands in {'double' if wanted.wide else 'single'} quotes"
     if isinstance(expr, tree.Literal):
-        return literal_hint(expr.value if isinstance(expr.value, int | float | str) else None, base(target))
-    return bcd_hint(expr, target) or conversion_hint(kind, target)
+        hint = literal_hint(expr.value if isinstance(expr.value, int | float | str) else None, base(target))
+    else:
+        hint = bcd_hint(expr, target) or conversion_hint(kind, target)
+    takers = [row for row in DIALECTS.values() if converted_by_dialect(kind, target, row)]
+    return hint + (", or " if hint and takers else "") + (f"take {option(takers)}" if takers else "")
 
 
 def conversion_hint(kind: Type, target: Type) -> str:

@@ -54,7 +54,7 @@ def hint(facts: Facts, expr: tree.Expr, text: str, target: Type) -> str:
     written = f"{source}_TO_{number}({text})"
     if number != wanted.name:
         written = f"{number}_TO_{wanted}({written})"
-    return f"write {written}" + (f", or take {takers('whole_powers')}" if is_whole(facts, expr) else "")
+    return f"write {written}, or take {takers('whole_powers' if is_whole(facts, expr) else 'narrowing')}"
 
 
 def takes(kind: Type) -> bool:

@@ -69,7 +69,8 @@ def _behind(scope: Scope, expr: tree.Index, whole: RefType, kinds: list[Type | N
 def _wrong_number(scope: Scope, expr: tree.Index, whole: Type, needed: int) -> None:
     written = len(expr.subscripts)
     scope.error("S0305", expr, f"{whole} needs {needed} subscript{'s' if needed > 1 else ''}, "
-                f"{written} {'are' if written > 1 else 'is'} written")
+                f"{written} {'are' if written > 1 else 'is'} written", "a[1, 2] is an element of two dimensions" if
+                needed > written else "")
 
 
 def _fits(scope: Scope, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:

@@ -136,6 +136,7 @@ def warn_of_written_counter(scope: Scope, expr: tree.Expr) -> None:
     written = place(scope.facts, expr)
     for counter in scope.counters if written else ():
         if counter and all(a == b for a, b in zip(written or (), counter, strict=False)):
-            scope.error("S0504" if scope.dialect.fixed_counters else "S0590", expr,
-                        f"{scope.text(expr)} counts the FOR loop and is written inside it")
+            fixed = scope.dialect.fixed_counters
+            scope.error("S0504" if fixed else "S0590", expr, f"{scope.text(expr)} counts the FOR loop and is written inside it",
+                        f"write WHILE, or take {takers('fixed_counters', False)}" if fixed else "")
             return

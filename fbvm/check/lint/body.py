@@ -8,8 +8,8 @@ from typing import Any
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
-from fbvm.check.symbols.facts import Facts, Pou
-from fbvm.check.symbols.report import Report
+from fbvm.check.symbols.context import Context
+from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
 from fbvm.syntax.tree import il, ladder, sfc
 
@@ -19,8 +19,9 @@ Nodes = tuple[tree.Node | None, ...]
 class Body:
     """The body of one POU of the user's own, without errors."""
 
-    def __init__(self, pou: Pou, facts: Facts, report: Report) -> None:
-        self.pou, self.facts, self.report = pou, facts, report
+    def __init__(self, pou: Pou, context: Context) -> None:
+        self.pou, self.context = pou, context
+        self.facts, self.report = context.project.facts, context.report
 
     def warn(self, code: str, node: tree.Node, message: str, hint: str = "",
              related: tuple[Source, int, str] | None = None) -> None:

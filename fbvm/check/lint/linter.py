@@ -36,7 +36,7 @@ def lint_steps(context: Context, program: str | None) -> Iterator[None]:
     uses, writes = declared.Uses(facts), Writes()
     for pou in own:
         yield
-        body = Body(pou, facts, report)
+        body = Body(pou, context)
         for node in body.nodes:
             if rule := _RULES.get(type(node)):
                 rule(body, node)

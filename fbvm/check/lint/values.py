@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import operator
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from fbvm.base.types import BOOL, LREAL, Type, base
+from fbvm.base.types import BOOL, LREAL, StructType, Type, base
 from fbvm.check.expressions.constants import wrap
 from fbvm.check.expressions.values import is_any
 from fbvm.check.expressions.writes import place
@@ -19,6 +20,8 @@ _NO_PLACES = tree.Binary | tree.Unary | tree.Literal
 
 def _binary(body: Body, node: tree.Binary) -> None:
     kind = body.facts.operands.get(node)
+    if node.op == "**":
+        _signed_power(body, node)
     if kind is None or not is_any(kind, "ANY_REAL"):
         if kind is not None and node in body.facts.constants:
             _overflow(body, node, kind)
@@ -27,6 +30,19 @@ def _binary(body: Body, node: tree.Binary) -> None:
         _equality(body, node, node.op, (node.left, node.right), kind)
     _fraction(body, node.left, kind)
     _fraction(body, node.right, kind)
+
+
+def _signed_power(body: Body, node: tree.Binary) -> None:
+    """Warn of `-a ** b`: compilers disagree about what the sign belongs to."""
+    left = node.left
+    if not isinstance(left, tree.Unary) or left.op != "-" or node.start != left.start:
+        return
+    inside, behind = (re.sub(r"(?s)\(\*.*?\*\)|//[^\n]*", "", body.pou.source.text[start:end]) for start, end in (
+        (left.start, left.operand.start), (left.end, node.op_start)))
+    if inside.count("(") >= behind.count(")"):
+        base, power = body.text(left.operand), body.text(node.right)
+        body.warn("S0392", node, f"the sign belongs to {base} here, and to the whole power for other compilers",
+                  f"write (-{base}) ** {power}, or -({base} ** {power})")
 
 
 def _overflow(body: Body, node: tree.Binary, kind: Type) -> None:
@@ -136,7 +152,7 @@ def _has_no_effect(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
 
 
 def _changes_nothing(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
-    for node in Body(pou, body.facts, body.report).nodes:
+    for node in Body(pou, body.context).nodes:
         called = body.facts.calls.get(node) if isinstance(node, tree.Call) else None
         if isinstance(called, PouCall) and not _has_no_effect(body, called.pou, known):
             return False
@@ -154,7 +170,18 @@ def _own(variable: Variable | None, pou: Pou) -> bool:
 
 
 _EXACT: dict[str, Callable[[int, int], int]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
+def _member(body: Body, node: tree.Member) -> None:
+    """Warn of a VAR of a function block that is used through an instance, which the standard forbids (6.5.2)."""
+    field, whole = body.facts.fields.get(node), body.facts.types.get(node.of)
+    if field is None or field.kind != "VAR" or not isinstance(whole, StructType) or not whole.block or \
+            (node.of.of if isinstance(node.of, tree.Deref) else node.of) in body.facts.selves:
+        return
+    if body.context.block_of(whole).kind != "PROGRAM":
+        body.warn("S0295", node.name, f"{field.name} is a VAR of {whole}, which the standard leaves to its body",
+                  "make it a VAR_OUTPUT if it is read, a VAR_INPUT if it is written")
+
+
 RULES: dict[type, Callable[[Body, Any], None]] = {
-    tree.Binary: _binary, tree.Assign: _assign, tree.Call: _call, tree.CallStatement: _statement,
+    tree.Member: _member, tree.Binary: _binary, tree.Assign: _assign, tree.Call: _call, tree.CallStatement: _statement,
 }
 """By class of node the rule that looks at it."""

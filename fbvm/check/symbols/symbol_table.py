@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
+from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect, takers
 from fbvm.base.namespaces import Surroundings
@@ -177,10 +178,11 @@ class SymbolTable:
         for form in text.forms:
             taken = getattr(self.dialect, form.switch) is form.taken
             said = form.accepted if taken else form.refused
-            if said is not None and not (taken and source.library):
-                code, message, hint = said
-                hint += f", or take {takers(form.switch)}" if form.taken and not taken else ""
-                self.report.add(code, source, tree.Node(form.start, form.end), message, hint)
+            if said is None or source.library and CODES[said[0]].severity == "warning":
+                continue
+            code, message, hint = said
+            hint += f", or take {takers(form.switch)}" if form.taken and not taken else ""
+            self.report.add(code, source, tree.Node(form.start, form.end), message, hint)
 
     def _add_action(self, action: tree.Action, source: Source, owner: tree.Name | None, last: Pou | None) -> None:
         """Add an ACTION to the POU that it names, else to the POU in front of it."""

@@ -165,8 +165,8 @@ class Expressions(Builder):
     def binary(self, left: Expr, operator: Token, right: Expr) -> Binary:
         op = "AND" if operator.type == "AMPERSAND" else operator.text.upper()
         if op in ("AND_THEN", "OR_ELSE"):
-            self.forms.append(Form("no_short_circuit_words", operator.start, operator.end, None, (
-                "S0195", f"{op} is CODESYS's, and the tool of this dialect refuses it",
+            self.forms.append(Form("short_circuit_words", operator.start, operator.end, (
+                "S0195", f"{op} is CODESYS's: the standard and other compilers do not have it",
                 f"write {op[:3].strip('_')}, or IF in an IF")))
         node = Binary(left.start, right.end, op, left, right, operator.start)
         self.deepen(node, left, right)

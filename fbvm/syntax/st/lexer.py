@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import NamedTuple
 
+from fbvm.base.dialects import takers
 from fbvm.syntax.st.comments import CLOSERS, comment_end
 from fbvm.syntax.st.pragmas import GENERATOR, NO_EFFECT, attribute_name, dialectal, harmless
 from fbvm.syntax.st.tables import Terminal, tables
@@ -99,6 +100,7 @@ _SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
     (r"#[ \t]*(?:include|define|if|ifdef|ifndef|pragma)\b", "there is no preprocessor: declare constants in VAR CONSTANT"),
     (r"(?<!\.)%[A-Za-z]", "an address has a number behind its letters: %QX0.0, %MW10"),
     (r"#[A-Za-z_]", "`#` in front of a name is Siemens SCL: leave it out"),
+    (r"(?i)@EXTERNAL\b", "RuSTy now writes the pragma {external}, in front of a POU whose body is in another language"),
     (r"#", "a type stands in front of `#`, and no space"),
     (r"\\", "the escape in a string is `$`")))
 """Characters with which no token begins, and a hint."""
@@ -429,7 +431,7 @@ class Lexer:
         elif inner and self.text[start] == "(":
             self.forms.append(Form("comments_end_at_once", first, end, (
                 "S0103", "the comment ended at the first `*)`", "comments do not nest in this dialect: leave the inner (* and "
-                "*) out"), taken=False))
+                f"*) out, or take {takers('comments_end_at_once', False)}"), taken=False))
         return end if end >= 0 else len(self.text)
 
 

@@ -146,9 +146,9 @@ class Statements(Expressions):
         return Return(word.start, value.end if value else word.end, value)
 
     def jump(self, word: Token, target: Token) -> RefusedStatement:
-        self.forms.append(Form("no_jumps", word.start, target.end, None, (
-            "S0195", "JMP in Structured Text is CODESYS's, and the tool of this dialect refuses it",
-            "write IF or a loop; in an instruction list JMP stands alone")))
+        self.forms.append(Form("jumps_in_text", word.start, target.end, (
+            "S0195", "JMP in Structured Text is CODESYS's: the standard and other compilers do not have it",
+            "write IF or a loop")))
         made = RefusedStatement(word.start, target.end, "JMP")
         self.targets[made] = target.text
         return made

@@ -74,10 +74,13 @@ FLAGS = re.compile(r"\b(P_(ER|GT|EQ|N|OF|UF|CY)|CX_(Failure|Stopped)) +:=")
 """Only a library may write condition flags and the words of failures."""
 
 
+MEANT = {"ladder": ["S0390"], "twincat": ["S0195"], "tcunit": ["S0195"]}
+"""Warnings by folder: equality of reals is what an instruction asks; AND_THEN is a word of TwinCAT."""
+
+
 @pytest.mark.slow
 @each_of("files", OWN, ids=lambda files: files[0].parent.name + "/" + files[0].stem)
 def test_what_fbvm_brings_is_clean(files: list[Path]) -> None:
     ordinary = [path for path in files if not FLAGS.search(path.read_text(encoding="utf-8"))]
-    asked_for = ["S0390"] if files[0].parent.name == "ladder" else []  # equality is what an instruction asks there
-    compilation = compile_files(ordinary, libraries=[files[0].parent], no_warn=asked_for)
+    compilation = compile_files(ordinary, libraries=[files[0].parent], no_warn=MEANT.get(files[0].parent.name, []))
     assert compilation.diagnostics == [], "\n".join(d.render() for d in compilation.diagnostics)
