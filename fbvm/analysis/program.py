@@ -216,6 +216,8 @@ class Program:
         before, after = old.pou, new.pou
         if before is None or after is None or self._signature(old, before) != self._signature(new, after):
             return False
+        if self.dialect.bits_of_words and _names_bits_of_words(old) != _names_bits_of_words(new):
+            return False  # what %IX means everywhere
         known = checked.project.pous.get(("", fold(after.name.text)))
         if _is_object(before) or _is_object(after) or any(pou.base is known for pou in checked.project.pous.values()):
             return False  # what derived blocks inherit, and which bodies calls may mean, is worked out for all
@@ -366,3 +368,7 @@ def _deep(steps: Iterator[None]) -> Iterator[None]:
 
 
 __all__ = ["LibraryError", "Program"]
+
+
+def _names_bits_of_words(part: Part) -> bool:
+    return any(form.switch == "bits_of_words" for form in part.syntax.forms)

@@ -195,11 +195,12 @@ class AddressError(ValueError):
     """The text is no address, or the address does not exist; the message says why."""
 
 
-def parse_address(text: str, areas: Mapping[str, Area] = AREAS) -> Address:
+def parse_address(text: str, areas: Mapping[str, Area] = AREAS, words: bool = False) -> Address:
     """The address that `text` names: `D100`, `%D100`, `CIO 1519.03`, `1519.03`, `E0_100`, `%MW10`, `%IX0.3`.
 
     `areas` are the areas of the PLC, with those of its units; E banks are always known.  A bit of a larger unit is
-    returned as a bit of one of its bytes.  Raises AddressError for text that is no address, and for an address outside its
+    returned as a bit of one of its bytes; with `words` what counts behind %IX, %QX and %MX is words, %IX1.15 the last bit of the
+    second one.  Raises AddressError for text that is no address, and for an address outside its
     area.
 
     >>> str(parse_address("1519.3")), str(parse_address("DM100")), str(parse_address("%MW4.15"))
@@ -207,7 +208,7 @@ def parse_address(text: str, areas: Mapping[str, Area] = AREAS) -> Address:
     """
     text = text.strip()
     if match := _PORTABLE.fullmatch(text):
-        return _portable(match)
+        return _portable(match, words)
     match = _OMRON.fullmatch(text)
     if not match:
         mailbox = _MAILBOX.fullmatch(text)
@@ -222,12 +223,15 @@ def parse_address(text: str, areas: Mapping[str, Area] = AREAS) -> Address:
     return check_address(Address(name, whole_number(match[4]), bit))
 
 
-def _portable(match: re.Match[str]) -> Address:
+def _portable(match: re.Match[str], words: bool) -> Address:
     area, size = match[1].upper(), _SIZES[match[2].upper()]
     if size == 1:
         if match[4] is None and match[2] == "":
             raise AddressError(f"%{area}{match[3]} has no size: write %{area}X{match[3]}.0 or %{area}W{match[3]}")
-        return check_address(Address(area, whole_number(match[3]), whole_number(match[4] or "0"), 1))
+        number, bit = whole_number(match[3]), whole_number(match[4] or "0")
+        if words and bit > 15:
+            raise AddressError(f"bit {bit} does not exist; bits of a word are 0 to 15")
+        return check_address(Address(area, 2 * number + bit // 8, bit % 8, 1) if words else Address(area, number, bit, 1))
     whole = check_address(Address(area, whole_number(match[3]), None, size))
     if match[4] is None:
         return whole

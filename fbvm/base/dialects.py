@@ -86,6 +86,7 @@ class Dialect:
     wrong_bcd_is_zero: bool = False
     negative_is_zero: bool = False
     any_width_at: bool = False
+    bits_of_words: bool = False
     steps_apart: bool = False
     times_are_numbers: bool = False
     short_names: bool = False
@@ -216,6 +217,9 @@ QUESTIONS = {
     "plain_names": ("names that begin with _ or P_", "taken", "taken, with a warning (S0195)"),
     "any_width_at": ("x AT %IW4 : DINT, x AT %ML2 : DWORD: an address of another size than the type", "an error",
                      "x begins there, with a warning (S0193)"),
+    "bits_of_words": ("%IX0.15: a bit above 7", "an error (S0601): bytes are counted behind %IX, %QX and %MX",
+                      "bit 15 of word 0, which is %IX1.7, with a warning (S0193); a project that names such a bit counts words "
+                      "behind all %IX, %QX and %MX, as devices with word addressing do"),
     "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
                          "0"),
     "wrong_bcd_is_zero": ("BCD_TO_UINT(16#9A): a digit above 9", "stops the program (R0105)", "0"),
@@ -242,7 +246,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
-                   own_time=True, short_circuit_words=True, jumps_in_text=True)
+                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

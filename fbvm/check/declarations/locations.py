@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fbvm.base.areas import E_NAMES, FLAG_AREAS, PORTABLE_AREAS, Address, AddressError, parse_address
+from fbvm.base.areas import E_NAMES, FLAG_AREAS, PORTABLE_AREAS, Address, AddressError
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
@@ -22,7 +22,7 @@ def location_of(context: Context, declared: tree.VarDecl, kind: Type, source: So
     if is_open(node, kind):
         return None
     try:
-        address = parse_address(node.text, context.areas)
+        address = context.address(node.text, source)
     except AddressError as error:
         context.report.add("S0601", source, node, str(error), _hint(node.text, declared, kind))
         return None

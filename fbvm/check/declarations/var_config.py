@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.base.areas import PORTABLE_AREAS, Address, AddressError, parse_address
+from fbvm.base.areas import PORTABLE_AREAS, Address, AddressError
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
@@ -190,7 +190,7 @@ class VarConfig:
 
     def _direct(self, text: str, node: tree.Node, source: Source) -> Spot | None:
         try:
-            address = parse_address(text, self.context.areas)
+            address = self.context.address(text, source)
         except AddressError as error:
             self.report.add("S0601", source, node, str(error))
             return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.base.areas import FLAG_AREAS, AddressError, parse_address
+from fbvm.base.areas import FLAG_AREAS, AddressError
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, EnumType, Type, fold
 from fbvm.check.expressions import objects, unknown_names
 from fbvm.check.expressions.scope import Scope
@@ -85,7 +85,7 @@ def program(scope: Scope, expr: tree.NameRef) -> bool:
 def address(scope: Scope, expr: tree.Direct, want: Type | None) -> Type | None:
     """The type of a directly represented variable: BOOL or a bit string of its width."""
     try:
-        meant = parse_address(expr.text, scope.context.areas)
+        meant = scope.context.address(expr.text, scope.source)
     except AddressError as error:
         scope.error("S0601", expr, str(error))
         return None

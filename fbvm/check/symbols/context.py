@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
+from fbvm.base.areas import AREAS, E_NAMES, Address, Area, Mailbox, e_bank, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import EnumType, RefType, StructType, Type, derives, fold
@@ -85,6 +85,10 @@ class Context:
         self._blocks: dict[int, Pou] = {}
         self._identifiers = 0
         self._anonymous = 0
+
+    def address(self, text: str, source: Source) -> Address:
+        """The address that a text of the program names.  Raises AddressError."""
+        return parse_address(text, self.areas, self.project.counts_words and not source.library)
 
     # --- areas, numbers ---------------------------------------------------------------------------------------------
 

@@ -81,6 +81,8 @@ class SymbolTable:
         self.report = report
         self.facts = Facts()
         self.size_limits = SizeLimits(report, dialect.large_memory)
+        self.counts_words = False
+        """True if words are counted behind %IX, since some text names a bit above 7."""
         self.pous: dict[tuple[str, str], Pou] = {}
         self.types: dict[tuple[str, str], TypeEntry] = {}
         self.globals: dict[tuple[str, str], Variable] = {}
@@ -177,6 +179,7 @@ class SymbolTable:
         """Report the forms of a text that the dialect does not take, and for the user's own texts those to be warned of."""
         for form in text.forms:
             taken = getattr(self.dialect, form.switch) is form.taken
+            self.counts_words |= taken and form.switch == "bits_of_words" and not source.library
             said = form.accepted if taken else form.refused
             if said is None or source.library and CODES[said[0]].severity == "warning":
                 continue

@@ -85,6 +85,7 @@ class Declarations(Types):
         return self.var_decl(names, at, location, colon, spec, None, sign, initial, end)
 
     def location(self, token: Token) -> Location:
+        self.note_bit_of_word(token)
         return Location(token.start, token.end, token.text)
 
     # --- initial values ---

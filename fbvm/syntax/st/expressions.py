@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from fbvm.syntax.st import literals
@@ -33,6 +34,9 @@ Item = tuple[Expr | None, Expr | None]
 REPEATED_LIMIT = 1_000_000
 """Most values that one `n(a, b)` of an array may stand for."""
 Decode = Callable[[], literals.Decoded]
+
+_BIT_OF_WORD = re.compile(r"%([IQM])X?(\d{1,9})\.(8|9|1[0-5])", re.I)
+"""An address with a bit that a byte does not have."""
 
 
 class Expressions(Builder):
@@ -93,7 +97,17 @@ class Expressions(Builder):
         return NameRef(token.start, token.end, token.text)
 
     def direct(self, token: Token) -> Direct:
+        self.note_bit_of_word(token)
         return Direct(token.start, token.end, token.text)
+
+    def note_bit_of_word(self, token: Token) -> None:
+        """Note the address of a bit above 7, `%IX0.15`, which is one of a word."""
+        if found := _BIT_OF_WORD.fullmatch(token.text):
+            area, word, bit = found[1].upper(), int(found[2]), int(found[3])
+            meant = f"%{area}X{2 * word + bit // 8}.{bit % 8}"
+            self.forms.append(Form("bits_of_words", token.start, token.end, (
+                "S0601", f"bit {bit} does not exist; bits are 0 to 7", f"bit {bit} of a word is {meant}"), (
+                "S0193", f"{token.text} is {meant}: words are counted behind X in this project", f"write %{area}W{word}.{bit}")))
 
     def member(self, of: Expr, dot: Token, token: Token) -> Member:
         node = Member(of.start, token.end, of, Name(token.start, token.end, token.text))

@@ -14,6 +14,7 @@ from rows import each_of
 from fbvm.analysis.parts import File, spans
 from fbvm.analysis.program import Program
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.dialects import DIALECTS
 from fbvm.code.compiler import compile_sources
 
 TWO = """\
@@ -230,3 +231,14 @@ def test_diagnostics_are_those_of_the_compiler() -> None:
     for text, dialect in texts:
         wanted = compile_sources([Source("x.st", text)], dialect=dialect).diagnostics
         assert rows(fresh(text, dialect)) == rows(wanted), text
+
+
+def test_a_bit_of_a_word_changes_what_addresses_mean_everywhere() -> None:
+    text = "PROGRAM Main\nVAR b : BOOL; END_VAR\n    b := %IX0.3;\nEND_PROGRAM\n"
+    program = Program(dialect=DIALECTS["codesys"])
+    program.replace("words.st", text)
+    program.check_all()
+    program.replace("words.st", text.replace("0.3", "0.13"))
+    assert not program.check_changes()
+    program.check_all()
+    assert codes(program, "words.st") == [("S0193", 3)]
