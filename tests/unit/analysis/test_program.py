@@ -14,7 +14,6 @@ from rows import each_of
 from fbvm.analysis.parts import File, spans
 from fbvm.analysis.program import Program
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.dialects import DIALECTS
 from fbvm.code.compiler import compile_sources
 
 TWO = """\
@@ -235,7 +234,7 @@ def test_diagnostics_are_those_of_the_compiler() -> None:
 
 def test_a_bit_of_a_word_changes_what_addresses_mean_everywhere() -> None:
     text = "PROGRAM Main\nVAR b : BOOL; END_VAR\n    b := %IX0.3;\nEND_PROGRAM\n"
-    program = Program(dialect=DIALECTS["codesys"])
+    program = Program(dialect="codesys")
     program.replace("words.st", text)
     program.check_all()
     program.replace("words.st", text.replace("0.3", "0.13"))

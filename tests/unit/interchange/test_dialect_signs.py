@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from click.testing import CliRunner
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import DIALECTS
 from fbvm.cli.main import main
 from fbvm.interchange.dialect_signs import guessed
 
@@ -54,3 +59,47 @@ def test_a_document_is_checked_in_the_dialect_of_its_tool_which_is_said(name: st
     done = CliRunner().invoke(main, ["check", str(DOCUMENTS / name), "--dialect", "auto", "--json", "--no-warn", "all"])
     assert f"dialect {dialect}: {reason}" in done.stderr
     assert "X0101" not in done.stdout
+
+
+class Project(NamedTuple):
+    """A project of the table: its name, the dialect, words of the reason, the code of an error if it is refused, its files."""
+
+    name: str
+    dialect: str
+    reason: str
+    refused: str
+    files: dict[str, str]
+
+
+def read_projects() -> Iterator[Project]:
+    """The projects of `dialect_projects.txt`, in their order."""
+    table = Path(__file__).with_name("dialect_projects.txt").read_text(encoding="utf-8")
+    for piece in re.split(r"(?m)^==== ", table)[1:]:
+        head, *files = re.split(r"(?m)^---- ", piece)
+        name, said, *refused = head.strip().splitlines()
+        dialect, reason = said.split(": ", 1)
+        yield Project(name, dialect, reason, refused[0].removeprefix("refused: ") if refused else "",
+                      dict(file.split("\n", 1) for file in files))
+
+
+PROJECTS = tuple(read_projects())
+
+
+@pytest.mark.slow
+@each_of("project", PROJECTS, ids=lambda project: project.name)
+def test_auto_takes_the_dialect_of_a_project_which_it_is_accepted_in(project: Project, tmp_path: Path) -> None:
+    folder = tmp_path / str(PROJECTS.index(project))
+    paths = [folder / name for name in project.files]
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(project.files[path.relative_to(folder).as_posix()], encoding="utf-8")
+    done = CliRunner().invoke(main, ["check", *map(str, paths), "--dialect", "auto", "--no-warn", "all"])
+    said = done.stderr.replace(f"{folder}{os.sep}", "").replace("\\", "/")
+    assert f"dialect {project.dialect}: {project.reason}\n" in said
+    assert (done.exit_code == 0) is not bool(project.refused), done.output
+    assert project.refused in done.output
+
+
+def test_there_are_projects_of_every_dialect() -> None:
+    assert {project.dialect for project in PROJECTS} == set(DIALECTS)
+    assert len(PROJECTS) >= 20
