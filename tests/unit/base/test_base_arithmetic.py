@@ -9,7 +9,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base import arithmetic, strings
-from fbvm.base.arithmetic import NAN, Undefined
+from fbvm.base.arithmetic import INF, NAN, Undefined, power
 
 
 def test_nan_is_the_canonical_one() -> None:
@@ -53,3 +53,12 @@ def test_no_answer_says_why(call, code: str, values: tuple[object, ...]) -> None
     with pytest.raises(Undefined) as caught:
         call()
     assert (caught.value.code, caught.value.values) == (code, values)
+
+
+@each_of("a, b, expected", [
+    (-1e200, 3.0, -INF), (-1e200, 5.0, -INF), (-1e200, 2.0, INF), (-1e200, 4.0, INF), (1e200, 3.0, INF), (0.0, -3.0, INF),
+    (-0.0, -3.0, -INF), (-0.0, -5.0, -INF), (-0.0, -2.0, INF), (-0.0, -0.5, INF), (-8.0, 0.5, NAN), (-2.0, 3.0, -8.0),
+    (1e-200, 3.0, 0.0),
+])
+def test_power_beyond_the_range_and_at_zero(a: float, b: float, expected: float) -> None:
+    assert repr(power(a, b)) == repr(expected)

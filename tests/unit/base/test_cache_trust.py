@@ -159,3 +159,20 @@ def test_the_state_of_a_folder_is_that_of_all_files_below(tmp_path: Path) -> Non
     assert list(cache._state(str(tmp_path))) == before != []
     (tmp_path / "inner" / "deep" / "TON.st").write_text("newer")
     assert list(cache._state(str(tmp_path))) != before
+
+
+def written(root: Path, kept: Cache, count: int) -> list[int]:
+    """Writes so many files of 100 bytes, each used a second later than the one before; returns which of them are there."""
+    for number in range(count):
+        kept.write(str(number), bytes(100 - len(kept.head) - 32))
+        os.utime(kept.folder / str(number), (number, number)) if (kept.folder / str(number)).exists() else None
+    return sorted(int(path.name) for path in kept.folder.iterdir())
+
+
+@pytest.mark.parametrize("limits", [(1000, 99), (1 << 20, 10)], ids=["bytes", "files"])
+def test_above_a_limit_the_oldest_files_go_until_a_quarter_is_free(root: Path, limits: tuple[int, int]) -> None:
+    assert written(root, Cache("full", b"head", *limits), 10) == list(range(10))
+    assert written(root, Cache("more", b"head", *limits), 11) == list(range(4, 11))
+    again = Cache("full", b"head", *limits)  # another process, which finds the folder full
+    again.write("10", bytes(64))
+    assert sorted(int(path.name) for path in again.folder.iterdir()) == list(range(4, 11))

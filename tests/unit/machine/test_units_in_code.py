@@ -168,6 +168,17 @@ def test_a_trap_of_the_program_ends_a_run_and_a_restart_begins_anew() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("do", [lambda plc: plc.scan(), lambda plc: plc.run(scans=50)], ids=["scan", "run"])
+def test_a_trap_at_the_first_statement_ends_a_program(do: Callable[[Plc], object]) -> None:
+    code = compile_text("PROGRAM Main VAR n, d : INT; END_VAR d := 10 / (9 - n); n := n + 1; END_PROGRAM").image
+    assert code is not None
+    rigs = four(code, (0,))
+    while not rigs[0].plc.trap:
+        agree(rigs, do)
+    assert (rigs[0].plc.scans, rigs[0].plc.trap.code) == (10, "R0101")
+
+
+@pytest.mark.slow
 def test_a_trap_of_a_units_program_is_a_fault_of_ours() -> None:
     for rig in four(image(every=50), (0, 0)):
         rig.plc.run(scans=10)

@@ -1,0 +1,93 @@
+"""Memory areas and addresses: how far each area goes, where its bits lie, what is no address."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from rows import each_of
+
+from fbvm.base.areas import (
+    AREAS,
+    E_BANKS,
+    E_WORDS,
+    SLOTS_OFFSET,
+    AddressError,
+    Mailbox,
+    parse_address,
+    refusal,
+)
+
+MAILBOX = Mailbox("BOX", 4, 3, 20)
+
+
+def test_areas_lie_one_behind_the_other() -> None:
+    placed = sorted(AREAS.values(), key=lambda area: area.offset)
+    for one, other in pairwise(placed):
+        assert one.offset + one.size_bytes <= other.offset, (one.name, other.name)
+    assert placed[-1].offset + placed[-1].size_bytes == SLOTS_OFFSET
+
+
+@each_of("last, behind", [
+    ("CIO 6143", "CIO 6144"), ("6143.15", "6144.00"), ("W511", "W512"), ("H1535", "H1536"), ("A959", "A960"), ("T4095", "T4096"),
+    ("C4095", "C4096"), ("D32767", "D32768"), ("D32767.15", "D32767.16"), ("CF127", "CF128"), ("TF4095", "TF4096"),
+    ("CNF4095", "CNF4096"), ("EC_32767", "EC_32768"), ("E0:32767.15", "E0:0.16"), ("EC_0", "ED_0"),
+    ("%IB4095", "%IB4096"), ("%IW2047", "%IW2048"), ("%ID1023", "%ID1024"), ("%IL511", "%IL512"), ("%IX4095.7", "%IX4095.8"),
+    ("%QB4095", "%QB4096"), ("%QX4095.7", "%QX4096.0"), ("%MB65535", "%MB65536"), ("%ML8191", "%ML8192"),
+    ("%MW4.15", "%MW4.16"), ("%MB0.7", "%MB0.8"), ("%ML0.63", "%ML0.64"), ("BOX63", "BOX64"), ("BOX63.15", "BOX0.16"),
+])
+def test_an_area_has_a_last_place(last: str, behind: str) -> None:
+    areas = AREAS | {"BOX": MAILBOX.at(SLOTS_OFFSET)}
+    parse_address(last, areas)
+    with pytest.raises(AddressError):
+        parse_address(behind, areas)
+
+
+@each_of("text, said", [
+    ("D40000", "D ends at 32767; 40000 does not exist"), ("%MW40000", "%M ends at 32767; 40000 does not exist"),
+    ("%QB5000", "%Q ends at 4095; 5000 does not exist"), ("D5.16", "bit 16 does not exist; bits are 0 to 15"),
+    ("%IX5.8", "bit 8 does not exist; bits are 0 to 7"), ("%IW5.16", "bit 16 does not exist; bits of %IW5 are 0 to 15"),
+    ("TF7.1", "T0007 is a flag and has no bits"), ("CF5.0", "CF005 is a flag and has no bits"),
+    ("ED_5", "there is no E bank D; banks are 0 to C"), ("%I5", "%I5 has no size: write %IX5.0 or %IW5"),
+    ("BOX1", "'BOX1' is not an address"), ("D", "'D' is not an address"), ("%IX", "'%IX' is not an address"),
+    ("D-1", "'D-1' is not an address"), ("", "'' is not an address"),
+])
+def test_what_is_no_address_is_said_why(text: str, said: str) -> None:
+    with pytest.raises(AddressError) as raised:
+        parse_address(text)
+    assert str(raised.value) == said
+
+
+@each_of("text, shown, byte, bit", [
+    ("D100", "D100", 200, 0), ("dm 7", "D7", 14, 0), ("%D5.09", "D5.09", 11, 1), ("5", "CIO 5", 10, 0),
+    ("1519.3", "CIO 1519.03", 3038, 3), ("TF21", "T0021", 2, 5), ("CNF8", "C0008", 1, 0), ("CF113", "CF113", 14, 1),
+    ("E3_9", "E3_9", 18, 0), ("ea:9.8", "EA_9.08", 19, 0),
+    ("%MB9", "%MB9", 9, 0), ("%MW9", "%MW9", 18, 0), ("%md9", "%MD9", 36, 0), ("%ML9", "%ML9", 72, 0), ("%IX9.6", "%IX9.6", 9, 6),
+    ("%QX9", "%QX9.0", 9, 0), ("%MW4.15", "%MX9.7", 9, 7), ("%MD1.16", "%MX6.0", 6, 0), ("BOX3.12", "BOX3.12", 7, 4),
+])
+def test_where_an_address_lies_and_how_it_is_written(text: str, shown: str, byte: int, bit: int) -> None:
+    found = parse_address(text, AREAS | {"BOX": MAILBOX.at(SLOTS_OFFSET)})
+    assert (str(found), found.byte_offset(), found.bit_in_byte()) == (shown, byte, bit)
+
+
+@each_of("mailbox, said", [
+    (MAILBOX, ""), (Mailbox("MB", 1, 0, 0), ""), (Mailbox("MAILBOXX", 0, 1, 1 << 20), ""),
+    (Mailbox("BOX", 1, 1, 1 << 20), "BOX would have 1048577 words; 1 to 1048576 are possible"),
+    (Mailbox("BOX", 0, 5, 0), "BOX would have 0 words; 1 to 1048576 are possible"),
+    (Mailbox("BOX", -1, 1, 5), "BOX would have 4 words; 1 to 1048576 are possible"),
+    (Mailbox("BOX", 9, -1, -1), "BOX would have 10 words; 1 to 1048576 are possible"),
+    (Mailbox("BOX", 9, 1, -1), "BOX would have 8 words; 1 to 1048576 are possible"),
+    (Mailbox("DM", 1, 1, 1), "'DM' cannot name an area: write 2 to 8 capitals that no other area has"),
+    (Mailbox("CIO", 1, 1, 1), "'CIO' cannot name an area: write 2 to 8 capitals that no other area has"),
+    (Mailbox("X", 1, 1, 1), "'X' cannot name an area: write 2 to 8 capitals that no other area has"),
+    (Mailbox("box", 1, 1, 1), "'box' cannot name an area: write 2 to 8 capitals that no other area has"),
+    (Mailbox("MAILBOXES", 1, 1, 1), "'MAILBOXES' cannot name an area: write 2 to 8 capitals that no other area has"),
+])
+def test_what_a_mailbox_may_be(mailbox: Mailbox, said: str) -> None:
+    assert refusal(mailbox) == said
+
+
+def test_what_is_kept_over_a_start_and_what_a_program_must_not_write() -> None:
+    assert {area.name for area in AREAS.values() if area.retained} == {"H", "A", "CNF", "C", "D"}
+    assert {area.name: area.read_only for area in AREAS.values() if area.read_only} == {"CF": 128, "A": 448}
+    assert (E_BANKS, E_WORDS) == (13, 32768)
