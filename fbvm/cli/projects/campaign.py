@@ -243,7 +243,7 @@ def _about(outcome: Outcome, group: Group, recordings: dict[int, Path]) -> list[
         lines.append(failure.detail)
     path = recordings.get(group.first)
     if plan.tests:
-        lines.append(f"fbvm step {named(path)}" if path and path.exists() else f"the same command with --only {group.first}")
+        lines.append(f"fbvm chart {named(path)}" if path and path.exists() else f"the same command with --only {group.first}")
     elif path:
         which = f" --plc {failure.plc}" if len(plan.project.plcs) > 1 else ""
         lines.append(f"fbvm replay {named(path)}{which}")

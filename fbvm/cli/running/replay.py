@@ -84,6 +84,8 @@ def _repeat(make: Callable[[], RepeatedRun], asked: Asked) -> int:
         say(f"after scan {repeated.differs} the memory is not what was recorded", fg="red", err=True)
     elif ended == "end" and not repeated.complete:
         say(f"the recording was cut off after {repeated.plc.scans} scans", fg="yellow", err=True)
+    elif reason == "end" and not (asked.shown or asked.charted or asked.as_json):
+        say(f"{repeated.plc.scans:,} scans were done again: the memory is what was recorded")
     return result.status
 
 

@@ -69,6 +69,9 @@ def test_failing_runs_of_tests_are_grouped_and_each_is_done_again_by_its_number(
     assert (status, rows[4]["scan"]) == (1, "4")
     assert ">       assert counter.Total < 15" in said
     assert f"run 4, seed {rows[4]['seed']}: test tests/test_counter.py::test_it_counts (tests/test_counter.py:4)" in said
+    verb = ["chart", str(Path("campaign-results/1.fbtrace"))]
+    assert f"  fbvm {' '.join(verb)}\n" in fbvm("tests/test_counter.py", "--vary", "Step=1,2,3,9", "--vary", "cycle=10ms,5ms")[1]
+    assert CliRunner().invoke(main, verb).exit_code == 0
 
 
 ENDS = """import ctypes

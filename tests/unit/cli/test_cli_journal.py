@@ -151,6 +151,12 @@ def test_a_recording_that_was_cut_off_is_done_again_up_to_there(here: Path) -> N
     assert (result.exit_code, result.output) == (0, "Main.n = 8\nthe recording was cut off after 4 scans\n")
 
 
+def test_a_replay_that_shows_nothing_says_that_it_came_out_the_same(here: Path) -> None:
+    fbvm("run", "counter.st", "--scans", "4", "--trace", "run.fbtrace")
+    result = fbvm("replay", "run.fbtrace")
+    assert (result.exit_code, result.output) == (0, "4 scans were done again: the memory is what was recorded\n")
+
+
 def test_a_recording_of_another_run_is_found_out(here: Path) -> None:
     """A fingerprint of the memory that is not that of the run: as if this version of fbvm computed something else."""
     fbvm("run", "counter.st", "--scans", "4", "--trace", "run.fbtrace", "--verify")
