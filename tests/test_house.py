@@ -54,7 +54,8 @@ FLOORS = {
 ORDERS = {
     "syntax": ("tree", "st", "ladder/instructions", "ladder/drawing", "ladder", "il", "sfc", "recovery", "", "formatter"),
     "check": ("symbols", "expressions", "calls", "declarations", "lint", ""),
-    "interchange": ("", "cx", "cx/read", "cx/write", "plcopen", "plcopen/read", "plcopen/write", "twincat", "formats"),
+    "interchange": ("", "cx", "cx/read", "cx/write", "plcopen", "plcopen/read", "plcopen/write", "twincat", "codesys2",
+                    "formats"),
     "code": ("", "builder", "layout", "pictures", "lowering", "store", "compiler"),
     "engine": ("", "python", "native/llvm", "native/library", "native/emit", "native/scans", "native", "choice"),
     "wire": ("", "fins"),

@@ -89,6 +89,8 @@ class Dialect:
     bits_of_words: bool = False
     steps_apart: bool = False
     times_are_numbers: bool = False
+    short_addresses: bool = False
+    dates_take_durations: bool = False
     short_names: bool = False
     own_time: bool = False
     short_circuit_words: bool = False
@@ -209,6 +211,11 @@ QUESTIONS = {
                        "count lies there, with a warning (S0193)"),
     "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another "
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
+    "short_addresses": ("dword := p; p < dword, where p is a POINTER TO: a pointer where DWORD or UDINT is needed, or compared "
+                        "with one", "an error", "its address: the number of the byte in the memory of the PLC, 0 for a null "
+                        "pointer"),
+    "dates_take_durations": ("D#2024-12-31 + T#1d: a DATE and a TIME", "an error",
+                             "the DATE so much later or earlier, which may have hours in it"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
     "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
     "short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken, with a warning (S0195)", "taken"),
@@ -246,7 +253,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
-                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True)
+                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, short_addresses=True,
+                   dates_take_durations=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

@@ -65,9 +65,15 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
     if dialect.instances_are_values and isinstance(target, StructType) and target.block:
         return kind == target
     kind, target = base(kind), base(target)
-    if isinstance(kind, RefType) and kind.moves and target in (ELEMENTARY["ULINT"], ELEMENTARY["LWORD"]):
-        return dialect.integers_and_bits  # a pointer has 64 bits
+    if isinstance(kind, RefType) and kind.moves and isinstance(target, Elementary):
+        return _holds_pointer(target, dialect)
     return any(getattr(dialect, switch) and holds_all(kind, target) for switch, holds_all in _BY_DIALECT)
+
+
+def _holds_pointer(target: Elementary, dialect: Dialect) -> bool:
+    """True if a dialect converts a pointer, which has 64 bits, or its address to a number."""
+    return target in (ELEMENTARY["ULINT"], ELEMENTARY["LWORD"]) and dialect.integers_and_bits or \
+        target in ADDRESSES and dialect.short_addresses
 
 
 def _narrows(kind: Type, target: Type) -> bool:
@@ -106,6 +112,8 @@ def as_number(kind: Type, dialect: Dialect) -> Type:
     return kind
 
 
+ADDRESSES = (ELEMENTARY["DWORD"], ELEMENTARY["UDINT"])
+"""What holds the address of a pointer in a dialect whose pointers have 32 bits."""
 UNSIGNED = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}
 """The unsigned number of each bit string."""
 
@@ -139,6 +147,7 @@ _DATES = {
     ("LDATE_AND_TIME", "LTIME_OF_DAY"), ("LDATE_AND_TIME", "DATE"), ("LDATE_AND_TIME", "TIME_OF_DAY"),
     ("DATE_AND_TIME", "LTIME_OF_DAY"), ("DATE_AND_TIME", "LDATE"), ("DATE", "DATE_AND_TIME"), ("DATE", "LDATE_AND_TIME"),
     ("LDATE", "LDATE_AND_TIME"), ("LDATE", "DATE_AND_TIME"),
+    ("TIME", "TIME_OF_DAY"), ("TIME_OF_DAY", "TIME"), ("LTIME", "LTIME_OF_DAY"), ("LTIME_OF_DAY", "LTIME"),
 }
 
 

@@ -28,7 +28,7 @@ from fbvm.base.types import (
     machine,
 )
 from fbvm.check.expressions import constants
-from fbvm.check.expressions.assignability import UNSIGNED, as_number, is_untyped
+from fbvm.check.expressions.assignability import ADDRESSES, UNSIGNED, as_number, is_untyped
 from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.operator_hints import bit_hint, report_undefined
 from fbvm.check.expressions.scope import Scope
@@ -156,6 +156,8 @@ def _reference(scope: Scope, expr: tree.Binary) -> Type | None:
     bytes; in a dialect that counts elements all references are moved."""
     left, right = (_beside_reference(scope, expr, side) for side in (expr.left, expr.right))
     counts = scope.dialect.pointers_count_elements
+    if expr.op in COMPARISONS and scope.dialect.short_addresses and (address := _address(left, right)) is not None:
+        return _folded(scope, expr, address, BOOL)
     result = _compared_references(expr.op, left, right) if expr.op in COMPARISONS else _moved(expr.op, left, right, counts)
     if result is None:
         report_undefined(scope, expr, left, right, None)
@@ -164,6 +166,14 @@ def _reference(scope: Scope, expr: tree.Binary) -> Type | None:
     if counts and isinstance(result, RefType) and not _made_by_adr(scope, expr):
         scope.facts.by_elements.add(expr)
     return result
+
+
+def _address(left: Type, right: Type) -> Type | None:
+    """The number that holds an address, where a pointer is compared with one; else None."""
+    for pointer, number in ((left, right), (right, left)):
+        if isinstance(pointer, RefType) and pointer.moves and number in ADDRESSES:
+            return number
+    return None
 
 
 def _compared_references(op: str, left: Type, right: Type) -> Type | None:
@@ -346,6 +356,8 @@ def _family(scope: Scope, op: str) -> tuple[str, ...]:
 def _time(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> Type | None:
     """The result of an operator on times and dates, or None if it is none of those."""
     result = TIMES.get((expr.op, left, right))
+    if result is None and expr.op in "+-" and (left, right) == (DATE, TIME) and scope.dialect.dates_take_durations:
+        result = DATE
     if result is None and expr.op in "+-" and common(left, right) is not None:
         met = common(left, right)
         assert met is not None

@@ -1,10 +1,12 @@
-"""`fbvm import`: programs from PLCopen XML, as CODESYS, Beremiz and OpenPLC Editor write it, and from CX-Programmer."""
+"""`fbvm import`: programs from PLCopen XML, as CODESYS, Beremiz and OpenPLC Editor write it, from CX-Programmer and from
+CODESYS 2.3."""
 
 from __future__ import annotations
 
 import codecs
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -15,9 +17,12 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
+from fbvm.interchange.codesys2 import is_binary, is_export
+from fbvm.interchange.codesys2.importing import import_codesys2, library_description
 from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.dialect_signs import FAMILIES
 from fbvm.interchange.formats.given import is_cx_project, usual_dialect
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
 
@@ -37,17 +42,15 @@ from fbvm.interchange.plcopen.read.producer import ORDERS
 @click.option("--json", "as_json", is_flag=True, help="Print messages as one JSON object.")
 def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: str, memory: bool, order: str | None,
             as_json: bool) -> None:
-    """Make sources of a project in PLCopen XML, or of CX-Programmer (.cxp, .cxt), and say what could not be taken over.
+    """Make sources of a project in PLCopen XML, of CX-Programmer (.cxp, .cxt) or of CODESYS 2.3 (.exp, .pro, .lib), and say what
+    could not be taken over. Sources of a .lib get a library.toml: `--library DIR` then finds its blocks by name.
 
     Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
     blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
     if usual_dialect([file]) == "twincat":
         raise click.UsageError(f"{file} needs no import: `fbvm check {file}` and all other verbs on programs take TwinCAT's "
                                "files as they are")  # fmt: skip
-    if not is_cx_project(file):
-        made = import_xml(file, order=order or "")
-    else:
-        made = import_project(read_file(file, SOURCE_BYTES), str(file), plc, _encoding(encoding), memory)
+    made = _imported(file, order or "", plc, encoding, memory)
     there = [name for name in made.files if os.path.lexists(folder / name)]
     if there and not force:
         raise click.UsageError(f"{folder / there[0]} is there already; --force writes over it")
@@ -65,6 +68,19 @@ def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: st
         say(f"these sources are written for --dialect {FAMILIES[made.family]}: {made.because}", err=True)
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)
+
+
+def _imported(file: Path, order: str, plc: str | None, encoding: str, memory: bool) -> Imported:
+    """The sources within a file, by its kind."""
+    if is_cx_project(file):
+        return import_project(read_file(file, SOURCE_BYTES), str(file), plc, _encoding(encoding), memory)
+    data = read_file(file, SOURCE_BYTES) if file.is_file() else b""
+    if not is_export(data) and not is_binary(data):
+        return import_xml(file, order=order)
+    made = import_codesys2(data, str(file))
+    if file.suffix.lower() != ".lib" or not made.files:
+        return made
+    return replace(made, files=made.files | {"library.toml": library_description(made, file.stem)})
 
 
 def _encoding(name: str) -> str:

@@ -11,7 +11,7 @@ from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, mach
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.builder.emitter import Emitter
-from fbvm.code.operations import FLOATS, SIZES, TEXT_UNITS, Node
+from fbvm.code.operations import FLOATS, OFFSET_SHIFT, SIZES, TEXT_UNITS, Node
 
 _TICKS = {"TIME": 1_000_000, "TIME_OF_DAY": 1_000_000, "DATE": 1_000_000_000, "DATE_AND_TIME": 1_000_000_000}
 """Nanoseconds of the unit in which a time or date is converted to and from numbers: ms for TIME and TOD, s for DATE and DT,
@@ -26,10 +26,16 @@ def implicit(emitter: Emitter, node: Node, kind: Type, target: Type) -> Node:
     if wanted in TEXT_UNITS:
         return ("character", wanted, node)
     if source == "ref":
-        return ("bits", wanted, "ref", node)
+        return ("bits", wanted, "ref", node) if SIZES[wanted] == SIZES["ref"] else _byte_number(node, wanted)
     if source in FLOATS and wanted not in FLOATS:
         return saturated(emitter, "truncate", node, wanted)
     return ("convert", wanted, source, node)
+
+
+def _byte_number(reference: Node, form: str) -> Node:
+    """The number of the byte in the buffer to which a reference points."""
+    place = ("shr", "u64", ("bits", "u64", "ref", reference), ("const", "i64", OFFSET_SHIFT), 0)
+    return ("convert", form, "u64", place)
 
 
 def to_float(node: Node, kind: Type, form: str) -> Node:
@@ -278,8 +284,9 @@ def _to_time(node: Node, source: Type, target: Type, site: int, tick: int) -> No
 
 def _date_part(emitter: Emitter, node: Node, source: Type, target: Type) -> Node:
     """Among times and dates: the same moment, or the date or the time of day of a date and time."""
-    if source.name.removeprefix("L") == target.name.removeprefix("L") or source.name.endswith("DATE"):
-        return node  # a date as a moment is its midnight
+    if source.name.removeprefix("L") == target.name.removeprefix("L") or source.name.endswith("DATE") or \
+            is_any(target, "ANY_DURATION"):
+        return node  # a date as a moment is its midnight, a time of day the duration since midnight
     moment = emitter.to_temporary(node)
     midnight = day_start(moment)
     return midnight if target.name.endswith("DATE") else ("sub", "i64", moment, midnight)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file
+from fbvm.interchange.codesys2 import is_binary, is_export
 from fbvm.interchange.cx.markup import is_project
 from fbvm.interchange.dialect_signs import FAMILIES
 from fbvm.interchange.imported import Imported
@@ -53,8 +54,8 @@ def is_cx_project(path: Path) -> bool:
 
 
 def within(path: Path, resource: str | None = None, memory: bool = False) -> Imported | None:
-    """The sources within a file: a project of CX-Programmer or TwinCAT, an object of TwinCAT, a document in PLCopen XML; None for
-    all others.
+    """The sources within a file: a project of CX-Programmer or TwinCAT, an object of TwinCAT, a document in PLCopen XML, an
+    export, project or library of CODESYS 2.3; None for all others.
 
     `resource` is the name of the PLC where a project has several; with `memory` the contents of CX-Programmer's memory window are
     initial values.  Raises OSError if a file that is called so cannot be read."""
@@ -90,6 +91,14 @@ def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: b
         from fbvm.interchange.plcopen.read.importing import import_xml
 
         return _below(name, import_xml(data, name))
+    if is_binary(data):
+        from fbvm.interchange.codesys2.importing import read_binary
+
+        return _below(name, read_binary(data, name))
+    if is_export(data):
+        from fbvm.interchange.codesys2.importing import read_export
+
+        return read_export(data, name)
     if suffix in CX_SUFFIXES or is_project(data):
         from fbvm.interchange.cx.read.importing import import_project
 

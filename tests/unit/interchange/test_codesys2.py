@@ -1,0 +1,153 @@
+"""Files of CODESYS 2.3: exports as text, and libraries in the form that they were found to have."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+from click.testing import CliRunner
+
+from fbvm.base.diagnostics import Source
+from fbvm.cli.main import main
+from fbvm.code.compiler import compile_sources
+from fbvm.interchange.codesys2.importing import import_codesys2
+from fbvm.interchange.formats.given import usual_dialect, within
+from fbvm.machine.plc import Plc
+
+EXPORT = """
+(* @NESTEDCOMMENTS := 'Yes' *)
+(* @PATH := '\\/Motors' *)
+(* @OBJECTFLAGS := '0, 8' *)
+(* @SYMFILEFLAGS := '2048' *)
+FUNCTION_BLOCK Doubler
+VAR_INPUT IN : INT; END_VAR
+VAR_OUTPUT OUT : INT; END_VAR
+(* @END_DECLARATION := '0' *)
+OUT := IN * Factor;
+Count;
+END_FUNCTION_BLOCK
+
+ACTION Count:
+Calls := Calls + 1;
+END_ACTION
+(* @NESTEDCOMMENTS := 'Yes' *)
+(* @PATH := '' *)
+PROGRAM PLC_PRG
+VAR d : Doubler; r : INT; END_VAR
+(* @END_DECLARATION := '0' *)
+d(IN := r + 1);
+r := d.OUT;
+END_PROGRAM
+
+(* @NESTEDCOMMENTS := 'Yes' *)
+(* @GLOBAL_VARIABLE_LIST := 'Settings' *)
+(* @PATH := '' *)
+VAR_GLOBAL
+    Factor : INT := 2;
+    Calls : INT;
+END_VAR
+(* @OBJECT_END := 'Settings' *)
+(* @CONNECTIONS := Settings
+FILENAME : ''
+NUMOFCONNECTIONS : 0
+*)
+
+_ALARMCONFIG
+_ALARMCLASSNAME : 'DEFAULT'
+_END_ALARMCONFIG
+
+LIBRARY
+\\\\.host\\Standard.lib 4.10.05 12:14:46
+NumOfPOUs: 1
+TON: 0
+END_LIBRARY
+
+PLC_CONFIGURATION
+_MODULE: '3S'
+PLC_END
+
+RESOURCE
+TASK Fast (INTERVAL := T#1ms)
+END_RESOURCE
+"""
+DIAGRAM = EXPORT.replace("d(IN := r + 1);\nr := d.OUT;", "_FBD_BODY\n_NETWORKS : 1\n_NETWORK\n_OUTPUTS : 0")
+
+
+def test_an_export_runs_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "project.exp"
+    path.write_bytes(EXPORT.encode("cp1252").replace(b"\n", b"\r\n"))
+    made = within(path)
+    assert made is not None and usual_dialect([path]) == "codesys"
+    source, = made.sources
+    assert source.text.count("\n") == EXPORT.count("\n")
+    assert [said.message for said in made.diagnostics] == ["the task Fast is not taken over"]
+    compiled = compile_sources([source], runnable=True, dialect="codesys")
+    assert compiled.image is not None
+    plc = Plc(compiled.image)
+    for expected in (2, 6, 14):
+        plc.scan()
+        assert plc.read("PLC_PRG.r") == expected
+    assert plc.read("Calls") == 3
+
+
+def test_an_import_of_an_export_makes_a_file_of_each_object() -> None:
+    made = import_codesys2(EXPORT.encode(), "project.exp")
+    assert list(made.files) == ["Doubler.st", "PLC_PRG.st", "Settings.st"] and not made.errors
+    assert made.files["Doubler.st"].endswith("END_ACTION\n") and "@" not in "".join(made.files.values())
+    assert compile_sources(made.sources, runnable=True, dialect="codesys").image is not None
+
+
+def test_a_diagram_of_an_export_is_refused_by_name() -> None:
+    made = import_codesys2(DIAGRAM.encode(), "project.exp")
+    error, = made.errors
+    assert error.code == "X0203" and "PROGRAM PLC_PRG is a diagram (FBD)" in error.message
+    assert DIAGRAM[error.start:].startswith("_FBD_BODY")
+
+
+def _text(text: str) -> bytes:
+    return struct.pack("<I", len(text.encode("cp1252"))) + text.encode("cp1252")
+
+
+def _object(name: str, declaration: str, body: str | None = None, kind: int = 0x12) -> bytes:
+    head = bytes(17) + b"\xcd" * 8 + b"\2\0" * 8
+    made = _text(name) + head + _text(declaration.replace("\n", "\r\n"))
+    return made + (bytes((kind,)) + _text(body.replace("\n", "\r\n")) if body is not None else b"") + bytes(20)
+
+
+LIBRARY = b"CoDeSys+" + bytes(50) + _text("VAR_GLOBAL\r\nEND_VAR\r\n") + bytes(40) + b"".join((
+    _object("Limits", "VAR_GLOBAL CONSTANT\n\tHIGHEST : INT := 5; (* f\xfcr alle *)\nEND_VAR\n"),
+    _object("Pair", "TYPE Pair :\nSTRUCT\n\ta, b : INT;\nEND_STRUCT\nEND_TYPE\n\n(* a FUNCTION Odd of old *)\n"),
+    _object("Sum", "(* adds up *)\nFUNCTION Sum : INT\nVAR_INPUT p : Pair; END_VAR\n", "Sum := MIN(p.a + p.b, HIGHEST);"),
+    _object("Twice", "FUNCTIONBLOCK Twice\nVAR_INPUT n : INT; END_VAR\nVAR_OUTPUT m : INT; END_VAR\n", "m := 2 * n;"),
+    _object("Demo", "PROGRAM Demo\nVAR x : INT; END_VAR\n", "not text", kind=0x29),
+))
+
+
+def test_a_library_is_read_and_found_by_name(tmp_path: Path) -> None:
+    (tmp_path / "own.lib").write_bytes(LIBRARY)
+    done = CliRunner().invoke(main, ["import", str(tmp_path / "own.lib"), "-o", str(tmp_path / "libs" / "own")])
+    assert done.exit_code == 0 and "the PROGRAM Demo of the library is a diagram and is left out" in done.output
+    assert sorted(path.name for path in (tmp_path / "libs" / "own").iterdir()) == \
+        ["Limits.st", "Pair.st", "Sum.st", "Twice.st", "library.toml"]
+    assert "für alle" in (tmp_path / "libs" / "own" / "Limits.st").read_text(encoding="utf-8")
+    program = Source("main.st", "PROGRAM Main VAR p : Pair := (a := 2, b := 9); n, top : INT; t : Twice; END_VAR\n"
+                     "n := Sum(p); top := HIGHEST; t(n := n); END_PROGRAM")
+    image = compile_sources([program], runnable=True, dialect="codesys", libraries=[tmp_path / "libs"]).image
+    assert image is not None
+    plc = Plc(image)
+    plc.scan()
+    assert (plc.read("Main.n"), plc.read("Main.top"), plc.read("Main.t.m")) == (5, 5, 10)
+
+
+def test_a_project_whose_programs_are_diagrams_says_so(tmp_path: Path) -> None:
+    made = import_codesys2(LIBRARY, "own.pro")
+    assert [error.message for error in made.errors] == \
+        ["the body of PROGRAM Demo is a diagram, which is not read from own.pro"]
+
+
+def test_a_damaged_library_is_refused() -> None:
+    for data in (LIBRARY[:60], b"CoDeSys+" + bytes(1000), b"CoDeSys+\xff\xff\xff\xffPROGRAM"):
+        made = import_codesys2(data, "own.lib")
+        assert not made.files and [error.code for error in made.errors] == ["X0105"]
+    for cut in range(60, len(LIBRARY), 37):
+        import_codesys2(LIBRARY[:cut], "own.lib")
