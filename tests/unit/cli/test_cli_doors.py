@@ -7,6 +7,8 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import click
@@ -16,7 +18,9 @@ from rows import each_of
 
 from fbvm.cli.main import main
 from fbvm.cli.shared import status
+from fbvm.cli.shared.doors import notice_teller
 from fbvm.cli.shared.options import Door, door
+from fbvm.net.notices import Notice, NoticeKind
 from fbvm.wire.link import Peer
 
 UNIT = "192.168.250.21"
@@ -252,3 +256,40 @@ def test_the_image_says_which_words_it_does_not_set(fbvm: Fbvm, busy: int) -> No
     assert said[:-1] == ["some.json: D 30010 to 30013: not set, since these words belong to units"]
     Path("none.json").write_text(json.dumps({"spaces": {"D": [7] * 30000 + [0] * 9}}), encoding="utf-8")
     assert len(fbvm("serve", "--image", "none.json", "--port", str(busy)).stderr.splitlines()) == 1
+
+
+HERE, REAL = Peer("192.168.250.1", 502), Peer("127.0.0.1", 1502)
+
+
+@each_of("kind, error, said", [
+    (NoticeKind.NOT_MAPPED, "", "192.168.250.1:502 is not tried: ports below 1024 belong to the host; map it to 1502\n"),
+    (NoticeKind.UNUSABLE, "in use", "192.168.250.1:502: 127.0.0.1:1502 cannot be used: in use\n"),
+    (NoticeKind.UNREACHED, "refused", "192.168.250.1:502: nobody answers at 127.0.0.1:1502 (refused)\n"),
+    (NoticeKind.FULL, "", "192.168.250.1:502: a caller waits at 127.0.0.1:1502, since all sockets are in use\n"),
+    (NoticeKind.TURNED_AWAY, "", "192.168.250.1:502: 127.0.0.1:1502 is turned away, since no socket waits\n"),
+    (NoticeKind.LISTENING, "", "192.168.250.1:502: listening on 127.0.0.1:1502\n"),
+])
+def test_what_is_said_of_a_door(kind: NoticeKind, error: str, said: str) -> None:
+    with redirect_stderr(StringIO()) as file:
+        notice_teller("map it to {port}")(Notice(kind, HERE, REAL, error))
+    assert file.getvalue() == said
+
+
+def test_a_door_that_was_said_at_the_start_is_not_said_again() -> None:
+    with redirect_stderr(StringIO()) as file:
+        tell = notice_teller("", {HERE: REAL})
+        tell(Notice(NoticeKind.LISTENING, HERE, REAL))
+        tell(Notice(NoticeKind.LISTENING, Peer("192.168.250.2", 502), Peer("0.0.0.0", 1503)))
+    assert file.getvalue().splitlines() == [
+        "192.168.250.2:502: listening on 0.0.0.0:1503",
+        "Other computers can reach 0.0.0.0:1503: whoever connects may read and write."]
+
+
+def test_twenty_callers_are_told_of_and_not_more() -> None:
+    with redirect_stderr(StringIO()) as file:
+        tell = notice_teller("")
+        for number in range(30):
+            tell(Notice(NoticeKind.FULL if number % 2 else NoticeKind.TURNED_AWAY, HERE, Peer("127.0.0.1", number)))
+        tell(Notice(NoticeKind.UNREACHED, HERE, REAL, "refused"))
+    lines = file.getvalue().splitlines()
+    assert len(lines) == 21 and "127.0.0.1:19" in lines[19] and "nobody answers" in lines[20]

@@ -5,14 +5,22 @@ from __future__ import annotations
 import json
 import runpy
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner, Result
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.cli.main import main
+from fbvm.cli.programs import prove_tests
 from fbvm.cli.programs.prove import command
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Site
 from fbvm.prove import solver
+from fbvm.prove.cover import Covered, Reaching, Spot
+from fbvm.prove.prover import Limits
 from fbvm.testing.plugin import RigMaker
 
 INTERLOCK = str(data_folder("examples") / "classics" / "interlock.st")
@@ -267,3 +275,68 @@ def test_options_of_tests_that_do_not_go_together(tmp_path: Path) -> None:
     for arguments, said in rows:
         result = proved(str(program), *arguments)
         assert (result.exit_code, said in result.stderr) == (2, True), result.output
+
+
+COVERED_TEXT = "PROGRAM Main VAR a AT %IW0 : INT; n : INT; END_VAR\nIF a > 3 THEN\n    n := 1;\nEND_IF\nn := 2;\nEND_PROGRAM\n"
+
+
+@each_of("runs, never, missed, status, said", [
+    (0, [], {}, 0, "3 of 3 statements and branches are executed, no new test is needed"),
+    (1, [], {}, 0, "3 of 3 statements and branches are executed, with 1 new test in test_all.py"),
+    (2, [], {}, 0, "3 of 3 statements and branches are executed, with 2 new tests in test_all.py"),
+    (0, [(3, False)], {}, 0, "3 of 4 statements and branches are executed, no new test is needed\n"
+                             "  text.st:3: no run ever does it"),
+    (0, [(2, True)], {}, 0, "3 of 4 statements and branches are executed, no new test is needed\n"
+                            "  text.st:2 without a branch: no run ever does it"),
+    (1, [], {(3, False): 5}, 1, "3 of 4 statements and branches are executed, with 1 new test in test_all.py\n"
+                                "  text.st:3: no run of 5 scans does it"),
+    (0, [], {(3, False): 1, (5, False): 0}, 1,
+     "3 of 5 statements and branches are executed, no new test is needed\n  text.st:3: no run of 1 scan does it\n"
+     "  text.st:5: it was not found out whether a run does it"),
+])
+def test_what_is_said_of_tests_that_execute_everything(
+    runs: int, never: list[tuple[int, bool]], missed: dict[tuple[int, bool], int], status: int, said: str, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    Path("text.st").write_text(COVERED_TEXT, encoding="utf-8")
+    Path("test_all.py").unlink(missing_ok=True)
+    image = compile_text(COVERED_TEXT).image
+    assert image is not None
+
+    def spot(line: int, is_skip: bool) -> Spot:
+        return Spot(next(number for number, site in enumerate(image.sites) if site.line == line), is_skip)
+
+    found = Covered(3, [Reaching(cast(Any, SimpleNamespace(scans=2)), (spot(3, False), spot(2, True)), ())] * runs,
+                    [spot(*each) for each in never], {spot(*each): scans for each, scans in missed.items()})
+    asked: list[Limits] = []
+    monkeypatch.setattr(prove_tests, "cover", lambda image, limits, *more: asked.append(limits) or found)
+    monkeypatch.setattr(prove_tests, "covering_text", lambda *given: "# tests\n")
+    result = proved("text.st", "--tests", "test_all.py")
+    assert (result.exit_code, result.stdout) == (status, f"{said}\n"), result.output
+    assert Path("test_all.py").exists() == bool(runs) and len(asked) == 1
+    told = json.loads(proved("text.st", "--tests", "test_all.py", "--json").stdout)
+    assert told == {
+        "met": 3, "tests": [{"scans": 2, "executes": ["text.st:3", "text.st:2 without a branch"]}] * runs,
+        "never": [f"text.st:{line}" + " without a branch" * is_skip for line, is_skip in never],
+        "missed": [{"place": f"text.st:{line}", "scans": scans} for (line, _), scans in missed.items()]}
+
+
+REPORT = """<coverage><packages><package><classes><class filename="text.st"><lines>
+<line number="2" hits="4" branch="true" condition-coverage="50% (1/2)"/><line number="3" hits="{}"/><line number="5" hits="4"/>
+</lines></class></classes></package></packages></coverage>"""
+
+
+@each_of("hits, ways, known", [
+    (0, "1/2", [False, True]), (4, "1/2", [True, False]), (4, "2/2", [True, True]), (0, "0/2", [False, False]),
+])
+def test_what_a_report_says_to_be_executed(hits: int, ways: str, known: list[bool], tmp_path: Path,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    """`known` are the statement in the branch, and the way past the branch: executed if more ways were taken than branches."""
+    monkeypatch.chdir(tmp_path)
+    Path("report.xml").write_text(REPORT.format(hits).replace("1/2", ways), encoding="utf-8")
+    asked = prove_tests._known(Path("report.xml"))
+    inside, whole = Site("text.st", "Main", 3, 5), Site("text.st", "Main", 2, 1)
+    assert [asked(inside, []), asked(whole, [inside])] == known
+    assert asked(Site("text.st", "Main", 5, 1), []) and not asked(Site("text.st", "Main", 6, 1), [])
+    assert not asked(Site("other.st", "Main", 5, 1), [])

@@ -169,13 +169,16 @@ def test_a_trap_of_the_program_ends_a_run_and_a_restart_begins_anew() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("do", [lambda plc: plc.scan(), lambda plc: plc.run(scans=50)], ids=["scan", "run"])
-def test_a_trap_at_the_first_statement_ends_a_program(do: Callable[[Plc], object]) -> None:
-    code = compile_text("PROGRAM Main VAR n, d : INT; END_VAR d := 10 / (9 - n); n := n + 1; END_PROGRAM").image
+@pytest.mark.parametrize(("body", "trap"), [("d := 10 / (9 - n);", "R0101"), ("WHILE n = 9 DO ; END_WHILE", "R0104")])
+def test_the_only_trap_of_a_program_ends_it(body: str, trap: str, do: Callable[[Plc], object]) -> None:
+    code = compile_text(f"PROGRAM Main VAR n, d : INT; END_VAR {body} n := n + 1; END_PROGRAM").image
     assert code is not None
     rigs = four(code, (0,))
+    for rig in rigs:
+        rig.plc.budget = 1000
     while not rigs[0].plc.trap:
         agree(rigs, do)
-    assert (rigs[0].plc.scans, rigs[0].plc.trap.code) == (10, "R0101")
+    assert (rigs[0].plc.scans, rigs[0].plc.trap.code) == (10, trap)
 
 
 @pytest.mark.slow
