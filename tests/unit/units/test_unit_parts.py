@@ -123,6 +123,7 @@ def test_a_server_may_have_node_1() -> None:
     assert rig.plc.read("CIO 1523") == 1 << 2 and not rig.server.ended
 
 
+@pytest.mark.slow
 def test_who_begins_another_message_has_ten_seconds_for_it_again() -> None:
     rig = FinsRig()
     client = TcpClient(rig)
