@@ -221,7 +221,8 @@ def _end(area: Area) -> int:
 def _located_in(place: Place) -> Iterator[Place]:
     """The located variables in a program or a block; all elements of an array have the same ones."""
     if isinstance(place.type, ArrayType):
-        yield from _located_in(place.inner(f"{place.name}[{place.type.bounds[0][0]}]", place.type.element, 0))
+        first = ", ".join(str(low) for low, _ in place.type.bounds)
+        yield from _located_in(place.inner(f"{place.name}[{first}]", place.type.element, 0))
     elif isinstance(place.type, StructType):
         for field in place.type.fields.values():
             inner = member(place, field.name)

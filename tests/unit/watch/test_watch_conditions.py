@@ -70,7 +70,8 @@ def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
 
 
 @each_of("text", [
-    "done = ON", "CIO 1509.15 = on", "done <> OFF", "when = DT#1970-01-02-00:00:00", "when > DT#1970-01-01-00:00:00",
+    "done = ON", "done = BOOL#TRUE", "CIO 1509.15 = on", "done <> OFF",
+    "when = DT#1970-01-02-00:00:00", "when > DT#1970-01-01-00:00:00",
     "day < D#2024-01-31", "wait + 500ms = 2s", "wait * 2 = 3s", "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'",
 ])
 def test_literals_are_those_of_a_program(text: str) -> None:
