@@ -87,6 +87,7 @@ class Dialect:
     negative_is_zero: bool = False
     any_width_at: bool = False
     bits_of_words: bool = False
+    whole_characters: bool = False
     steps_apart: bool = False
     times_are_numbers: bool = False
     short_addresses: bool = False
@@ -227,6 +228,8 @@ QUESTIONS = {
     "bits_of_words": ("%IX0.15: a bit above 7", "an error (S0601): bytes are counted behind %IX, %QX and %MX",
                       "bit 15 of word 0, which is %IX1.7, with a warning (S0193); a project that names such a bit counts words "
                       "behind all %IX, %QX and %MX, as devices with word addressing do"),
+    "whole_characters": ("LEN, LEFT, MID, FIND ... of a WSTRING with a character beyond 16#FFFF",
+                         "count units of UTF-16, of which it has two", "count characters"),
     "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
                          "0"),
     "wrong_bcd_is_zero": ("BCD_TO_UINT(16#9A): a digit above 9", "stops the program (R0105)", "0"),
@@ -281,7 +284,7 @@ _ROWS = (
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
             generic_functions=True, times_are_numbers=True, places_for_all=True, own_time=True,
-            round_arrays=True, nested_repetitions=True, dates_in_nanoseconds=True),
+            round_arrays=True, nested_repetitions=True, dates_in_nanoseconds=True, whole_characters=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, plain_names=True,
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),

@@ -5,6 +5,7 @@ units.  A negative length, or a position that does not exist in front of the tex
 
 from __future__ import annotations
 
+import re
 from typing import AnyStr
 
 from fbvm.base.arithmetic import Undefined
@@ -56,6 +57,26 @@ def replace(a: AnyStr, b: AnyStr, n: int, p: int) -> AnyStr:
 def find(a: AnyStr, b: AnyStr) -> int:
     """Position of the first b in a; 0 if there is none or b is empty."""
     return a.find(b) + 1 if b else 0
+
+
+_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
+"""The two units of a character beyond 16#FFFF."""
+
+
+def characters(a: str) -> int:
+    """The number of characters of a WSTRING, in which one beyond 16#FFFF has two units."""
+    return len(a) - len(_PAIR.findall(a))
+
+
+def units_of(a: str, n: int) -> int:
+    """How many units the first n characters of a WSTRING have; all of them if it has fewer, n itself if that is negative."""
+    if n <= 0:
+        return n
+    for pair in _PAIR.finditer(a):
+        if pair.start() >= n:
+            break
+        n += 1
+    return min(n, len(a))
 
 
 # --- characters of two widths ---------------------------------------------------------------------------------------

@@ -120,6 +120,8 @@ concat     | a b                    | text   |             | a followed by b
 insert     | a b p site             | text   | R0108       | b after character p of a; p = 0 in front; p < 0 traps
 delete     | a n p site             | text   | R0108       | without n characters from p; p behind the end: unchanged
 replace    | a b n p site           | text   | R0108       | n characters from p replaced by b; p behind the end: appended
+characters | a                      | i64    |             | number of characters of an s16, surrogate pairs as one
+units_of   | a n                    | i64    |             | units of the first n characters of an s16, at most all; of n < 0 n
 find       | a b                    | i16    |             | first position of b in a, 0 if none or b is empty
 to_text    | data_type a            | s8     |             | the value as a literal would be read back, by data type's name
 from_text  | data_type a site       | any    | R0111 R0105 | reads a literal with or without type prefix, spaces trimmed

@@ -170,6 +170,7 @@ _UNWRAPPED: dict[str, Callable[[Node, RangeOf], Range]] = {
     "select": lambda node, of: _union(of, node[3], node[4]), "mux": lambda node, of: _union(of, *node[3]),
     "min": lambda node, of: _union(of, node[2], node[3]), "max": lambda node, of: _union(of, node[2], node[3]),
     "length": lambda node, of: _LENGTH, "find": lambda node, of: _LENGTH,
+    "characters": lambda node, of: _LENGTH,
 }
 
 

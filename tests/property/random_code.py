@@ -210,7 +210,9 @@ class Maker:
             return "first", form, self.value("s8" if form == "u8" else "s16", d)
         if form == "i64":
             high = self.small_number(63, d)
-            return self.pick((("now", "i64"), ("floor_div", "i64", self.value("i64", d), const("i64", self.pick((1, 3, 1000)))),
+            wide = self.value("s16", d)
+            return self.pick((("now", "i64"), ("characters", "i64", wide), ("units_of", "i64", wide, self.value("i64", d)),
+                              ("floor_div", "i64", self.value("i64", d), const("i64", self.pick((1, 3, 1000)))),
                               ("within", "i64", self.small_number(7, d), const("i64", -5), high, "R0102", site)))
         if form in ("u32", "u64"):
             source = {"u32": "f32", "u64": "f64"}[form]

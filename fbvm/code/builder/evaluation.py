@@ -116,6 +116,7 @@ _ROWS: dict[str, Callable[..., Any]] = {
     "from_bcd": lambda form, source, a, site: arithmetic.from_bcd(a, form),
     "to_bcd": lambda form, source, a, site: arithmetic.to_bcd(a, form),
     "length": lambda form, a: arithmetic.wrap(len(a), form), "find": lambda form, a, b: strings.find(a, b),
+    "characters": lambda form, a: strings.characters(a), "units_of": lambda form, a, n: strings.units_of(a, n),
     "concat": lambda form, a, b: a + b,
     **{name: lambda form, *operands, _name=name: getattr(strings, _name)(*operands[:-1])
        for name in ("left", "right", "mid", "insert", "delete", "replace")},

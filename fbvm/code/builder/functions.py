@@ -7,6 +7,7 @@ from itertools import pairwise
 
 from fbvm.base.types import StringType, machine
 from fbvm.check.symbols.facts import StandardCall
+from fbvm.code.builder import characters
 from fbvm.code.builder.conversions import as_count, convert, truncate
 from fbvm.code.builder.emitter import Emitter
 from fbvm.code.operations import SIZES, Node
@@ -96,8 +97,20 @@ def _text(name: str) -> Function:
             at_least = iter(_LEAST[name])
             operands = [node if isinstance(kind, StringType) else ("max", "i64", node, ("const", "i64", next(at_least)))
                         for node, (_, kind) in zip(operands, call.arguments, strict=True)]
+        if emitter.dialect.whole_characters and _form(call) == "s16":
+            operands = characters.in_units(emitter, name, operands)
         return (name, _form(call), *operands, site)
     return lower
+
+
+def _length(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Node:
+    whole = emitter.dialect.whole_characters and a[0][1] == "s16"
+    return characters.length(a[0]) if whole else ("length", "i16", a[0])
+
+
+def _find(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Node:
+    whole = emitter.dialect.whole_characters and a[0][1] == "s16"
+    return characters.find(emitter, a[0], a[1]) if whole else ("find", "i16", a[0], a[1])
 
 
 def _finite(emitter: Emitter, a: Node, form: str) -> Node:
@@ -165,8 +178,7 @@ FUNCTIONS: dict[str, Function] = {
     "ABS": _abs, "ATAN2": lambda emitter, a, call, site: ("atan2", _form(call), a[0], a[1]),
     "MOVE": lambda emitter, a, call, site: a[0], "SEL": _select, "MUX": _mux, "LIMIT": _limit,
     "MAX": _chain("max"), "MIN": _chain("min"), "CONCAT": _chain("concat"),
-    "LEN": lambda emitter, a, call, site: ("length", "i16", a[0]),
-    "FIND": lambda emitter, a, call, site: ("find", "i16", a[0], a[1]),
+    "LEN": _length, "FIND": _find,
     **dict.fromkeys(("TIME", "LTIME"), lambda emitter, a, call, site: ("now", "i64")), "__DUE": _due, "__STOP": _stop,
     "IS_VALID": lambda emitter, a, call, site: _finite(emitter, a[0], _form(call)),
     "IS_VALID_BCD": _valid_bcd,

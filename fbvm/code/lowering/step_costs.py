@@ -192,7 +192,7 @@ def _loaded(costs: _Costs, node: Node) -> int:
 _SIZED: dict[Any, _Cost] = {
     "load_text": _loaded,
     **dict.fromkeys(("left", "right", "mid", "concat", "insert", "delete", "replace", "recode", "length", "store_text"), _moved),
-    **dict.fromkeys(("find", "from_text", "from_leading"), _read),
+    **dict.fromkeys(("find", "from_text", "from_leading", "characters", "units_of"), _read),
     **dict.fromkeys(("eq", "ne", "lt", "le", "gt", "ge"), _compared),
     **dict.fromkeys(("select", "mux", "min", "max", "let"), _chosen),
     "copy": lambda costs, node: MOVED_BYTE * int(node[3]),

@@ -334,6 +334,7 @@ VALUES: dict[str, Callable[..., str]] = {
     "delete": _call("delete"), "replace": _call("replace"),
     "concat": lambda e, machine, a, b: f"({e.value(a)} + {e.value(b)})",
     "find": lambda e, machine, a, b: e.bring(f"find({bare(e.value(a))}, {bare(e.value(b))})", machine),
+    "characters": _call("characters"), "units_of": _call("units_of"),
     "to_text": _call("to_text"), "from_text": _call("from_text"), "from_leading": _call("from_leading"), "enum_text": _enum_text,
     "character": lambda e, machine, a: f"character({bare(e.value(a))}, {machine == 's16'})",
     "first": lambda e, machine, a: f"first({bare(e.value(a))})",

@@ -444,6 +444,6 @@ EXPRESSION_ROWS: dict[str, Row] = {
     "reference": _reference, "bit_behind": _bit_behind,
     **{name: _operation(name) for name in (
         "pow", "math", "atan2", "length", "left", "right", "mid", "concat", "insert", "delete", "replace", "find", "to_text",
-        "from_text", "from_leading", "character", "first", "recode")},
+        "from_text", "from_leading", "character", "first", "recode", "characters", "units_of")},
 }  # fmt: skip
 """How each operation becomes a term: called with the operands of its row."""

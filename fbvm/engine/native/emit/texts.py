@@ -300,6 +300,16 @@ def _length(w: Writer, machine: str, a: Node) -> str:
     return cut(w, w.text(a).length, machine)
 
 
+def _characters(w: Writer, machine: str, a: Node) -> str:
+    text = w.text(a)
+    return cut(w, w.call("wide_characters", w.integer(text.at), text.length), machine)
+
+
+def _units_of(w: Writer, machine: str, a: Node, n: Node) -> str:
+    text, count = w.text(a), w.value(n)
+    return cut(w, w.call("wide_units", w.integer(text.at), text.length, count), machine)
+
+
 def _find(w: Writer, machine: str, a: Node, b: Node) -> str:
     text, wanted = w.text(a), w.text(b)
     found = w.call("text_find", w.integer(text.at), text.length, w.integer(wanted.at), wanted.length, str(text.unit))
@@ -352,6 +362,7 @@ TEXTS: dict[str, Callable[..., Text]] = {
 }
 """How each operation is written that yields a text: called with the operands of its row."""
 
-VALUES: dict[str, Callable[..., str]] = {"length": _length, "find": _find, "first": _first, "from_text": _from_text,
+VALUES: dict[str, Callable[..., str]] = {"length": _length, "find": _find, "characters": _characters, "units_of": _units_of,
+          "first": _first, "from_text": _from_text,
           "from_leading": _from_leading}
 """The same for those that read a text and yield a number."""

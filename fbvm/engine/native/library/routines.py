@@ -69,6 +69,34 @@ def wide_length(at: int, capacity: int) -> int:
     return n
 
 
+def wide_characters(at: int, m: int) -> int:
+    """Characters of a WSTRING of m units: two units that are a pair of surrogates are one."""
+    i = 0
+    n = 0
+    while i < m:
+        i += wide_size(at, m, i)
+        n += 1
+    return n
+
+
+def wide_units(at: int, m: int, n: int) -> int:
+    """Units of the first n characters of a WSTRING of m units; n itself if it is negative."""
+    if n < 0:
+        return n
+    i = 0
+    while i < m and n > 0:
+        i += wide_size(at, m, i)
+        n -= 1
+    return i
+
+
+def wide_size(at: int, m: int, i: int) -> int:
+    """Units of the character that begins at unit i of m: 2 for a pair of surrogates."""
+    if i + 1 < m and wide(at, i) & 0xFC00 == 0xD800 and wide(at, i + 1) & 0xFC00 == 0xDC00:
+        return 2
+    return 1
+
+
 def wide_order(a: int, m: int, b: int, n: int) -> int:
     """Below 0, 0 or above: how text a stands to text b."""
     i = 0
