@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 from fbvm.net.faults import Fault
@@ -32,6 +33,11 @@ class Axis:
     plc: str = ""
     path: str = ""
     at_ns: int = 0
+
+    @staticmethod
+    def plain(value: Any) -> Any:
+        """A value for JSON, which has no infinities and no NaN."""
+        return str(value) if isinstance(value, float) and not isfinite(value) else value
 
     def text(self, value: Any) -> str:
         """A value as people write it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.campaign.execution import Wrong
 from fbvm.campaign.judge import Judge
-from fbvm.campaign.plan import MOST_RUNS, VALUE, Axis, Plan
+from fbvm.campaign.plan import MOST_RUNS, SETTINGS, VALUE, Axis, Plan
 from fbvm.campaign.plan_file import Written
 from fbvm.code.image import Image
 from fbvm.interchange.formats.given import usual_dialect
@@ -76,6 +77,9 @@ def plan_of(written: Written, project: Project, images: Mapping[str, Image]) -> 
         replace(written.judging, goldens=goldens), about["show"],
     )  # fmt: skip
     check_count(plan)
+    for (*_, name), times in Counter((each.what, each.plc, each.path, each.at_ns, each.name) for each in plan.axes).items():
+        if times > 1:
+            raise Unfit(f"{name} is varied {times} times: write all of its values in one place")
     for axis in plan.axes:
         for value in axis.values if axis.what == VALUE else ():
             _check(axis, value, plcs[axis.plc].runs[0].plc)
@@ -117,7 +121,8 @@ def _check(axis: Axis, value: Any, plc: Any) -> None:
     try:
         value_for(plc.find(axis.path), value)
     except UnknownPlace as error:
-        raise Unfit(str(error)) from None
+        hint = f'; what is varied beside variables is written setting = "{axis.path}"' if axis.path in SETTINGS else ""
+        raise Unfit(f"{error}{hint}") from None
     except (TypeError, ValueError) as error:
         raise Unfit(str(error)) from None
 

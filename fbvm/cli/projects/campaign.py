@@ -107,6 +107,9 @@ def _bench(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, 
     """The bench of a campaign over a program or a project, and the folder to which golden files are relative."""
     plan, images, home = planned(files, program, libraries, options,
                                  lambda written, project: _changed(written, project.for_ns, options))  # fmt: skip
+    missing = [golden.file for golden in plan.judging.goldens if not golden.text]
+    if missing and not options["write_golden"]:
+        raise click.UsageError(f"there is no golden file {named(home / missing[0])}: --write-golden writes it")
     from fbvm.campaign.planning import unfit_conditions
     from fbvm.campaign.work import Bench
 
@@ -272,7 +275,7 @@ def _group_as_dict(outcome: Outcome, group: Group, recordings: dict[int, Path]) 
     return {
         **vars(group.failure), "plc": failure.plc, "scan": failure.scan, "now_ns": failure.now_ns, "runs": len(group.numbers),
         "first": group.first, "seed": variant.seed, "common": in_common(plan, group, outcome.results),
-        "values": {axis.name: variant.value(plan, at) for at, axis in enumerate(plan.axes)},
+        "values": {axis.name: axis.plain(variant.value(plan, at)) for at, axis in enumerate(plan.axes)},
         "faults": list(map(str, variant.faults)), "power": list(map(str, variant.cuts)), "timing": variant.timing,
         "shrunk": group.shrunk is not None, "recording": str(path) if path and path.exists() else None,
     }  # fmt: skip

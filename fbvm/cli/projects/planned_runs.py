@@ -127,7 +127,12 @@ def planned(files: Sequence[Path], program: str | None, libraries: Sequence[Path
     except Wrong as error:
         refuse(error.diagnostics)
     except (Unfit, ValueError) as error:
-        raise click.UsageError(str(error)) from None
+        is_of_file = where and not any(options.get(name) for name in OF_PROGRAMS)
+        raise click.UsageError(f"{named(where)}: {error}" if where and is_of_file else str(error)) from None
+
+
+OF_PROGRAMS = ("varied", "shown", "never", "always", "within", "until", "mappings")
+"""Options whose names and values programs may not have; without them it is the file that is wrong."""
 
 
 def refuse(diagnostics: Sequence[Diagnostic]) -> NoReturn:

@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.base.host import can_end_others
@@ -312,6 +313,7 @@ def test_the_row_of_three_plcs_is_good_and_a_fault_planted_in_a_copy_is_found(fo
     (("mix.st", "--faults", "1"), "say how long a run takes at most"),
     (("mix.st", "--for", "1s", "--write-golden"), "no [[golden]] to write"),
     (("none.toml",), "none.toml"),
+    (("mix.st", "--for", "1s", "--vary", "Main.Limit=1", "--vary", "Main.Limit=2"), "Main.Limit is varied 2 times"),
     (("mix.st", "--for", "1s", "--runs", "1000000000"), "1,000,000,000 runs are too many"),
     (("mix.st", "--for", "1s", "--vary", "Main.Limit=1..30000", "--vary", "Main.Count=1..30000"), "900,000,000 combinations"),
     (("mix.st", "--for", "1s", "--faults", "1001"), "a run has 1,000 of each at most"),
@@ -324,6 +326,28 @@ def test_what_does_not_fit_is_said_before_anything_is_written(folder: Path, argu
     status, text = fbvm(*arguments)
     assert (status, said in text) == (2, True), text
     assert not (folder / "campaign-results").exists()
+
+
+IN_FILE = [
+    ('never = ["Main.Foo"]', "bad.toml: Main has no Foo"),
+    ('[[vary]]\nname = "Main.Foo"\nvalues = [1]', "bad.toml: Main has no Foo"),
+    ('[[vary]]\nname = "cycle"\nvalues = ["5ms"]', 'what is varied beside variables is written setting = "cycle"'),
+    ('[[golden]]\nfile = "g.txt"\nnames = ["Main.Up"]', "there is no golden file g.txt: --write-golden writes it"),
+]
+
+
+@each_of(("written", "said"), IN_FILE)
+def test_what_of_a_campaign_file_does_not_fit_its_program_is_said_with_the_file(folder: Path, written: str, said: str) -> None:
+    (folder / "bad.toml").write_text(f'[campaign]\nsources = ["mix.st"]\nfor = "1s"\n{written}\n')
+    status, text = fbvm("bad.toml")
+    assert (status, said in text) == (2, True), text
+
+
+@pytest.mark.slow
+def test_parameters_that_json_cannot_write_are_texts_there(folder: Path) -> None:
+    (folder / "real.st").write_text("PROGRAM Main\nVAR r : REAL; b : BOOL; END_VAR\nb := r > 1.0;\nEND_PROGRAM\n")
+    status, said = fbvm("real.st", "--vary", "Main.r=0.5,inf", "--for", "100ms", "--never", "Main.b", "--json")
+    assert (status, json.loads(said)["groups"][0]["values"]) == (1, {"Main.r": "inf"})
 
 
 def test_a_table_for_other_tools_has_numbers_as_numbers(folder: Path) -> None:
