@@ -255,7 +255,7 @@ class Adapter:
         self._close()
         self._open(how, changed if isinstance(changed, dict) else given)
         self.breakpoints.renew()
-        self._begin(False)
+        self._after(lambda: self._begin(False))
 
     def _close(self) -> None:
         if self.debug.target:

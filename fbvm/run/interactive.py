@@ -77,7 +77,7 @@ class Control:
 
 def run_interactive(runs: Sequence[Running], control: Control, audience: Audience, *, until: Callable[[], bool] | None = None,
                     monotonic_ns: Callable[[], int] = time.monotonic_ns) -> None:  # fmt: skip
-    """Runs PLCs until each has its `reason`: its own end, "stopped" after `control.end`, or "interrupted" after Ctrl-C.
+    """Runs PLCs until each has its `reason`: its own end, "stopped" after `control.end` or Ctrl-C.
 
     A PLC with a trap ends for itself and can still be looked at: the loop goes on until `control.end`.  One that meets a
     breakpoint pauses the run, and its scan goes on with the next one that is executed.  When `until` returns True between two

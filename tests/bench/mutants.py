@@ -54,7 +54,10 @@ TESTS = {
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
     "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run", "tests/fblib/test_network_instructions.py"),
-    "record": ("tests/unit/record", "tests/unit/cli", "tests/cx/test_diff.py"), "run": ("tests/unit/run", "tests/unit/net"),
+    "record": ("tests/unit/record", "tests/unit/cli", "tests/cx/test_diff.py"), "run": (
+        "tests/unit/run", "tests/unit/net", "tests/unit/machine/test_batches.py", "tests/unit/campaign/test_campaign_parts.py",
+        "tests/unit/campaign/test_campaign_items.py", "tests/unit/campaign/test_fleet.py", "tests/unit/live/test_pictures.py",
+    ),
     "testing": ("tests/unit/testing", "tests/twincat"), "cli": ("tests/unit/cli",),
     "analysis": ("tests/unit/analysis", "tests/unit/lsp"),
 }  # fmt: skip

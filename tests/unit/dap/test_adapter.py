@@ -238,8 +238,11 @@ def test_pause_is_answered_first_and_stands_between_two_scans(file: Path) -> Non
     with pytest.raises(RefusedError, match="nothing runs"):
         client.ask("pause", threadId=1)
     client.ask("continue", threadId=1)
+    client.adapter.tell_progress()
     client.adapter.work()
     client.adapter.tell_progress()
+    started, told = client.events("progressStart")[-1], client.events("progressUpdate")
+    assert [row["progressId"] for row in told] == [started["progressId"]] and told[0]["message"].startswith("scan ")
     client.ask("pause", threadId=1)
     assert client.events("stopped")[-1]["reason"] == "pause" and not client.adapter.is_running and client.line == 18
     client.ask("continue", threadId=1)
@@ -373,6 +376,43 @@ def test_what_the_last_scans_said_comes_before_the_end(file: Path) -> None:
     client.begin(lines(file, {"line": 19, "logMessage": "n={N}"}), program=str(file), **{"for": "50ms"})
     events = [row["event"] for row in client.messages if row.get("event") in ("output", "exited")]
     assert events[-2:] == ["output", "exited"] and "n=5" in client.events("output")[-1]["output"]
+
+
+@pytest.mark.slow
+def test_log_points_speak_again_only_of_what_was_changed(file: Path) -> None:
+    client = Client()
+    client.begin(lines(file, {"line": 19, "logMessage": "n={N}"}), program=str(file), stopOnEntry=True)
+    client.go("fbvm/stepScan", scans=3)
+    for typed, numbers in (("print Main.N", ""), ("Main.N := 10", "11 12 13"), ("force Main.R = 1", "11 12 13")):
+        client.go("fbvm/gotoScan", scan=0)
+        client.value(typed, "repl")
+        before = len(client.events("output"))
+        client.go("fbvm/stepScan", scans=3)
+        said = [row["output"].partition("n=")[2].strip() for row in client.events("output")[before:] if "n=" in row["output"]]
+        assert " ".join(said) == numbers, typed
+
+
+@pytest.mark.slow
+def test_a_restart_ends_what_runs(file: Path) -> None:
+    client = Client()
+    client.begin(program=str(file))
+    client.ask("continue", threadId=1)
+    assert client.adapter.work() and client.adapter.is_running
+    client.ask("restart")
+    assert not client.adapter.is_running and client.events("stopped")[-1]["reason"] == "entry" and client.value("N") == "0"
+    client.go("fbvm/stepScan", scans=2)
+    assert client.value("N") == "2"
+
+
+@pytest.mark.slow
+def test_what_a_plc_warns_of_stops_at_the_beginning_if_that_is_wanted(tmp_path: Path) -> None:
+    path = tmp_path / "fast.st"
+    path.write_text("""PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM
+CONFIGURATION C RESOURCE R ON PLC TASK t(INTERVAL := T#1ms, PRIORITY := 1); PROGRAM p WITH t : Main; END_RESOURCE
+END_CONFIGURATION""", encoding="utf-8")
+    stop = Client().begin({"setExceptionBreakpoints": {"filters": ["warning"]}}, program=str(path), cycle="10ms")
+    assert (stop["reason"], stop["text"]) == ("exception", "warning") and "1ms" in stop["description"]
+    assert Client().begin(program=str(path), cycle="10ms")["reason"] == "entry"
 
 
 @pytest.mark.slow
@@ -515,6 +555,12 @@ def test_completions_are_the_names_that_can_be_written_here(file: Path) -> None:
 
     assert labels("Main.T.") == ["Main.T.A", "Main.T.Q", "Main.T.k"]
     assert "A" in labels("") and "why" in labels("wh") and "Main" in labels("print M")
+    rows = client.ask("completions", text="print Ma", column=9, frameId=frame)["targets"]
+    assert [(row["label"], row["start"], row["length"]) for row in rows if row["label"] == "Main"] == [("Main", 7, 2)]
+    from_0 = Client(columnsStartAt1=False)
+    from_0.begin(lines(file, 6), program=str(file))
+    rows = from_0.ask("completions", text="print Ma", column=8, frameId=from_0.frames[0]["id"])["targets"]
+    assert [(row["label"], row["start"], row["length"]) for row in rows if row["label"] == "Main"] == [("Main", 6, 2)]
 
 
 def test_memory_is_read_and_written_in_words_with_their_high_byte_first(file: Path) -> None:
@@ -529,6 +575,13 @@ def test_memory_is_read_and_written_in_words_with_their_high_byte_first(file: Pa
     assert client.events("memory")[-1]["offset"] == 0
     before = client.ask("readMemory", memoryReference=answer["address"], offset=-2, count=4)
     assert base64.b64decode(before["data"]) == b"\0\0\x12\x34"
+    assert [client.ask("readMemory", memoryReference="D200", **asked)["data"] for asked in ({}, {"count": 0})] == ["", ""]
+    client.ask("setExpression", expression="Main.N", value="16#1234")
+    assert base64.b64decode(client.ask("readMemory", memoryReference="Main.N", count=2)["data"]) == b"\x34\x12"
+    behind = base64.b64decode(client.ask("readMemory", memoryReference="D32767", offset=2, count=2)["data"])
+    assert behind[0] and not behind[1], "right behind the last word lies the number of a type, low byte first"
+    client.ask("writeMemory", memoryReference="D210", data=base64.b64encode(b"\x0a\x0b").decode())
+    assert (client.value("D210"), client.value("D211")) == ("2571 (16#0A0B)", "0 (16#0000)")
     far = client.ask("readMemory", memoryReference="0x7FFFFFFF", count=8)
     assert far["unreadableBytes"] == 8
     for arguments in ({"memoryReference": "D0", "data": "?"}, {"memoryReference": "0x7FFFFFFF", "data": "AAA="}):

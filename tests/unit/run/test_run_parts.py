@@ -1,0 +1,94 @@
+"""What stands beside the loop: names of several PLCs, slices of work, limits of time, the pace of a debugger, readers of keys."""
+
+from __future__ import annotations
+
+import pytest
+from images import counter_image
+from test_run_loop import MS, Clock, RealNetwork, real_plc
+
+from fbvm.machine.plc import Plc
+from fbvm.run import real_pace, slices, time_limit
+from fbvm.run.plc_names import PlcNames
+from fbvm.run.real_pace import RealPace
+from fbvm.run.slices import SLICE_NS, TOLD_NS, Slices
+from fbvm.watch.paths import UnknownPlace
+
+
+def names(alone: bool, *plcs: str) -> tuple[PlcNames, dict[str, Plc]]:
+    made = {name: Plc(counter_image()) for name in plcs}
+    return PlcNames({name: (plc.find, lambda place, plc=plc: lambda: plc.read(place)) for name, plc in made.items()}, alone), made
+
+
+def test_a_name_begins_with_its_plc() -> None:
+    found, plcs = names(False, "pump", "valve")
+    plcs["valve"].write("D5", 7)
+    place = found.find("valve.D5")
+    assert (place.name, found.read(place), found.owner(place)) == ("valve.D5", 7, ("valve", plcs["valve"].find("D5")))
+    assert found.read(found.find("pump.D5")) == 0
+    plcs["valve"].write("D5", 8)
+    assert found.read(place) == 8
+    for wrong, said in (("D5", "begins with the name of no PLC; there is pump, valve"), ("pump.D5..D6", "is a range; name one"),
+                        ("pump.Nothing", "Nothing")):  # fmt: skip
+        with pytest.raises(UnknownPlace, match=said):
+            found.find(wrong)
+
+
+def test_the_name_of_an_only_plc_may_be_left_out_where_that_is_said() -> None:
+    found, _ = names(True, "pump")
+    assert found.parted("D5") == ("pump", "D5") and found.parted("pump.D5") == ("pump", "D5")
+    for found in (names(False, "pump")[0], names(True, "pump", "valve")[0]):
+        with pytest.raises(UnknownPlace):
+            found.parted("D5")
+
+
+def test_work_is_done_in_slices_and_told_of_every_half_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(slices, "time", clock)
+    told: list[int] = []
+    left = [300]
+
+    def work() -> bool:
+        clock.now_ns += 5 * MS
+        left[0] -= 1
+        return left[0] > 0
+
+    sliced = Slices(work, lambda: told.append(left[0]))
+    clock.now_ns += TOLD_NS
+    sliced.begin()
+    sliced.slice()
+    assert left == [300 - SLICE_NS // (5 * MS)] and not told
+    while left[0] > 0:
+        sliced.slice()
+    assert told == [200, 100, 0]
+    sliced.slice()
+    assert left[0] == -1, "work that has nothing left is asked once a slice"
+
+
+def test_limits_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(time_limit, "time", clock)
+    is_over, passed = time_limit.time_limit(10 * MS), time_limit.stopwatch()
+    clock.now_ns += 9 * MS
+    assert not is_over() and 9 * MS <= passed() < 10 * MS
+    time_limit.pause(2 * MS)
+    assert is_over() and 11 * MS <= passed() < 12 * MS and clock.slept_ns == [2 * MS]
+
+
+def test_under_a_debugger_real_time_stands_while_no_scan_is_executed(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(real_pace, "time", clock)
+    plc, network = real_plc(clock)
+    served: list[int] = []
+    monkeypatch.setattr(RealNetwork, "serve", lambda self, now_ns: served.append(now_ns) or [])
+    virtual = Plc(counter_image())
+    virtual.run(scans=5)
+    pace = RealPace([plc, virtual])
+    assert pace.is_real and not RealPace([virtual]).is_real
+    assert 60 * MS <= pace.wait(60 * MS) < 61 * MS, "time goes on where the latest of the PLCs stood: at 50 ms"
+    assert [round(slept_ns / MS) for slept_ns in clock.slept_ns] == [10]
+    clock.now_ns += 7 * MS
+    assert 67 * MS <= pace.wait(60 * MS) < 68 * MS and len(clock.slept_ns) == 1, "a scan that is late has the time that it is"
+    clock.now_ns += 1000 * MS
+    pace.begin()
+    assert 55 * MS <= pace.wait(55 * MS) < 56 * MS and len(served) == 3
+    assert network.driven is False
