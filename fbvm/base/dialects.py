@@ -139,7 +139,8 @@ QUESTIONS = {
     "programs_are_written": ("Prog.count := 0, where count is a VAR of the PROGRAM", "an error", "written"),
     "locals_are_written": ("instance.count := 0, where count is a VAR of the block", "an error", "written"),
     "lenient_texts": ("STRING_TO_INT('12 pcs'), STRING_TO_REAL('none')", "stops the program (R0111)",
-                      "the number that the text begins with, else 0; under rusty 0 unless the whole text is one"),
+                      "the number that the text begins with, else 0; under rusty 0 unless the whole text is one, a real without "
+                      "its fraction"),
     "initial_variables": ("VAR x : INT := y, where y is a variable", "an error",
                           "the value that y begins with; in a FUNCTION, and for VAR_TEMP, what y has when the body starts"),
     "round_arrays": ("VAR a : ARRAY[0..3] OF INT := (1, 2, 3, 4): an array in parentheses", "an error", "[1, 2, 3, 4]"),

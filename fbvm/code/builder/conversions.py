@@ -102,11 +102,28 @@ def _from_text(emitter: Emitter, node: Node, form: str, name: str, site: int) ->
     lenient = emitter.dialect.lenient_texts
     if not lenient:
         return ("from_text", form, name, node, site)
+    if lenient == "whole" and name in _NUMBERS:
+        return _from_whole(emitter, node, form, name, site)
     if lenient == "whole" or form in ("b", "i64", "u64", "f64"):
         return ("from_leading", form, name, int(lenient == "whole"), node)
     if form == "f32":
         return ("convert", form, "f64", ("from_leading", "f64", "LREAL", 0, node))
     return ("convert", form, "i64", ("from_leading", "i64", "LINT", 0, node))
+
+
+_NUMBERS = frozenset(("SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD"))
+
+
+def _from_whole(emitter: Emitter, node: Node, form: str, name: str, site: int) -> Node:
+    """The integer that a whole text names: a literal of it, or one of a real without its fraction; 0 if it does not fit."""
+    text = emitter.to_temporary(node)
+    value = emitter.to_temporary(("from_leading", form, name, 1, text))
+    real = emitter.to_temporary(("from_leading", "f64", "LREAL", 1, text))
+    low, high = limits(form)
+    fits: Node = ("and", "b", ("gt", "b", "f64", real, ("const", "f64", low - 1.0)),
+                  ("lt", "b", "f64", real, ("const", "f64", high + 1.0)))
+    cut: Node = ("truncate", form, "f64", ("select", "f64", fits, ("const", "f64", 0.0), real), site)
+    return ("select", form, ("eq", "b", form, value, ("const", form, 0)), value, cut)
 
 
 def _to_text(emitter: Emitter, source: Type, node: Node) -> Node:
