@@ -312,6 +312,10 @@ class _Names:
         self.targets.add(node.variable)
         return iter(())
 
+    def caught(self, node: tree.Try) -> Iterator[Use]:
+        self.targets.add(node.code)
+        return iter(())
+
     def enum_literal(self, node: tree.EnumLiteral) -> Iterator[Use]:
         entry = self.project.type_entry(node.type_name.text, self.source)
         if entry is not None:
@@ -395,7 +399,7 @@ _SHARED = ("VAR_GLOBAL", "PROGRAM")
 _LEAVES = frozenset(("start", "end", "op_start", "text"))
 _RULES: dict[type, Callable[[_Names, Any], Iterator[Use]]] = {
     tree.NameRef: _Names.named, tree.Member: _Names.member, tree.Call: _Names.call, tree.Assign: _Names.assignment,
-    tree.For: _Names.counted, tree.EnumLiteral: _Names.enum_literal, tree.NamedType: _Names.type_name,
+    tree.For: _Names.counted, tree.Try: _Names.caught, tree.EnumLiteral: _Names.enum_literal, tree.NamedType: _Names.type_name,
     tree.StructInit: _Names.structure, tree.Pou: _Names.pou_head, tree.Action: _Names.action, tree.VarSection: _Names.section,
     tree.TypeDecl: _Names.type_head, tree.ProgramInstance: _Names.program_instance, sfc.Step: _Names.steps,
     sfc.Transition: _Names.steps, sfc.Association: _Names.steps,

@@ -13,7 +13,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc
 from fbvm.syntax.tree.node import walk
 
-_FOLDED = (tree.If, tree.Case, tree.For, tree.While, tree.Repeat, tree.VarSection, ladder.Ladder, ladder.Rung, sfc.Step,
+_FOLDED = (tree.If, tree.Case, tree.For, tree.While, tree.Repeat, tree.Try, tree.VarSection, ladder.Ladder, ladder.Rung, sfc.Step,
            sfc.Transition, tree.Declaration, tree.StructSpec, tree.Resource)
 _HAS_ELEMENTS = re.compile(r"\b(?:LADDER|STEP|INITIAL_STEP)\b", re.I)
 _COMMENTS = re.compile(r"(?:^[ \t]*//[^\n]*\n){2,}|\(\*.*?\*\)|/\*.*?\*/", re.M | re.S)

@@ -96,6 +96,7 @@ class Dialect:
     own_time: bool = False
     short_circuit_words: bool = False
     jumps_in_text: bool = False
+    exceptions: bool = False
     functions_have_inputs: bool = False
     plain_names: bool = False
     locals_hide_results: bool = False
@@ -222,6 +223,7 @@ QUESTIONS = {
     "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
     "short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken, with a warning (S0195)", "taken"),
     "jumps_in_text": ("JMP in Structured Text", "taken, with a warning (S0195)", "taken"),
+    "exceptions": ("__TRY .. __CATCH(code) .. __ENDTRY", "taken, with a warning (S0195)", "taken"),
     "functions_have_inputs": ("FUNCTION f : INT without an input", "taken", "taken, with a warning (S0195)"),
     "plain_names": ("names that begin with _ or P_", "taken", "taken, with a warning (S0195)"),
     "any_width_at": ("x AT %IW4 : DINT, x AT %ML2 : DWORD: an address of another size than the type", "an error",
@@ -257,7 +259,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
-                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, short_addresses=True,
+                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
+                   short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (
     STANDARD,

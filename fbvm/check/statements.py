@@ -296,6 +296,15 @@ class _Statements:
         self._body(node.body)
         self.scope.condition(node.until, "UNTIL")
 
+    def _try(self, node: tree.Try) -> None:
+        self.block(node.body)
+        kind, wanted = self.target(node.code), self.scope.context.exception_codes()
+        if kind is not None and kind is not wanted:
+            self.error("S0301", node.code, f"__CATCH gives a {wanted}, and this is {kind}",
+                       f"declare it as __SYSTEM.{wanted}")
+        self.block(node.handler)
+        self.block(node.final or ())
+
     def _leave(self, node: tree.Exit | tree.Continue) -> None:
         if not self._loops:
             word = "EXIT" if isinstance(node, tree.Exit) else "CONTINUE"
@@ -326,7 +335,7 @@ class _Statements:
 _CHECK: dict[type, Callable[..., None]] = {
     tree.Assign: _Statements._assign, tree.CallStatement: _Statements._call, tree.If: _Statements._if,
     tree.Case: _Statements._case, tree.For: _Statements._for, tree.While: _Statements._while,
-    tree.Repeat: _Statements._repeat, tree.Exit: _Statements._leave, tree.Continue: _Statements._leave,
+    tree.Repeat: _Statements._repeat, tree.Try: _Statements._try, tree.Exit: _Statements._leave, tree.Continue: _Statements._leave,
     il.InstructionList: _Statements._rungs,
     ladder.Ladder: _Statements._rungs, ladder.Rung: _Statements._rungs, sfc.Sfc: _Statements._sfc,
     tree.Return: _Statements._return, tree.Empty: _Statements._empty, tree.RefusedStatement: _Statements._refused,

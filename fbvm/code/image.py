@@ -37,12 +37,15 @@ class Site:
 class Body:
     """The code of one POU: its name, the word of its declaration (FUNCTION_BLOCK ...), and its operations.
 
-    `instance_size` is the size of an instance in bytes; 0 for a function, which has a frame at a fixed place instead."""
+    `instance_size` is the size of an instance in bytes; 0 for a function, which has a frame at a fixed place instead.  With
+    `is_part` it is the code of some statements of a POU, executed for the same instance and among its frames; observations do not
+    tell of its calls."""
 
     name: str
     kind: str
     code: Block
     instance_size: int
+    is_part: bool = False
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from fbvm.base.areas import SLOTS_OFFSET, Area
 from fbvm.base.areas import Address as AreaAddress
 from fbvm.base.types import Field, StructType
 from fbvm.code.image import Body, Image, TaskRow
-from fbvm.code.operations import FIRST_OBJECT, WHOLE_BYTES, Address, Block, Node
+from fbvm.code.operations import CALLS, FIRST_OBJECT, WHOLE_BYTES, Address, Block, Node
 from fbvm.code.shapes import is_address, is_expression, operand_words
 
 MARGIN = 10
@@ -153,9 +153,10 @@ class _Writer:
 
     def simple(self, name: str, operands: list[Any]) -> str:
         """A statement without blocks; `<-` stands before what is stored."""
-        if name == "call":
+        if name in CALLS:
             place = f" of {self.address(operands[1])}" if operands[1] else ""
-            return f"call {self.image.bodies[operands[0]].name}{place}"
+            given = f"t{operands[2]} <- " if name == "attempt" else ""
+            return f"{given}{name} {self.image.bodies[operands[0]].name}{place}{' traps' * bool(operands[3:] and operands[3])}"
         if name == "observe":
             return f"observe {operands[0]} {self.detail(operands[2])}".rstrip()
         if name == "let":

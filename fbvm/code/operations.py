@@ -21,6 +21,8 @@ extents each; those from LEASED on are leases, for what may end while pointers t
 place in the source (Image.sites), for traps.
 Operands are evaluated from left to right, an address where it stands.  `let` temporaries belong to one execution of one
 body.  `math`, `pow` and `atan2` of f32 are worked out in 64 bits and rounded once.
+An `attempt` gives 0 for a body that has come to its end, else the number in CAUGHT of the code with which it has stopped: that of
+a way out (WAYS_OUT), or, if `traps` is True, that of a trap.  What it does not catch stops its own body as well.
 Meaning: IEC 61131-3 ed. 3 with the decisions on edges that are stated beside each row.
 """
 
@@ -150,6 +152,7 @@ exit       |                        |        |             | leaves the innermos
 next       |                        |        |             | to the tail of the innermost loop
 return     |                        |        |             | leaves the body
 call       | pou address            |        |             | executes the body of that number; address of its instance, or None
+attempt    | pou address number traps |   |          | call, and what has ended the body becomes the u32 temporary (below)
 reverse    | address size runs      |        |             | each item's bytes backwards; runs (offset, count, stride, item)
 charge     | count site             |        | R0104       | takes count from the step budget and stores it; below 0 traps
 due        | a                      |        |             | notes time a (ns) if it is earlier than what is noted
@@ -170,6 +173,25 @@ def _rows(text: str, kind: str) -> dict[str, Operation]:
 
 EXPRESSIONS = _rows(_EXPRESSIONS, "expression")
 STATEMENTS = _rows(_STATEMENTS, "statement")
+
+WAYS_OUT = {"return": 1, "exit": 2, "next": 3}
+"""Codes of `stop` that are no traps: jumps out of an attempt, to be done by the body around."""
+UNKNOWN_EXCEPTION = 0xFFFFFFFF
+CAUGHT = WAYS_OUT | {
+    "R0101": 0x102, "R0102": 0x101, "R0103": 0x103, "R0105": 0x103, "R0110": 0x51, "R0121": 0x54,
+    **dict.fromkeys(("R0106", "R0107", "R0108", "R0109", "R0111"), UNKNOWN_EXCEPTION)}  # fmt: skip
+"""By code what an attempt gives: of traps the member of ExceptionCode (CODESYS Development System, data type
+__SYSTEM.ExceptionCode).  The watchdog and a program that stops itself are not caught."""
+
+
+def caught(code: str, traps: bool) -> int:
+    """What an attempt gives that a body has stopped with a code, 0 if it does not catch that."""
+    number = CAUGHT.get(code, 0)
+    return number if traps or code in WAYS_OUT else 0
+
+
+CALLS = ("call", "attempt")
+"""Statements that execute a body: its number and the address of its instance are their first operands."""
 
 OBSERVATIONS: dict[str, str] = {
     "statement": "a statement is about to be executed; no detail",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.graphs import cycles
 from fbvm.code.image import Image
-from fbvm.code.operations import Node
+from fbvm.code.operations import CALLS, Node
 from fbvm.code.shapes import statements
 from fbvm.engine.ranges import Range, value_range
 
@@ -19,7 +19,7 @@ def base_ranges(image: Image) -> dict[int, Range]:
     callers: dict[int, list[tuple[int, Node]]] = {number: [] for number in range(len(image.bodies))}
     for number, body in enumerate(image.bodies):
         for node in statements(body.code):
-            if node[0] == "call":
+            if node[0] in CALLS:
                 callers[node[1]].append((number, node))
     starts: dict[int, list[Range | None]] = {number: [] for number in callers}
     for task in image.tasks:
@@ -39,7 +39,7 @@ def base_ranges(image: Image) -> dict[int, Range]:
 
 def recursive_bodies(image: Image) -> set[int]:
     """The numbers of the bodies that may be called again while they run."""
-    called = [tuple({node[1]: None for node in statements(body.code) if node[0] == "call"}) for body in image.bodies]
+    called = [tuple({node[1]: None for node in statements(body.code) if node[0] in CALLS}) for body in image.bodies]
     return {number for group in cycles(range(len(called)), called.__getitem__) for number in group}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from fbvm.code.image import Image
-from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Node
+from fbvm.code.operations import CALLS, SIZES, TEXT_UNITS, Address, Node
 from fbvm.code.shapes import statements
 from fbvm.engine.ranges import Range, RangeOf, value_range
 
@@ -69,7 +69,7 @@ class Effects:
             address, size = STORES[node[0]](node)
             found = span(located(address, instance), size, range_of)
             return None if found is None else (found,)
-        return self._call(node, instance) if node[0] == "call" else ()
+        return self._call(node, instance) if node[0] in CALLS else ()
 
     def _call(self, node: Node, caller: int | None) -> Spans:
         stored = self._of_body(node[1])

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fbvm.base.data import data_folder
 from fbvm.code.image import Image
+from fbvm.code.operations import CALLS
 from fbvm.code.shapes import statements
 from fbvm.prove.bounded import Goal
 from fbvm.prove.encoding.clocks import Clock
@@ -72,7 +73,7 @@ def _called(image: Image) -> set[int]:
         number = waiting.pop()
         if number not in found:
             found.add(number)
-            waiting += [node[1] for node in statements(image.bodies[number].code) if node[0] == "call"]
+            waiting += [node[1] for node in statements(image.bodies[number].code) if node[0] in CALLS]
     return found
 
 

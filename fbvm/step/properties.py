@@ -8,6 +8,7 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.base.types import RefType, StructType, fold
 from fbvm.code.image import Image, ProgramRun, TaskRow
+from fbvm.code.operations import CALLS
 from fbvm.code.shapes import statements
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.machine.plc import STEP_BUDGET
@@ -103,7 +104,7 @@ class Properties:
             needed, waiting = {body}, [body]
             while waiting:
                 for node in statements(whole.bodies[waiting.pop()].code):
-                    if node[0] == "call" and node[1] not in needed:
+                    if node[0] in CALLS and node[1] not in needed:
                         needed.add(node[1])
                         waiting.append(node[1])
             bodies = tuple(each if number in needed else replace(each, code=()) for number, each in enumerate(whole.bodies))

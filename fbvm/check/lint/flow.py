@@ -53,6 +53,10 @@ class _Flow:
             return statement.otherwise is not None and self.block(statement.otherwise) and all(ends)
         if isinstance(statement, tree.For | tree.While | tree.Repeat):
             return self.loop(statement)
+        if isinstance(statement, tree.Try):
+            ends = self.block(statement.body)
+            ends = self.block(statement.handler) and ends
+            return self.block(statement.final or ()) or ends
         if isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList):
             return self.block(statement.body)
         if isinstance(statement, tree.Exit) and self.left:

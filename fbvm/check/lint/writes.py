@@ -179,6 +179,15 @@ class _Order:
         if not isinstance(node, tree.While):
             definite.update((key, call) for key, call in inside.items() if isinstance(call, tree.Call))
 
+    def attempt(self, node: tree.Try, definite: Definite) -> None:
+        """What is assigned between __TRY and __CATCH may be read by the handler; it counts as executed."""
+        for statement in node.body:
+            definite.update(self.block((statement,)))
+            self.stores.clear()
+        self.steps(node.code)
+        self.block(node.handler)
+        definite.update(self.block(node.final or ()))
+
     def body_of(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList, definite: Definite) -> None:
         """Go through the statements of rungs or of a chart as through those of the block around them."""
         self.in_rung = isinstance(node, ladder.Rung)
@@ -297,7 +306,8 @@ class _Order:
 
 _STEPS: dict[type, Callable[[_Order, Any, Definite], None]] = {
     tree.Assign: _Order.assign, tree.CallStatement: _Order.call, tree.If: _Order.choice, tree.Case: _Order.case,
-    tree.For: _Order.loop, tree.While: _Order.loop, tree.Repeat: _Order.loop, tree.Return: _Order.leave,
+    tree.For: _Order.loop, tree.While: _Order.loop, tree.Repeat: _Order.loop, tree.Try: _Order.attempt,
+    tree.Return: _Order.leave,
     tree.Exit: _Order.leave, tree.Continue: _Order.leave, tree.Empty: _Order.nothing,
     tree.RefusedStatement: _Order.nothing, il.InstructionList: _Order.body_of,
     ladder.Ladder: _Order.body_of, ladder.Rung: _Order.body_of,

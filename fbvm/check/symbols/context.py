@@ -144,6 +144,12 @@ class Context:
         assert isinstance(kind, EnumType)
         return kind
 
+    def exception_codes(self) -> EnumType:
+        """The enumeration ExceptionCode, of which __CATCH gives a member; a library declares it."""
+        kind = self.named_type("ExceptionCode", Source("", "", "codesys"))
+        assert isinstance(kind, EnumType)
+        return kind
+
     def block_of(self, kind: StructType) -> Pou:
         """The function block or program whose instances have this type."""
         return self._blocks[id(kind)]

@@ -21,6 +21,8 @@ def bodies(statement: tree.Statement) -> list[tree.Block]:
         return [body for _, body in statement.branches] + [statement.otherwise or ()]
     if isinstance(statement, tree.Case):
         return [branch.body for branch in statement.branches] + [statement.otherwise or ()]
+    if isinstance(statement, tree.Try):
+        return [statement.body, statement.handler, statement.final or ()]
     if isinstance(statement, _WITH_BODY):
         return [statement.body]
     return []

@@ -128,7 +128,7 @@ def _image(checker: Checker, library: ObjectLibrary, progress: Progress, drawn: 
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
     initial = (*placement.initial, *references.in_slots(), *InstancePaths(checker).rows())
-    return Image(placement.layout, bodies, tuple(tasks), placement.symbols, initial,
+    return Image(placement.layout, (*bodies, *program.parts), tuple(tasks), placement.symbols, initial,
                  tuple(placement.retained), tuple(program.sites), types, program.objects, tuple(program.rungs),
                  tuple(program.charts), frames=placement.frames)
 

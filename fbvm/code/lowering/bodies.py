@@ -9,7 +9,7 @@ from fbvm.check.checker import Checker
 from fbvm.check.symbols.facts import Edge, Pou, Start
 from fbvm.code.builder.places import Place
 from fbvm.code.image import Body, RungPicture
-from fbvm.code.lowering import aggregates, calls, frame_stack, loops, operators, pointers, statements, variables
+from fbvm.code.lowering import aggregates, attempts, calls, frame_stack, loops, operators, pointers, statements, variables
 from fbvm.code.lowering.context import BodyContext, Rules
 from fbvm.code.lowering.program import Program
 from fbvm.code.lowering.step_costs import step_cost, with_costs
@@ -21,7 +21,7 @@ from fbvm.syntax.tree import il, ladder, sfc
 RULES = Rules(
     values={**operators.VALUES, **calls.VALUES, **variables.VALUES, **aggregates.VALUES},
     places={**calls.PLACES, **variables.PLACES, **aggregates.PLACES},
-    statements={**statements.STATEMENTS, **calls.STATEMENTS, **loops.STATEMENTS},
+    statements={**statements.STATEMENTS, **calls.STATEMENTS, **loops.STATEMENTS, **attempts.STATEMENTS},
 )
 
 

@@ -5,7 +5,7 @@ A rule imports this module and never another rule's caller: it calls `body.value
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from fbvm.base.types import BOOL, UDINT, RefType, StructType, Type, base, machine
@@ -49,6 +49,7 @@ class BodyContext(Emitter):
         super().__init__(checker.project.dialect)
         self.program, self.checker, self.pou = program, checker, pou
         self.facts = checker.project.facts
+        self._rules = rules
         self._values, self._places, self._statements = rules.values, rules.places, rules.statements
         self._sites: dict[int, int] = {}
         self._slots: dict[Variable, Place] = {}
@@ -56,6 +57,8 @@ class BodyContext(Emitter):
         """The frame of the body, if that lies on the stack of frames."""
         self.at_return: Block = ()
         """Statements that end the body, for wherever it returns."""
+        self.ways_out: Mapping[tree.Statement, str] = {}
+        """The statements that lead out of a part of the POU that has a body of its own, with the code of each (WAYS_OUT)."""
         self._reads: list[Place] = []
         """Variables that the present statement reads, for observations."""
         self.entry_site = self.site(pou.tree.name)
@@ -65,6 +68,12 @@ class BodyContext(Emitter):
         """By site the numbers of statements that are drawn as rungs."""
         self.contacts: dict[tree.Expr, list[Mark]] = {}
         """The contacts of such rungs that show an expression."""
+
+    def part(self, ways_out: Mapping[tree.Statement, str]) -> BodyContext:
+        """The context of a part of the POU that has a body of its own."""
+        made = BodyContext(self.program, self.checker, self.pou, self._rules)
+        made.ways_out = ways_out
+        return made
 
     def site(self, node: tree.Node) -> int:
         """The number of the place in the source at which a node begins."""
@@ -254,6 +263,11 @@ class BodyContext(Emitter):
             self.lower(statements)
         self._reads = reads
         return tuple(inner)
+
+    def leave(self, node: tree.Statement, block: Block, site: int) -> None:
+        """Emit a jump: `block`, or what makes the body around do that."""
+        way = self.ways_out.get(node)
+        self.emit(*(block if way is None else (("stop", way, site),)))
 
     def exit_if(self, condition: tree.Expr, holds: bool, site: int) -> Block:
         """Statements that leave the innermost loop if a condition has the value `holds`, and observe what it reads."""

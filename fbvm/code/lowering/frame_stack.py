@@ -55,6 +55,20 @@ def enter(body: BodyContext) -> None:
     body.at_return += (("store", "ref", newest, ("load_raw", "ref", before)),)
 
 
+def enter_part(body: BodyContext) -> None:
+    """Emit what a part of a POU with a body of its own does first: find the frame of the POU, its newest one."""
+    if body.pou.stack_bytes:
+        frame = body.to_temporary(("load", "ref", ("abs", body.pou.frame_offset, ())))
+        body.frame = Place((("ref", frame, body.entry_site), 0, ()), BOOL)
+
+
+def kept(body: BodyContext) -> list[tuple[str, Address]]:
+    """The words that calls change until they return: the top of the stack, and the newest frame of each POU."""
+    if body.program.stack is None:
+        return []
+    return [("u32", _top(body)), *(("ref", ("abs", pou.frame_offset, ())) for pou in body.checker.bodies if pou.stack_bytes)]
+
+
 def leased(body: BodyContext, bits: Node) -> Node:
     """A reference to a variable in a frame on the stack, by its bits: one that holds as long as the frame is in use."""
     number = LEASED + (_stack(body).lease << body.program.held_bits) + 1

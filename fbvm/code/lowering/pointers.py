@@ -199,6 +199,12 @@ def begin_leases(body: BodyContext) -> None:
             body.at_return += tuple(("store", "u32", field, value) for field, value in zip(fields, kept, strict=True))
 
 
+def kept(body: BodyContext) -> list[tuple[str, Address]]:
+    """The words that say which leases of other POUs are held."""
+    own = () if body.pou.stack_bytes else body.pou.owner.leases
+    return [("u32", _row(body, lease, _LEASE_HELD)) for lease in range(len(body.facts.leases)) if lease not in own]
+
+
 # --- working with them ------------------------------------------------------------------------------------------------
 
 

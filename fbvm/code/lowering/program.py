@@ -9,7 +9,7 @@ from fbvm.base.areas import Area
 from fbvm.base.types import Type
 from fbvm.check.checker import Checker
 from fbvm.check.symbols.facts import Pou, Start, Variable
-from fbvm.code.image import Objects, RungPicture, SfcPicture, Site
+from fbvm.code.image import Body, Objects, RungPicture, SfcPicture, Site
 from fbvm.code.layout.layout import Placement
 from fbvm.code.layout.reference_marks import references_in
 from fbvm.code.operations import FIRST_OBJECT
@@ -35,6 +35,8 @@ class Program:
         """By POU the references that its body makes when it starts, and where in the buffer each lies."""
         self.leases_at, self.held_bits = placement.objects.leases_at, placement.objects.held_bits
         self.stack = placement.stack
+        self.parts: list[Body] = []
+        """Bodies of parts of POUs, which are numbered behind those of all POUs."""
         self._objects = placement.objects
         self._area_objects: dict[str, tuple[int, int]] = {}
         self._numbers: dict[tuple[str, str, int], int] = {}
@@ -68,6 +70,11 @@ class Program:
     def objects(self) -> Objects:
         """All objects, those of `area_object` included."""
         return replace(self._objects, extents=(*self._objects.extents, *self._area_objects.values()))
+
+    def add_part(self, body: Body) -> int:
+        """Adds the body of a part of a POU.  Returns its number."""
+        self.parts.append(body)
+        return len(self.checker.bodies) + len(self.parts) - 1
 
     # --- where things lie ---------------------------------------------------------------------------------------------
 

@@ -119,11 +119,11 @@ def _text_case(body: BodyContext, node: tree.Case) -> None:
 
 
 def _exit(body: BodyContext, node: tree.Exit, site: int) -> None:
-    body.emit(*EXIT)
+    body.leave(node, EXIT, site)
 
 
 def _continue(body: BodyContext, node: tree.Continue, site: int) -> None:
-    body.emit(("next",))
+    body.leave(node, (("next",),), site)
 
 
 def _return(body: BodyContext, node: tree.Return, site: int) -> None:
@@ -134,7 +134,7 @@ def _return(body: BodyContext, node: tree.Return, site: int) -> None:
             body.copy(place, body.aggregate(node.value), site)
         else:
             body.write(place, body.value(node.value, place.type), site)
-    body.emit(*body.at_return, ("return",))
+    body.leave(node, (*body.at_return, ("return",)), site)
 
 
 # --- ladder and charts ------------------------------------------------------------------------------------------------

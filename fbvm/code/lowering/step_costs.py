@@ -33,11 +33,13 @@ _LOOPS = tree.For | tree.While | tree.Repeat
 
 
 def step_cost(statements: tree.Block) -> int:
-    """The number of statements of a block, without those inside loops."""
+    """The number of statements of a block, without those inside loops and behind __TRY, which charge for themselves."""
     total = 0
     for statement in statements:
         total += 1
-        if not isinstance(statement, _LOOPS):
+        if isinstance(statement, tree.Try):
+            total += step_cost(statement.handler) + step_cost(statement.final or ())
+        elif not isinstance(statement, _LOOPS):
             total += sum(step_cost(inner) for inner in bodies(statement))
     return total
 

@@ -42,7 +42,7 @@ def encode(image: Image) -> bytes:
     document = {
         "fingerprint": image.fingerprint,
         "layout": [image.layout.slots_size, image.layout.e_banks, [astuple(box) for box in image.layout.mailboxes]],
-        "bodies": [[body.name, body.kind, body.instance_size, _dump(body.code)] for body in image.bodies],
+        "bodies": [[body.name, body.kind, body.instance_size, _dump(body.code), body.is_part] for body in image.bodies],
         "tasks": [[task.name, task.priority, task.interval_ns, task.single, [astuple(run) for run in task.programs]]
                   for task in image.tasks],
         "symbols": [[name, types.field(symbol)] for name, symbol in image.symbols.items()],
@@ -90,9 +90,9 @@ class _StoredBody(Body):
     """A body whose code is parsed when it is asked for."""
 
     @classmethod
-    def of(cls, name: str, kind: str, instance_size: int, text: str) -> _StoredBody:
+    def of(cls, name: str, kind: str, instance_size: int, text: str, is_part: bool) -> _StoredBody:
         body = cls.__new__(cls)
-        vars(body).update(name=name, kind=kind, instance_size=instance_size, text=text)
+        vars(body).update(name=name, kind=kind, instance_size=instance_size, text=text, is_part=is_part)
         return body
 
     @cached_property

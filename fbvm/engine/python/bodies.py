@@ -12,7 +12,7 @@ from typing import Any
 
 from fbvm.base.areas import BUDGET
 from fbvm.code.image import Body, Image
-from fbvm.code.operations import Address, Block, Node
+from fbvm.code.operations import CALLS, Address, Block, Node
 from fbvm.engine.effects import STORES, Effects
 from fbvm.engine.inlining import Inlining
 from fbvm.engine.observation import NO_SITE
@@ -29,7 +29,7 @@ IN_MEMORY = f"i64[{BUDGET // 8}]"
 """The step budget in the memory."""
 BEGIN, END = "#+ ", "#- "
 """Beginnings of the comments around the code of a body in place of a call, with the number of the call."""
-STORING = {*STORES, "call"} - {"store"}
+STORING = {*STORES, *CALLS} - {"store"}
 """Statements that may change what is held; a store sees to that itself."""
 LEAVES = {EXIT: "exit", NEXT: "next", RETURN: "return"}
 
@@ -151,6 +151,15 @@ class BodyWriter(Expressions):
     def call_body(self, pou: int, address: Address | None, place: str) -> None:
         """Writes the call of the body of number `pou`, whose instance begins at `address`; `place` is Python for that byte."""
         self.line(f"{self.budget} = {self.function(pou)}({place}, {self.budget})")
+
+    def attempt_body(self, pou: int, place: str, number: str) -> None:
+        """Writes the execution of a part of this POU, and that the variable `number` is 0 behind it."""
+        self.line(f"{self.budget} = {self.function(pou)}({place}, {self.budget})")
+        self.line(f"{number} = 0")
+
+    def after_stop(self, number: str, traps: bool) -> None:
+        """Writes what is done when such a part has stopped: the variable `number` gets what has ended it."""
+        self.line(f"{number}, {self.budget}, _ = caught(stopped, {traps})")
 
     def observe(self, kind: str, site: int, detail: Any) -> None:
         """Writes an observation."""

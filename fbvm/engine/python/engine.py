@@ -20,7 +20,7 @@ from weakref import finalize
 from fbvm.base.areas import BUDGET, MOST_FRAMES
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image, ProgramRun
-from fbvm.code.operations import Address
+from fbvm.code.operations import Address, caught
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.apart import run_apart
 from fbvm.engine.bases import base_ranges, recursive_bodies
@@ -209,7 +209,7 @@ class PythonEngine:
         """The bodies of a program over this memory."""
         log = self._log if program.build is Build.LOGGED else None
         names = environment(self.memory, self.image.objects) | program.constants | (log.names if log else {})
-        names["counts"], names["marks"] = self.counted, self.marks
+        names["counts"], names["marks"], names["caught"] = self.counted, self.marks, self._caught
         for number, machines in program.own.items():
             if machines:
                 names[f"own{number}"] = OwnViews(self.memory, machines)
@@ -311,6 +311,23 @@ class PythonEngine:
 
     def _instance(self, body: int, base: int) -> int:
         return NO_INSTANCE if self.image.bodies[body].kind == "FUNCTION" else base
+
+    def _caught(self, stop: Stop, traps: bool) -> tuple[int, int, list[tuple[int, int]]]:
+        """Called by an attempt with what has stopped the body: what it gives; how many steps are left; and the bodies that have
+        ended with it, as number and instance, the innermost first, without parts of others.  Raises what it does not catch."""
+        number = caught(stop.code, traps)
+        if not number:
+            raise stop
+        ended: dict[int, tuple[int, int]] = {}
+        left, at = None, stop.__traceback__ and stop.__traceback__.tb_next
+        while at is not None:
+            names, body = at.tb_frame.f_locals, self._numbers.get(at.tb_frame.f_code.co_name)
+            if body is not None:
+                left = names.get("n")
+                if not self.image.bodies[body].is_part:
+                    ended[id(at.tb_frame)] = body, names["b1"]
+            at = at.tb_next
+        return number, self._system[BUDGET // 8] if left is None else left, [*ended.values()][::-1]
 
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         """Executes a task step by step: a generator of observations, which returns what `run` returns.

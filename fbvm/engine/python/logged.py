@@ -91,6 +91,15 @@ class LoggedWriter(ObservedWriter):
         self.line(f"{self.function(pou)}({place})")
         self._note(Row("return", self.site, pou))
 
+    def attempt_body(self, pou: int, place: str, number: str) -> None:
+        self.line(f"{self.function(pou)}({place})")
+        self.line(f"{number} = 0")
+
+    def after_stop(self, number: str, traps: bool) -> None:
+        self.line(f"{number}, _, ended = caught(stopped, {traps})")
+        self.line(f"notes([{len(self.table)}] * len(ended))")
+        self.table.append(Row("return", self.site, None))
+
     def observe(self, kind: str, site: int, detail: Any) -> None:
         if kind == "contact":
             element, value = detail

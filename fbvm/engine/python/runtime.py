@@ -91,7 +91,7 @@ def bit_behind(reference: int, n: int) -> int:
 
 
 _PURE: dict[str, Any] = {
-    "Observation": Observation, "NAN": arithmetic.NAN, "INF": arithmetic.INF, "stop": stop, "bisect": bisect_right,
+    "Observation": Observation, "Stop": Stop, "NAN": arithmetic.NAN, "INF": arithmetic.INF, "stop": stop, "bisect": bisect_right,
     "quotient": quotient, "remainder": remainder, "divide": arithmetic.divide, "power": arithmetic.power,
     "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux,
     "within": within, "wrapped": wrapped,

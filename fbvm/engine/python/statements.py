@@ -245,6 +245,15 @@ def _end(w: BodyWriter, pou: int) -> None:
     w.comment(f"{END}{w.image.bodies[pou].name}")
 
 
+def _attempt(w: BodyWriter, pou: int, address: Address | None, number: int, traps: bool) -> None:
+    place = bare(w.place(address, max(1, w.image.bodies[pou].instance_size))) if address else "0"
+    w.assigned.add(number)
+    w.line("try:")
+    w.suite(lambda: w.attempt_body(pou, place, f"t{number}"))
+    w.line("except Stop as stopped:")
+    w.suite(lambda: w.after_stop(f"t{number}", traps))
+
+
 def _charge(w: BodyWriter, count: int, site: int) -> None:
     name = w.budget
     if name == IN_MEMORY:
@@ -293,7 +302,7 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
-    "begin": _begin, "end": _end,
+    "begin": _begin, "end": _end, "attempt": _attempt,
     "charge": _charge, "due": _due, "stop": _stop,
     "observe": _observe, "count": _count, "mark": _mark,
 }

@@ -33,6 +33,14 @@ class SteppedWriter(ObservedWriter):
         self.line(f"yield from {self.function(pou)}({place})")
         self.line(f"yield Observation('return', {self.site}, ({pou}, {place}))")
 
+    def attempt_body(self, pou: int, place: str, number: str) -> None:
+        self.line(f"yield from {self.function(pou)}({place})")
+        self.line(f"{number} = 0")
+
+    def after_stop(self, number: str, traps: bool) -> None:
+        self.line(f"{number}, _, ended = caught(stopped, {traps})")
+        self.line(f"for each in ended: yield Observation('return', {self.site}, each)")
+
     def observe(self, kind: str, site: int, detail: Any) -> None:
         self.line(f"yield Observation({kind!r}, {site}, {self._shown(kind, detail)})")
 

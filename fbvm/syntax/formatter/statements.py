@@ -129,9 +129,6 @@ class StatementLayout(ExpressionLayout):
     def method_among_statements(self, method: Phrase) -> Phrase:
         return method
 
-    def refused_statement(self, token: Token) -> Phrase:
-        return self.refused(token)
-
     # --- compound statements ---
 
     def ladder(self, token: Token) -> Phrase:
@@ -235,4 +232,15 @@ class StatementLayout(ExpressionLayout):
         if semicolon:
             phrase.parts.append(self.dropped(semicolon))
         phrase.parts += (lines(self.before_end(end)), HARD, self.ended(end))
+        return phrase
+
+    def try_statement(self, word: Token, items: list[Phrase], catch: Token, opening: Token, code: Phrase, closing: Token,
+                      handler: list[Phrase], last: Token | None, final: list[Phrase] | None, end: Token) -> Phrase:
+        phrase = Phrase(word.start, self.leaf(word), self.branch(items, catch), self.leaf(catch), self.leaf(opening),
+                        self.hung(code), self.closer(closing))
+        if last and final is not None:
+            phrase.parts += (self.branch(handler, last), self.leaf(last), self.block(final, end))
+        else:
+            phrase.parts.append(self.block(handler, end))
+        phrase.parts += (HARD, self.ended(end))
         return phrase

@@ -352,9 +352,6 @@ class _Refusal(ErrorRecovery):
     def too_deep(self, token: Token, why: str) -> list[Token]:
         raise InstructionError("this is nested too deep", "", token)
 
-    def without_end(self, opener: Token, found: Token) -> None:
-        raise InstructionError(f"`{opener.text}` cannot stand here", "", opener)
-
 
 def _refuse(stuck: Automaton) -> ErrorRecovery:
     return _Refusal()

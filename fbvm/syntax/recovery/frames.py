@@ -13,7 +13,7 @@ from fbvm.syntax.st.tables import tables
 from fbvm.syntax.tree import Binary, EnumLiteral, Literal, NullLiteral, Unary
 
 ENDS = {
-    "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT",
+    "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT", "TRY": "END_TRY",
     "VAR": "END_VAR", "VAR_GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE",
     "FUNCTION": "END_FUNCTION", "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM",
     "CONFIGURATION": "END_CONFIGURATION", "RESOURCE": "END_RESOURCE", "ACTION": "END_ACTION", "ACTIONS": "END_ACTIONS",
@@ -23,7 +23,8 @@ ENDS = {
     "ACCESSOR": "END_ACCESSOR", "NAMESPACE": "END_NAMESPACE"}
 """Word that opens -> word that ends it."""
 
-OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}
+OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}, "CATCH": {"TRY"},
+                                "FINALLY": {"TRY"}}
 """Word that ends or divides a block -> the words that may open that block."""
 for _opener, _end in ENDS.items():
     OPENERS.setdefault(_end, set()).add(_opener)
@@ -33,7 +34,7 @@ UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "CLASS", "INTERFACE", "NAMESPA
 """Tokens that begin a declaration at the outermost level, and the end of the text."""
 
 POUS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM"}
-STATEMENT_WORDS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
+STATEMENT_WORDS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "TRY", "EXIT", "CONTINUE", "RETURN"}
 HEADS = {"IF": "THEN", "ELSIF": "THEN", "WHILE": "DO", "FOR": "DO", "CASE": "OF", "UNTIL": "END_REPEAT"}
 """Word that begins a head -> the word that ends the head."""
 

@@ -11,7 +11,7 @@ from fbvm.syntax.st.lexer import Lexer, Token
 LONGEST = 200_000
 """Longest block in characters that is searched."""
 
-BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
+BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "TRY"}
 
 
 def advice(source: Source, opener: Token, until: Token) -> str:

@@ -178,6 +178,21 @@ def _other_end(automaton: Automaton, token: Token, following: list[Token]) -> Re
                   f"{end} expected, but {found(token)} found", f"a {word.text.upper()} ends with {end}", word)
 
 
+def _no_handler(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """`__TRY .. __ENDTRY`"""
+    open_ = frames(automaton.states, automaton.values)
+    if token.type not in ("FINALLY", "END_TRY") or not open_ or open_[-1].word.type != "TRY" or \
+            advance(automaton.states, "CATCH") is None:
+        return None
+    head = [Token(*each, token.start, token.start) for each in HANDLER]
+    return Repair([*head, token], token.start, token.end, f"__CATCH(code) expected before {found(token)}",
+                  "code is a variable of type __SYSTEM.ExceptionCode", open_[-1].word, lossless=False)
+
+
+HANDLER = (("CATCH", "__CATCH"), ("LPAR", "("), ("NUMBER", "0"), ("RPAR", ")"))
+"""The tokens that are read in place of the head of a handler."""
+
+
 def _location_behind_type(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`x : INT AT D5;`"""
     if token.type != "AT" or anchor(automaton.states).symbol != "var_decls" or len(following) < 2:
@@ -298,7 +313,7 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
 MISTAKES: tuple[Callable[[Automaton, Token, list[Token]], Repair | None], ...] = (
     networks, _ladder, _misspelt, _statement_word, function_head, _nameless, _reserved_name, _end_of_section,
     colon_behind, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
-    _location_behind_type, _caret, _begin, infix, decimal_comma, bare_point, doubled_quote, bare_function, _c_loop,
+    _no_handler, _location_behind_type, _caret, _begin, infix, decimal_comma, bare_point, doubled_quote, bare_function, _c_loop,
     _declared_in_body, _instruction_list, foreign_word, comment_signs, until, statement_as_value,
     two_names, misnamed, sized_text, alias, written_type, braces)
 """In the order in which they are asked; the first repair counts."""

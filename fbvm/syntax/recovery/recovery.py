@@ -123,9 +123,6 @@ class Recovery:
             token = self.following()
         return [token]
 
-    def without_end(self, opener: Token, end: Token) -> None:
-        self.report("S0101", opener.start, opener.end, f"{opener.text.upper()} has no end before {found(end)}", "")
-
     # --- messages ---
 
     def report(self, code: str, start: int, end: int, message: str, help_: str, opener: Token | None = None,
@@ -236,12 +233,12 @@ class Recovery:
         end = ENDS[word.type]
         if not ends_alike(self.builder.source, word, token) or word.type not in BLOCKS:
             return self.no_opener(token)
-        self.report("S0101", token.start, token.end, f"{end} expected, but {found(token)} found",
-                    f"{word.type} ends with {end}", word, lossless=True)
+        self.report("S0101", token.start, token.end, f"{sign(end)} expected, but {found(token)} found",
+                    f"{sign(word.type)} ends with {sign(end)}", word, lossless=True)
         return [Token(end, end, token.start, token.end)]
 
     def no_opener(self, token: Token) -> list[Token]:
-        words = " or ".join(sorted(OPENERS[token.type]))
+        words = " or ".join(map(sign, sorted(OPENERS[token.type])))
         self.report("S0101", token.start, token.end, f"{found(token)} without {words}", "", lossless=True)
         following = self.following()
         return [] if following.type == "SEMICOLON" else [following]
@@ -270,7 +267,7 @@ class Recovery:
         name = f" `{head[0].text}`" if isinstance(head, tuple) else ""
         self.last = min(self.last, self.place(token) - 1)
         self.report("S0101", self.place(token), token.end,
-                    f"{ENDS[word.type]} expected before {found(token)}: "
+                    f"{sign(ENDS[word.type])} expected before {found(token)}: "
                     f"the {word.text.upper()}{name} of line {line} is still open", advice(source, word, token), word, lossless)
 
     # --- giving up a part ---
@@ -316,7 +313,7 @@ class Recovery:
         symbol = anchor(self.states).symbol
         while True:
             kind = token.type
-            if kind in UNITS or kind == "TRY":
+            if kind in UNITS:
                 return [token]
             if symbol != "declarations":
                 if kind == "SEMICOLON":

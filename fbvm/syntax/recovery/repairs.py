@@ -51,7 +51,7 @@ def _score(automaton: Automaton, states: State | None, tokens: list[Token]) -> i
         after = advance(states, token.type)
         if after is None and token.type != "NAME" and automaton.may_be_name(token):
             after = advance(states, "NAME")
-        if after is not None and (token.type == "$END" or token.type == "TRY"):
+        if after is not None and token.type == "$END":
             return len(tokens)
         states = after
     return len(tokens) if states is not None else len(tokens) - 1

@@ -16,7 +16,7 @@ DROPPED = {"LET": "an assignment has no word in front of it: x := 5;", "SET": "w
 """Word that is dropped -> hint; the rest of the statement is read."""
 SKIPPED = {"LOOP": "a loop without a condition is WHILE TRUE DO .. END_WHILE; EXIT leaves it",
            "UNLESS": "write IF NOT condition THEN .. END_IF", "DIM": "variables are declared in VAR .. END_VAR",
-           "CONST": "constants are declared in VAR CONSTANT .. END_VAR", "TRY": "there are no exceptions: check before",
+           "CONST": "constants are declared in VAR CONSTANT .. END_VAR", "TRY": "write __TRY .. __CATCH(code) .. __ENDTRY",
            "INPUT": "inputs are declared in VAR_INPUT .. END_VAR", "OUTPUT": "outputs are declared in VAR_OUTPUT .. END_VAR"}
 """Word whose whole statement is passed over -> hint."""
 ENDED = {"LOOP": "END_LOOP", "CONST": "END_CONST", "TRY": "END_TRY", "INPUT": "END_INPUT", "OUTPUT": "END_OUTPUT"}

@@ -10,7 +10,6 @@ from typing import Any, Protocol
 from fbvm.syntax.st.builder import TooDeep
 from fbvm.syntax.st.lexer import Token, lexis, meant
 from fbvm.syntax.st.lookahead import advance
-from fbvm.syntax.st.refused import whole
 from fbvm.syntax.st.tables import Tables, tables
 
 NESTING_LIMIT = 200
@@ -19,10 +18,9 @@ NESTING_LIMIT = 200
 STACK_LIMIT = 4000
 """Most states on the stack; within NESTING_LIMIT only an endless chain of signs or NOTs needs more."""
 
-NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "STRUCT", "UNION", "ARRAY", "REF_TO",
+NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "TRY", "STRUCT", "UNION", "ARRAY", "REF_TO",
                      "POINTER", "REFERENCE"))
-REFUSED = frozenset(("TRY",))
-DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
+DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "CATCH", "FINALLY", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT", "END_TRY",
                       "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION", "END_TRANSITION", "END_CLASS",
                       "END_METHOD", "END_ACCESSOR", "END_NAMESPACE", "END_PROPERTY"))
 """Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the
@@ -55,8 +53,6 @@ class ErrorRecovery(Protocol):
 
     def too_deep(self, token: Token, why: str) -> list[Token]: ...
 
-    def without_end(self, opener: Token, found: Token) -> None: ...
-
 
 class Automaton:
     """One parse in progress.  `states` and `values` are its stacks; `states` has one entry more, the start state."""
@@ -82,7 +78,7 @@ class Automaton:
 
     def run(self, recovery: Callable[[Automaton], ErrorRecovery]) -> Any:
         """Feed every token; returns the value of the start symbol.  `recovery` is called at the first error."""
-        ahead, stream, special = self.ahead, self.stream, DIVIDERS | NESTING | REFUSED | {"$END"}
+        ahead, stream, special = self.ahead, self.stream, DIVIDERS | NESTING | {"$END"}
         while True:
             token = ahead.pop() if ahead else next(stream)
             try:
@@ -109,16 +105,11 @@ class Automaton:
         return self.recovery
 
     def _ended(self, token: Token, recovery: Callable[[Automaton], ErrorRecovery]) -> bool:
-        """Called behind a token that nests or is refused; returns whether the token was the end of the text."""
+        """Called behind a token that nests; returns whether the token was the end of the text."""
         if token.type == "$END":
             return True
         if token.type in NESTING and len(self.states) > NESTING_LIMIT and self._nested_too_deep():
             self.ahead.extend(reversed(self._recovery(recovery).too_deep(token, "levels")))
-        elif token.type in REFUSED and self.values[-1] is token:
-            self.values[-1], missed = whole(token, self.text, self.next)
-            if missed:
-                self._recovery(recovery).without_end(token, missed)
-                self.ahead.append(missed)
         return False
 
     def next(self) -> Token:

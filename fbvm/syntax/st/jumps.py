@@ -177,6 +177,9 @@ def _rebuilt(node: Statement, inner: Callable[[Block], Block]) -> Statement:
     if isinstance(node, tree.Case):
         cases = tuple(changed(branch, body=inner(branch.body)) for branch in node.branches)
         return changed(node, branches=cases, otherwise=None if node.otherwise is None else inner(node.otherwise))
+    if isinstance(node, tree.Try):
+        return changed(node, body=inner(node.body), handler=inner(node.handler),
+                       final=None if node.final is None else inner(node.final))
     if isinstance(node, tree.For | tree.While | tree.Repeat | InstructionList):
         return changed(node, body=inner(node.body))
     return node

@@ -28,6 +28,7 @@ from fbvm.syntax.tree import (
     Repeat,
     Return,
     Statement,
+    Try,
     While,
 )
 
@@ -156,9 +157,6 @@ class Statements(Expressions):
     def method_among_statements(self, members: Members) -> Members:
         return members
 
-    def refused_statement(self, token: Token) -> RefusedStatement:
-        return RefusedStatement(token.start, token.end, token.text.split(None, 1)[0].split("(")[0].upper())
-
     # --- compound statements ---
 
     def if_statement(self, word: Token, condition: Expr, then: Token, items: Items, more: list[Branch],
@@ -207,3 +205,9 @@ class Statements(Expressions):
     def repeat_statement(self, word: Token, items: Items, until: Token, condition: Expr, semicolon: Token | None,
                          end: Token) -> Statement:
         return Repeat(word.start, end.end, self.block(items), condition)
+
+    def try_statement(self, word: Token, items: Items, catch: Token, opening: Token, code: Expr, closing: Token, handler: Items,
+                      last: Token | None, final: Items | None, end: Token) -> Statement:
+        self.forms.append(Form("no_exceptions", word.start, word.end, None, (
+            "S0195", "__TRY is CODESYS's, and the tool of this dialect refuses it", "check before what may go wrong")))
+        return Try(word.start, end.end, self.block(items), code, self.block(handler), None if final is None else self.block(final))

@@ -223,8 +223,18 @@ class Empty(Statement):
 
 
 @_node
+class Try(Statement):
+    """`__TRY body __CATCH(code) handler __FINALLY final __ENDTRY`: `final` is None without __FINALLY."""
+
+    body: Block
+    code: Expr
+    handler: Block
+    final: Block | None
+
+
+@_node
 class RefusedStatement(Statement):
-    """Understood but never executed (a JMP into a block, __TRY ...): `what` names it."""
+    """Understood but never executed (a JMP into a block ...): `what` names it."""
 
     what: str
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from fbvm.code.image import Image
-from fbvm.code.operations import Address
+from fbvm.code.operations import CALLS, Address
 from fbvm.code.shapes import statements
 from fbvm.engine.ranges import value_range
 
@@ -25,7 +25,7 @@ def call_graph(image: Image) -> Calls:
     while waiting:
         number = waiting[-1]
         if number not in known:
-            known[number] = [(node[1], node[2]) for node in statements(image.bodies[number].code) if node[0] == "call"]
+            known[number] = [(node[1], node[2]) for node in statements(image.bodies[number].code) if node[0] in CALLS]
         missing = [called for called, _ in known[number] if called not in known]
         if missing:
             waiting += missing

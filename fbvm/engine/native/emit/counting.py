@@ -47,6 +47,8 @@ class Counting:
     in the context: how many positions a trap has noted, these, the segments."""
 
     def __init__(self, image: Image, nested: int) -> None:
+        self.is_exact = any(node[0] == "attempt" for body in image.bodies for node in statements(body.code))
+        """Whether each counter is a segment of its own, since a program that catches traps goes on behind them."""
         self.most_segments = sum(node[0] == "count" for body in image.bodies for node in statements(body.code))
         self.noted = 1 << (len(image.bodies) + nested).bit_length()
         self.bytes = ENTRY_BYTES * (1 + self.noted + self.most_segments)
@@ -156,6 +158,9 @@ class BodyCounting:
             before = self._w.new(f"load i64, ptr {at}")
             self._w.emit(f"store i64 {self._w.new(f'add i64 {before}, 1')}, ptr {at}")
         self._position = self._standing = self._counting.step(self._segment, number)
+        if self._counting.is_exact:
+            self._segment, self._position = None, NOWHERE
+            self._standing = NOWHERE
 
     def note_position(self) -> None:
         """Writes, where a trap leaves the body, how far that has come."""

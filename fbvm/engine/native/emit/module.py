@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from fbvm.base.areas import BUDGET, MOST_FRAMES
 from fbvm.code.image import Image
+from fbvm.code.operations import caught
 from fbvm.engine.bases import fixed_bases, recursive_bodies
 from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.native.emit import texts as native_texts
@@ -113,8 +114,10 @@ def _translated(image: Image, stops: bool) -> Translation:
         module.marks_at = module.room(-(-image.marks // 16) * 16)
     bodies = [_body(module, number) for number in module.heights]
     tasks = [_task(module, number) for number in range(len(image.tasks))]
+    rows = [f"i32 {caught(code, True)}" for code, _, _ in module.points] if module.attempts else []
+    table = f"@caught = internal constant [{len(rows) + 1} x i32] [{', '.join(['i32 0', *rows])}]"
     routines = [declaration(name) for name in sorted(module.routines)]
-    text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(), ASK,
+    text = "\n".join([*definitions(module.constants), objects(image.objects), *[table] * module.attempts, *bodies, *tasks, *routines, *_declarations(), ASK,
                       ATTRIBUTES, METADATA, *[GUARD] * stops])
     return Translation(text, tuple(module.regions), tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
                        module.counting.facts if module.counting else [], module.marks_at,

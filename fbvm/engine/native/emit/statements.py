@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fbvm.base.areas import DUE
-from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
+from fbvm.base.areas import BUDGET, DUE
+from fbvm.code.operations import SIZES, TEXT_UNITS, WAYS_OUT, Address, Block, Node
 from fbvm.engine.case_tables import FEW_VALUES, case_table
 from fbvm.engine.native.emit.expressions import flag_mask, place
 from fbvm.engine.native.emit.step_charges import charge
 from fbvm.engine.native.emit.stop_checks import observe
 from fbvm.engine.native.emit.texts import in_bytes, keep
-from fbvm.engine.native.emit.writer import TRAPPED, Writer, ir, signed, stored
+from fbvm.engine.native.emit.writer import ENDED, RARE, TRAPPED, Writer, ir, signed, stored
 from fbvm.engine.ranges import is_float
 
 # --- stores ---------------------------------------------------------------------------------------------------------
@@ -205,6 +205,33 @@ def _call(w: Writer, pou: int, address: Address | None) -> None:
     w.begin(good)
 
 
+def _attempt(w: Writer, pou: int, address: Address | None, number: int, traps: bool) -> None:
+    place = w.offset(address, max(1, w.module.image.bodies[pou].instance_size)) if address else "0"
+    w.module.attempts = True
+    left, slot = w.new("load i64, ptr %budget"), w.temporary(number, "u32")
+    result = w.new(f"call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
+    stopped, good, after = w.label("x"), w.label(), w.label()
+    w.emit(f"store i64 {result}, ptr %budget")
+    w.unlikely(w.new(f"icmp slt i64 {result}, {TRAPPED}"), stopped, good)
+    passing = w.passing_on()
+    with w.aside(stopped):
+        point = w.new(f"add i64 {result}, {-ENDED}")
+        row = w.new(f"getelementptr inbounds i32, ptr @caught, i64 {point}")
+        what, over = w.new(f"load i32, ptr {row}"), w.label("x")
+        # as unsigned numbers: 0, which nobody catches, is one less than all others
+        most = 0xFFFFFFFF if traps else max(WAYS_OUT.values())
+        other = w.new(f"icmp uge i32 {w.new(f'sub i32 {what}, 1')}, {most}")
+        w.emit(f"br i1 {other}, label %{passing}, label %{over}, {RARE}")
+        w.emit(f"{over}:")
+        w.emit(f"store i32 {what}, ptr {slot}, align 4")
+        w.emit(f"store i64 {w.system(BUDGET)}, ptr %budget")
+        w.emit(f"br label %{after}")
+    w.begin(good)
+    w.emit(f"store i32 0, ptr {slot}, align 4")
+    w.jump(after)
+    w.begin(after)
+
+
 def _due(w: Writer, a: Node) -> None:
     value = w.value(a)
     sooner, after = w.label(), w.label()
@@ -245,7 +272,7 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
-    "charge": charge, "due": _due, "stop": _stop,
+    "attempt": _attempt, "charge": charge, "due": _due, "stop": _stop,
     "observe": _observe, "count": _count, "mark": _mark,
 }
 """How each statement is written: called with the operands of its row."""

@@ -110,6 +110,8 @@ class Module:
     """Where the bytes for notes of power begin in the context."""
     kept_bytes: int = 0
     scratch_end: int = SCRATCH
+    attempts: bool = False
+    """Whether any of its code catches what has stopped a body."""
     regions: list[AliasScopes] = field(default_factory=list)
     """The accesses of each body that has been written."""
 
