@@ -300,7 +300,7 @@ class _Statements:
         self.block(node.body)
         kind, wanted = self.target(node.code), self.scope.context.exception_codes()
         if kind is not None and kind is not wanted:
-            self.error("S0301", node.code, f"__CATCH gives a {wanted}, and this is {kind}",
+            self.error("S0301", node.code, f"__CATCH gives an {wanted}, and this is {kind}",
                        f"declare it as __SYSTEM.{wanted}")
         self.block(node.handler)
         self.block(node.final or ())
@@ -335,7 +335,8 @@ class _Statements:
 _CHECK: dict[type, Callable[..., None]] = {
     tree.Assign: _Statements._assign, tree.CallStatement: _Statements._call, tree.If: _Statements._if,
     tree.Case: _Statements._case, tree.For: _Statements._for, tree.While: _Statements._while,
-    tree.Repeat: _Statements._repeat, tree.Try: _Statements._try, tree.Exit: _Statements._leave, tree.Continue: _Statements._leave,
+    tree.Repeat: _Statements._repeat, tree.Try: _Statements._try,
+    tree.Exit: _Statements._leave, tree.Continue: _Statements._leave,
     il.InstructionList: _Statements._rungs,
     ladder.Ladder: _Statements._rungs, ladder.Rung: _Statements._rungs, sfc.Sfc: _Statements._sfc,
     tree.Return: _Statements._return, tree.Empty: _Statements._empty, tree.RefusedStatement: _Statements._refused,

@@ -226,6 +226,8 @@ class Maker(Features):
         if loop and what == 6:
             rows = ((self.value("BOOL", 2), (self.said(self.pick(("exit", "continue"))),)),)
             return self.said("if", rows, ())
+        if depth > 0 and what == 17 and self.one_in(2):
+            return self.said("try", self.inner(depth, loop), self.inner(depth, loop), self.pick(((), self.inner(depth, loop))))
         if what == 7 and self.one_in(4):
             return self.said("if", ((self.value("BOOL", 2), (self.said("return"),)),), ())
         if what in (8, 9, 10, 13, 14):

@@ -138,9 +138,11 @@ class Oracle:
         places = passed | {name: (temporaries, name) for name in temporaries}
         places |= {row.name: self._located(row) for row in pou.variables if row.at}
         places |= {name: (self._globals, name) for name in self._globals if name not in variables}
-        with suppress(_Return):
-            self._block(pou.body, (variables, places, pou))
-        temporaries.ended = True
+        try:
+            with suppress(_Return):
+                self._block(pou.body, (variables, places, pou))
+        finally:
+            temporaries.ended = True
 
     def _located(self, row: Variable) -> Place:
         assert row.at
@@ -293,6 +295,20 @@ class Oracle:
             self._at(number)
             if self._value(condition, frame):
                 return
+
+    def _do_try(self, frame: Any, number: int, block: Any, handler: Any, final: Any) -> None:
+        """A trap in the handler ends the program at once; jumps out of both lead through the statements at the end."""
+        leaving: Exception | None = None
+        try:
+            try:
+                self._block(block, frame)
+            except Trapped:
+                self._block(handler, frame)
+        except (_Return, _Exit, _Continue, _Jump) as way:
+            leaving = way
+        self._block(final, frame)
+        if leaving:
+            raise leaving
 
     def _do_exit(self, frame: Any, number: int) -> None:
         raise _Exit

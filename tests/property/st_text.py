@@ -50,6 +50,8 @@ def _pou(pou: Pou, out: list[str], lines: Lines) -> None:
     out.append(f"{pou.kind} {pou.name}" + (f" : {pou.result}" if pou.result else ""))
     for section in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR", "VAR_TEMP"):
         _section(section, [row for row in pou.variables if row.section == section], out)
+    if "('try'," in repr((pou.body, pou.actions)):
+        out.append("VAR x9 : __SYSTEM.ExceptionCode; END_VAR")
     _block(pou.body, 1, out, lines)
     for name, block in pou.actions:
         out.append(f"ACTION {name}:")
@@ -148,6 +150,15 @@ def _statement(statement: Node, depth: int, out: list[str], lines: Lines) -> Non
         say(f"WHILE {value(operands[0])} DO")
         inner(operands[1])
         say("END_WHILE;", -2)
+    elif kind == "try":
+        say("__TRY")
+        inner(operands[0])
+        say("__CATCH(x9)", -1)
+        inner(operands[1])
+        if operands[2]:
+            say("__FINALLY", -1)
+            inner(operands[2])
+        say("__ENDTRY;", -2)
     elif kind == "repeat":
         say("REPEAT", -1)
         inner(operands[0])

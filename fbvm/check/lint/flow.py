@@ -54,9 +54,8 @@ class _Flow:
         if isinstance(statement, tree.For | tree.While | tree.Repeat):
             return self.loop(statement)
         if isinstance(statement, tree.Try):
-            ends = self.block(statement.body)
-            ends = self.block(statement.handler) and ends
-            return self.block(statement.final or ()) or ends
+            both = [self.block(statement.body), self.block(statement.handler)]
+            return self.block(statement.final or ()) or all(both)
         if isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList):
             return self.block(statement.body)
         if isinstance(statement, tree.Exit) and self.left:

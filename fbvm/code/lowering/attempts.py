@@ -1,8 +1,8 @@
 """Lowering of __TRY: its statements become a body of their own, which the operation `attempt` executes.
 
 A jump that leads out of them stops that body, and the body around does it.  With __FINALLY the handler has a body of its own as
-well if something leads out of it, so that __FINALLY comes first.  (CODESYS Development System, Operator: __TRY, __CATCH, __FINALLY,
-__ENDTRY.)"""
+well if something leads out of it, so that __FINALLY comes first.  (CODESYS Development System, Operator: __TRY, __CATCH,
+__FINALLY, __ENDTRY.)"""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ _JUMPS: dict[str, Block] = {"exit": EXIT, "next": (("next",),)}
 
 
 def _try(body: BodyContext, node: tree.Try, site: int) -> None:
-    before = [(form, word, body.to_temporary(("load", form, word))) for form, word in (*frame_stack.kept(body), *pointers.kept(body))]
+    before = [(form, word, body.to_temporary(("load", form, word)))
+              for form, word in (*frame_stack.kept(body), *pointers.kept(body))]
     ways = _ways_out(node.body)
     ended = _attempt(body, node.body, ways, True, site)
     with body.block() as handling:

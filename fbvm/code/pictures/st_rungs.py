@@ -23,8 +23,8 @@ _CHAINS = {"AND": False, "AND_THEN": False, "OR": True, "OR_ELSE": True}
 _COILS = {":=": " ", "S=": "S", "R=": "R"}
 """Signs of assignments, and the marks of coils that do the same."""
 _LEAVES = (tree.NameRef, tree.Member, tree.Index, tree.Direct, tree.Part, tree.Literal, tree.Deref)
-_NAMES = {"If": "IF", "For": "FOR", "While": "WHILE", "Repeat": "REPEAT", "Case": "CASE", "Try": "__TRY", "Return": "RETURN", "Exit": "EXIT",
-          "Assign": "this assignment", "CallStatement": "this call"}
+_NAMES = {"If": "IF", "For": "FOR", "While": "WHILE", "Repeat": "REPEAT", "Case": "CASE", "Try": "__TRY", "Return": "RETURN",
+          "Exit": "EXIT", "Assign": "this assignment", "CallStatement": "this call"}
 
 
 class NoRung(Exception):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import linecache
 import marshal
 import sys
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
@@ -195,6 +195,7 @@ class PythonEngine:
         """The notes of power of an image that has them."""
         self.substitutes: dict[int, Callable[[int], None]] = {}
         self._numbers = {function_name(number, body): number for number, body in enumerate(image.bodies)}
+        self._parts = frozenset(number for number, body in enumerate(image.bodies) if body.is_part)
         self._allowance = WHOLE_BUDGET
         self._spaces: list[dict[str, Any]] = []
         """The names of generated code, of each build that is bound."""
@@ -209,7 +210,8 @@ class PythonEngine:
         """The bodies of a program over this memory."""
         log = self._log if program.build is Build.LOGGED else None
         names = environment(self.memory, self.image.objects) | program.constants | (log.names if log else {})
-        names["counts"], names["marks"], names["caught"] = self.counted, self.marks, self._caught
+        names["counts"], names["marks"] = self.counted, self.marks
+        names["caught"] = partial(_caught, self._numbers, self._parts, self._system)
         for number, machines in program.own.items():
             if machines:
                 names[f"own{number}"] = OwnViews(self.memory, machines)
@@ -312,23 +314,6 @@ class PythonEngine:
     def _instance(self, body: int, base: int) -> int:
         return NO_INSTANCE if self.image.bodies[body].kind == "FUNCTION" else base
 
-    def _caught(self, stop: Stop, traps: bool) -> tuple[int, int, list[tuple[int, int]]]:
-        """Called by an attempt with what has stopped the body: what it gives; how many steps are left; and the bodies that have
-        ended with it, as number and instance, the innermost first, without parts of others.  Raises what it does not catch."""
-        number = caught(stop.code, traps)
-        if not number:
-            raise stop
-        ended: dict[int, tuple[int, int]] = {}
-        left, at = None, stop.__traceback__ and stop.__traceback__.tb_next
-        while at is not None:
-            names, body = at.tb_frame.f_locals, self._numbers.get(at.tb_frame.f_code.co_name)
-            if body is not None:
-                left = names.get("n")
-                if not self.image.bodies[body].is_part:
-                    ended[id(at.tb_frame)] = body, names["b1"]
-            at = at.tb_next
-        return number, self._system[BUDGET // 8] if left is None else left, [*ended.values()][::-1]
-
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         """Executes a task step by step: a generator of observations, which returns what `run` returns.
 
@@ -417,6 +402,27 @@ class PythonEngine:
             return trap(self.image, stop.code, stop.site, stop.values, self._stopped(stop)[0])
         return None
 
+
+def _caught(numbers: Mapping[str, int], parts: Set[int], system: memoryview, stop: Stop,
+            traps: bool) -> tuple[int, int, list[tuple[int, int]]]:  # fmt: skip
+    """Called by generated code with what has stopped the body of an attempt: what the attempt gives; how many steps are left;
+    and the bodies that have ended with it, as number and instance, the innermost first, without parts of others.
+
+    Raises what it does not catch.  `numbers` are those of the bodies by the names of their functions, `parts` those of bodies that
+    are parts of others."""
+    number = caught(stop.code, traps)
+    if not number:
+        raise stop
+    ended: dict[int, tuple[int, int]] = {}
+    left, at = None, stop.__traceback__ and stop.__traceback__.tb_next
+    while at is not None:
+        names, body = at.tb_frame.f_locals, numbers.get(at.tb_frame.f_code.co_name)
+        if body is not None:
+            left = names.get("n")
+            if body not in parts:
+                ended[id(at.tb_frame)] = body, names["b1"]
+        at = at.tb_next
+    return number, system[BUDGET // 8] if left is None else left, [*ended.values()][::-1]
 
 
 def _counting(function: Callable[[int], None], system: memoryview) -> Callable[[int, int], int]:

@@ -357,7 +357,7 @@ def _note_write(x: Execution, state: State, site: int, form: str | tuple[str, in
 
 STATEMENT_ROWS: dict[str, Row] = {
     "store": _store, "store_raw": _store, "store_bit": _store_bit, "store_flag": _store_flag, "store_text": _store_text,
-    "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let, "call": _call, "attempt": _attempt, "charge": _charge, "stop": _stop,
-    "due": _due, "observe": _observe,
+    "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let, "call": _call, "attempt": _attempt, "charge": _charge,
+    "stop": _stop, "due": _due, "observe": _observe,
 }  # fmt: skip
 """How each statement that does not part paths changes a state: called with the operands of its row."""

@@ -20,7 +20,8 @@ STACK_LIMIT = 4000
 
 NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "TRY", "STRUCT", "UNION", "ARRAY", "REF_TO",
                      "POINTER", "REFERENCE"))
-DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "CATCH", "FINALLY", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT", "END_TRY",
+DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "CATCH", "FINALLY", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
+                      "END_TRY",
                       "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION", "END_TRANSITION", "END_CLASS",
                       "END_METHOD", "END_ACCESSOR", "END_NAMESPACE", "END_PROPERTY"))
 """Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the

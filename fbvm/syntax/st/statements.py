@@ -210,4 +210,5 @@ class Statements(Expressions):
                       last: Token | None, final: Items | None, end: Token) -> Statement:
         self.forms.append(Form("no_exceptions", word.start, word.end, None, (
             "S0195", "__TRY is CODESYS's, and the tool of this dialect refuses it", "check before what may go wrong")))
-        return Try(word.start, end.end, self.block(items), code, self.block(handler), None if final is None else self.block(final))
+        rest = None if final is None else self.block(final)
+        return Try(word.start, end.end, self.block(items), code, self.block(handler), rest)

@@ -225,7 +225,6 @@ class Empty(Statement):
 @_node
 class Try(Statement):
     """`__TRY body __CATCH(code) handler __FINALLY final __ENDTRY`: `final` is None without __FINALLY."""
-
     body: Block
     code: Expr
     handler: Block

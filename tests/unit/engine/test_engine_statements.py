@@ -89,6 +89,24 @@ def test_a_trap_inside_a_call_ends_all() -> None:
     assert rig.trap.message == "R0109 Main.st:12:5 in Main: FOR step is zero"
 
 
+def test_an_attempt_gives_what_has_ended_its_body() -> None:
+    tried = ("let", 2, "i16", const("i16", 7))
+    ways = ((add(0, const("i16", 1)), ("charge", 3, 1)), (("stop", "R0110", 12),), (("stop", "exit", 12),))
+    given = []
+    for way in ways:
+        rig = execute((("attempt", 1, None, 1, True), ("store", "u32", at(4), ("tmp", "u32", 1)), tried), way, budget=50)
+        assert rig.trap is None
+        given.append((rig.slot("u32", 4), rig.memory.read(BUDGET, "i64")))
+    assert given == [(0, 47), (0x51, 50), (2, 50)]
+
+
+def test_an_attempt_lets_pass_what_it_does_not_catch() -> None:
+    """The step budget, whatever a program stops itself by, and traps where only ways out are caught."""
+    for code, traps in (("R0104", True), ("R0120", True), ("R0101", False)):
+        rig = execute((("attempt", 1, None, 1, traps), add(0, const("i16", 1))), (("stop", code, 12),))
+        assert rig.trap is not None and (rig.trap.code, rig.trap.site.line, rig.slot("i16")) == (code, 12, 0)
+
+
 def test_the_budget_is_stored_also_where_it_ends() -> None:
     rig = execute((("charge", 3, 1), ("charge", 4, 2)), budget=5)
     assert rig.memory.read(BUDGET, "i64") == -2
@@ -189,7 +207,7 @@ def test_a_memory_that_is_too_small_is_refused() -> None:
 
 def test_every_statement_has_an_example() -> None:
     executed = set().union(*(operations_in(code) for _, code, _, _ in PROGRAMS), operations_in(OBSERVED))
-    assert executed | {"case", "call", "due"} >= set(STATEMENTS)
+    assert executed | {"case", "call", "attempt", "due"} >= set(STATEMENTS)
 
 
 MESSAGES: list[tuple[str, Node, str]] = [

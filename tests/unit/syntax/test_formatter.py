@@ -229,9 +229,19 @@ def test_lines_of_a_comment_keep_their_places_to_one_another() -> None:
     assert shifted("(* a\n\tb *)", 2) == ["(* a", "      b *)"]
 
 
-def test_what_is_refused_is_not_touched() -> None:
-    refused = "__TRY\n   x:=1 ;\n__CATCH(e)\n__ENDTRY"
-    assert body(refused + "\na;") == refused + "\na;\n"
+def test_each_part_of_try_stands_by_itself() -> None:
+    assert body("__try x:=1; (* one *)\n // of the handler\n__catch ( e ) y:=2 ; __finally // last\n z:=3; __endtry a;") == """\
+__TRY
+    x := 1;  (* one *)
+    // of the handler
+__CATCH(e)
+    y := 2;
+__FINALLY  // last
+    z := 3;
+__ENDTRY;
+a;
+"""
+    assert body("__TRY __CATCH(e) __ENDTRY; a;") == "__TRY\n__CATCH(e)\n__ENDTRY;\na;\n"
 
 
 # --- namespaces ---
