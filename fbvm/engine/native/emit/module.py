@@ -117,8 +117,8 @@ def _translated(image: Image, stops: bool) -> Translation:
     rows = [f"i32 {caught(code, True)}" for code, _, _ in module.points] if module.attempts else []
     table = f"@caught = internal constant [{len(rows) + 1} x i32] [{', '.join(['i32 0', *rows])}]"
     routines = [declaration(name) for name in sorted(module.routines)]
-    text = "\n".join([*definitions(module.constants), objects(image.objects), *[table] * module.attempts, *bodies, *tasks, *routines,
-                      *_declarations(), ASK, ATTRIBUTES, METADATA, *[GUARD] * stops])
+    text = "\n".join([*definitions(module.constants), objects(image.objects), *[table] * module.attempts, *bodies, *tasks,
+                      *routines, *_declarations(), ASK, ATTRIBUTES, METADATA, *[GUARD] * stops])
     return Translation(text, tuple(module.regions), tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
                        module.counting.facts if module.counting else [], module.marks_at,
                        tuple(sorted(module.routines)))
