@@ -20,8 +20,8 @@ MOST_STATEMENTS = 40
 TOO_MANY = MOST_STATEMENTS + 1
 LEAST_GROWTH, GROWTH = 200, 0.25
 """Statements that the bodies of an image may grow by: so many, or this share of what they have."""
-CALLED = {"return", "mark"}
-"""Statements whose bodies are always called: one leaves its body, the other asks where the instance begins."""
+CALLED = {"return", "mark", "attempt"}
+"""Statements whose bodies are always called: they leave their body, ask where its instance begins, or catch a trap in it."""
 
 
 class Inlining:
@@ -79,7 +79,8 @@ class _Writer:
 
     def __init__(self, inlining: Inlining, code: Block) -> None:
         self._inlining = inlining
-        self._numbers = 1 + max((node[1] for node in statements(code) if node[0] == "let"), default=-1)
+        self._numbers = 1 + max((node[1] if node[0] == "let" else node[3] for node in statements(code)
+                                 if node[0] in ("let", "attempt")), default=-1)  # fmt: skip
         self.code = self._block(code)
 
     def _block(self, block: Block) -> Block:

@@ -58,8 +58,8 @@ def _attempt(body: BodyContext, block: tree.Block, ways: Mapping[tree.Statement,
     frame_stack.enter_part(part)
     part.lower(block)
     size = pou.type.size if pou.type is not None else 0
-    name = f"{pou.name} __TRY {body.program.sites[site].line}:{body.program.sites[site].column}"
-    number = body.program.add_part(Body(name if traps else f"{name} __CATCH", pou.kind, with_costs(tuple(part.out)), size, True))
+    name = f"{pou.name} {'__TRY' if traps else '__CATCH'}"
+    number = body.program.add_part(Body(name, pou.kind, with_costs(tuple(part.out)), size, True))
     ended = body.new_temporary()
     body.emit(("attempt", number, None if pou.kind == "FUNCTION" else ("self", 0, ()), ended, traps))
     return ("tmp", "u32", ended)

@@ -72,8 +72,8 @@ class Program:
         return replace(self._objects, extents=(*self._objects.extents, *self._area_objects.values()))
 
     def add_part(self, body: Body) -> int:
-        """Adds the body of a part of a POU.  Returns its number."""
-        self.parts.append(body)
+        """Adds the body of a part of a POU, whose name gets a number behind it.  Returns the number of the body."""
+        self.parts.append(replace(body, name=f"{body.name} {1 + len(self.parts)}"))
         return len(self.checker.bodies) + len(self.parts) - 1
 
     # --- where things lie ---------------------------------------------------------------------------------------------

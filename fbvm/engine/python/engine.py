@@ -405,11 +405,11 @@ class PythonEngine:
 
 def _caught(numbers: Mapping[str, int], parts: Set[int], system: memoryview, stop: Stop,
             traps: bool) -> tuple[int, int, list[tuple[int, int]]]:  # fmt: skip
-    """Called by generated code with what has stopped the body of an attempt: what that gives; how many steps are left;
+    """Called by generated code with what has stopped the body of an attempt: what it gives; how many steps are left;
     and the bodies that have ended with it, as number and instance, the innermost first, without parts of others.
 
-    Raises what it does not catch.  `numbers` are those of the bodies by the names of their functions, `parts` those of bodies that
-    are parts of others."""
+    Raises what it does not catch.  `numbers` are those of the bodies by the names of their functions, `parts` those of bodies
+    that are parts of others."""
     number = caught(stop.code, traps)
     if not number:
         raise stop
