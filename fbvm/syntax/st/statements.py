@@ -208,7 +208,7 @@ class Statements(Expressions):
 
     def try_statement(self, word: Token, items: Items, catch: Token, opening: Token, code: Expr, closing: Token, handler: Items,
                       last: Token | None, final: Items | None, end: Token) -> Statement:
-        self.forms.append(Form("no_exceptions", word.start, word.end, None, (
-            "S0195", "__TRY is CODESYS's, and the tool of this dialect refuses it", "check before what may go wrong")))
+        self.forms.append(Form("exceptions", word.start, word.end, (
+            "S0195", "__TRY is CODESYS's: the standard and other compilers do not have it", "check before what may go wrong")))
         rest = None if final is None else self.block(final)
         return Try(word.start, end.end, self.block(items), code, self.block(handler), rest)
