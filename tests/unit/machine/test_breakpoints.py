@@ -412,3 +412,22 @@ def test_of_what_is_large_the_part_that_changed_is_told() -> None:
         "Main.Zones[1, 2] was (Jams := 0, Level := 0.0), is (Jams := 7, Level := 1.5)",
         "Main.Zones[1, 1].Level was 0.0, is nan",
     ]  # fmt: skip
+
+
+def test_breakpoints_are_set_again_on_another_plc_and_removed() -> None:
+    first, second = (Plc(image(), engine="python") for _ in range(2))
+    points = first.breakpoints
+    made = [points.line("text.st:18", "i = 4", "= 2"), points.line("Adder", message="n is {n}"),
+            points.change("Main.g.n", "Main.i > 0", "3"), points.condition("Main.x > 1.0", "1"), points.statement()]
+    assert list(points) == made and len(points) == 5 and [str(each) for each in made] == [
+        "text.st:18 when i = 4", "text.st:4", "Main.g.n when Main.i > 0", "Main.x > 1.0", "the next statement"]
+    assert [second.breakpoints.put(each) for each in made] == made
+    assert [each.kind for each in second.breakpoints] == ["line", "line", "change", "condition", "statement"]
+    second.breakpoints.remove(made[-1])
+    assert list(second.breakpoints) == made[:-1] and second.breakpoints.armed
+    reasons = [halt.reasons for halt in halts(second, 6)]
+    assert reasons[0] == ("breakpoint text.st:18 when i = 4",) and ("Main.x > 1.0 holds",) in reasons
+    second.breakpoints.clear()
+    assert not second.breakpoints.armed and second.run(scans=2) == "scans"
+    with pytest.raises(KeyError):
+        second.breakpoints.remove(made[0])

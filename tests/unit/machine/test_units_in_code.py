@@ -182,6 +182,20 @@ def test_the_only_trap_of_a_program_ends_it(body: str, trap: str, do: Callable[[
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("do", [lambda plc: plc.scan(), lambda plc: plc.run(scans=50)], ids=["scan", "run"])
+def test_a_scan_that_has_no_steps_left_for_its_program_ends(do: Callable[[Plc], object]) -> None:
+    code = compile_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; n := n + 1; n := n + 1; END_PROGRAM").image
+    assert code is not None
+    rigs = four(code, (0,))
+    agree(rigs, lambda plc: plc.run(scans=10))
+    for rig in rigs:
+        rig.plc.budget = 1
+    agree(rigs, do)
+    trap = rigs[0].plc.trap
+    assert (rigs[0].plc.scans, trap and trap.code, rigs[0].plc.read("Main.n")) == (11, "R0104", 30)
+
+
+@pytest.mark.slow
 def test_a_trap_of_a_units_program_is_a_fault_of_ours() -> None:
     for rig in four(image(every=50), (0, 0)):
         rig.plc.run(scans=10)
