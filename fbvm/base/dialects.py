@@ -92,6 +92,7 @@ class Dialect:
     times_are_numbers: bool = False
     short_addresses: bool = False
     dates_take_durations: bool = False
+    callables_apart: bool = False
     short_names: bool = False
     own_time: bool = False
     short_circuit_words: bool = False
@@ -100,6 +101,8 @@ class Dialect:
     functions_have_inputs: bool = False
     plain_names: bool = False
     locals_hide_results: bool = False
+    offered: bool = True
+    """Whether hints for sources of any tool name it."""
 
 
 QUESTIONS = {
@@ -219,6 +222,8 @@ QUESTIONS = {
                         "pointer"),
     "dates_take_durations": ("D#2024-12-31 + T#1d: a DATE and a TIME", "an error",
                              "the DATE so much later or earlier, which may have hours in it"),
+    "callables_apart": ("DAY_OF_MONTH(d), where a variable that is no instance has the name of the function", "an error",
+                        "the function"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
     "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
     "short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken, with a warning (S0195)", "taken"),
@@ -268,6 +273,8 @@ _ROWS = (
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
             libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit"), unsigned_ltime=True,
             large_memory=True),
+    replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
+            libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
@@ -294,7 +301,7 @@ _ROWS = (
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
 DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}
-SWITCHES = tuple(f.name for f in fields(Dialect) if f.name not in ("name", "for_whom"))
+SWITCHES = tuple(f.name for f in fields(Dialect) if f.name not in ("name", "for_whom", "offered"))
 
 
 def dialect(name: str) -> Dialect:
@@ -306,7 +313,7 @@ def dialect(name: str) -> Dialect:
 
 def takers(switch: str, value: bool = True) -> str:
     """The option for a dialect with a switch set, or not set, for hints: `--dialect codesys, twincat or rusty`."""
-    return option(row for row in DIALECTS.values() if bool(getattr(row, switch)) is value)
+    return option(row for row in DIALECTS.values() if row.offered and bool(getattr(row, switch)) is value)
 
 
 def option(rows: Iterable[Dialect]) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from fbvm.base.diagnostics import Source
 
-FAMILIES = {"beremiz": "matiec", "codesys": "codesys", "twincat": "twincat"}
+FAMILIES = {"beremiz": "matiec", "codesys": "codesys", "codesys2": "codesys2", "twincat": "twincat"}
 """Families of tools that write documents, and the dialect of their programs."""
 SIGNS = (
     ("twincat", r"\bTc[23]_\w+|\bT_MaxString\b|\bFB_(?:FormatString|File\w+|LocalSystemTime)\b|\bADSLOGSTR\b"),
@@ -30,14 +30,14 @@ SIGNS = (
 COMMENTS = (("codesys", r"\(\*\s*@(?:NESTEDCOMMENTS|PATH|OBJECTFLAGS|SYMFILEFLAGS|GLOBAL_VARIABLE_LIST)\b"),)
 """The same for comments, in which exports of CODESYS 2.3 keep what they know of an object."""
 FILES = (
-    ("codesys", r"(?i)\.exp$"),
+    ("codesys2", r"(?i)\.exp$"),
     ("matiec", r"(?:^|[/\\])pous[/\\](?:programs|functions|function-blocks)[/\\]"),
 )
 """Dialects, and patterns of names of files: exports of CODESYS 2.3, folders of OpenPLC Editor."""
 PREFERRED = ("codesys", "twincat", "matiec", "rusty", "strucpp", "omron")
 """Of dialects with as many signs the first one is taken."""
 _COMMENTS = re.compile(r"(?s)//[^\n]*|\(\*.*?\*\)|(')(?:\$.|[^'$\n])*'")
-_MAKERS = {"codesys": "CODESYS 2.3", "matiec": "OpenPLC Editor"}
+_MAKERS = {"codesys2": "CODESYS 2.3", "matiec": "OpenPLC Editor"}
 
 
 @dataclass(frozen=True)

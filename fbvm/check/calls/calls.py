@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.dialects import takers
-from fbvm.base.types import ArrayType, RefType, StructType, Type, fold
+from fbvm.base.types import ArrayType, Elementary, EnumType, RefType, StringType, StructType, Type, base, fold
 from fbvm.check.calls import generics, methods, standard
 from fbvm.check.calls.binding import bind, bind_inputs
 from fbvm.check.expressions import names, objects, qualified
@@ -33,7 +33,7 @@ def statement(scope: Scope, call: tree.Call) -> None:
 def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -> Type | str | None:
     """The result's type, "" for a call without result, None after a diagnostic."""
     callee = call.callee
-    variable = scope.variable(callee.text) if isinstance(callee, tree.NameRef) else None
+    variable = _called_variable(scope, callee) if isinstance(callee, tree.NameRef) else None
     name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(scope, callee)
     if (named := action(scope, callee)) is not None:
         return _bind_action(scope, call, named)
@@ -58,6 +58,17 @@ def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -
         _arguments_alone(scope, call)
         return None
     return standard.call(scope, call, fold(name), want, as_value)
+
+
+def _called_variable(scope: Scope, name: tree.NameRef) -> Variable | None:
+    """The variable that a call names; None if a dialect calls the function of its name, since the variable cannot be called."""
+    variable = scope.variable(name.text)
+    if variable is None or not scope.dialect.callables_apart or \
+            not isinstance(base(variable.type), Elementary | StringType | EnumType):
+        return variable
+    pou = scope.project.pou(variable.name, scope.source)
+    is_function = pou.is_function if pou is not None else standard.is_known(fold(variable.name))
+    return None if is_function else variable
 
 
 def action(scope: Scope, callee: tree.Expr) -> tuple[Pou, tree.Expr | None] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.base.dialects import takers
+from fbvm.base.dialects import Dialect, takers
 from fbvm.base.types import (
     BOOL,
     DATE,
@@ -16,6 +16,8 @@ from fbvm.base.types import (
     REAL,
     TIME,
     TOD,
+    UDINT,
+    USINT,
     Elementary,
     EnumType,
     RefType,
@@ -218,7 +220,7 @@ def _as_numbers(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: 
     timed = _nanoseconds(scope, expr, left, right)
     if timed is not None:
         return scope.infer(timed)
-    a, b = as_number(left, dialect), as_number(right, dialect)
+    a, b = _numbers(expr.op, left, right, dialect)
     if (a, b) == (left, right) or _is_strict(expr, left, right):
         return None
     kind = _operand_type(scope, expr, a, b, want)
@@ -231,6 +233,13 @@ def _as_numbers(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: 
     keeps = left != a and right in (left, UNTYPED_INT) and machine(kind) == machine(left)
     result = left if keeps else kind
     return _folded(scope, expr, kind, BOOL if expr.op in COMPARISONS else result)
+
+
+def _numbers(op: str, left: Type, right: Type, dialect: Dialect) -> tuple[Type, Type]:
+    """Both types as the numbers that a dialect takes them for; a BOOL is one beside a number with which it is compared."""
+    if op in COMPARISONS and dialect.narrowing and (left == BOOL) is not (right == BOOL):
+        left, right = (USINT if kind == BOOL else kind for kind in (left, right))
+    return as_number(left, dialect), as_number(right, dialect)
 
 
 def _beside_duration(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> tree.Binary | None:
@@ -274,7 +283,8 @@ def _beside_reference(scope: Scope, expr: tree.Binary, side: tree.Expr) -> Type:
     kind = scope.facts.types[side]
     if kind is UNTYPED_INT:
         null = expr.op in COMPARISONS and scope.facts.constants[side] == 0
-        kind = scope.adopt(side, NULL if null else LINT) or kind
+        number = UDINT if expr.op in COMPARISONS and scope.dialect.short_addresses else LINT
+        kind = scope.adopt(side, NULL if null else number) or kind
     return kind
 
 
@@ -285,6 +295,10 @@ def _chained(scope: Scope, expr: tree.Binary, right: Type) -> bool:
         return False
     text = scope.text
     if scope.source.text[first.start:first.start + 1] != "(":
+        if scope.dialect.narrowing:
+            scope.error("S0193", expr, f"this compares a BOOL, 0 or 1, with {right}",
+                        f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}")
+            return False
         scope.error("S0302", expr, f"{expr.op} is not defined for BOOL and {right}",
                     f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}")
         return True

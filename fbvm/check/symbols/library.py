@@ -282,7 +282,7 @@ class Libraries:
         return any(isinstance(each, Source) and pattern.search(each.text) is not None for each in texts)
 
     def is_by_dialect(self, name: str) -> bool:
-        """True for a library whose blocks stand in place of others in what users write, and not in libraries."""
+        """True for a library whose blocks stand in place of others in what users write, and not in shipped libraries."""
         return self._libraries[name].by_dialect
 
     def block_names(self) -> list[str]:

@@ -246,8 +246,9 @@ class SymbolTable:
         """The libraries whose names `source` sees, nearest first, "" for the user's own names, which a library never sees."""
         own = source.library
         if own not in self._owners:
+            shipped = bool(own) and self.libraries.is_shipped(own)
             others = [name for name in self.libraries.names if name != own]
-            self._owners[own] = own, *(name for name in others if not (own and self.libraries.is_by_dialect(name)))
+            self._owners[own] = own, *(name for name in others if not (shipped and self.libraries.is_by_dialect(name)))
         return self._owners[own]
 
     def _load(self, name: str, owner: str) -> None:

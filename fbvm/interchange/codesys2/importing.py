@@ -15,7 +15,7 @@ from fbvm.interchange.imported import Imported
 from fbvm.interchange.source_files import SourceFiles
 from fbvm.syntax.text import decode
 
-FAMILY = "codesys"
+FAMILY = "codesys2"
 _MARKS = re.compile(r"(?ms)^\(\* @[A-Z_]+ := .*?\*\)[ \t]*\r?\n?")
 _FRONT = re.compile(r"(?m)(?:^\(\* @(?:NESTEDCOMMENTS|GLOBAL_VARIABLE_LIST|PATH|OBJECTFLAGS|SYMFILEFLAGS) := .*\r?\n)+")
 """The marks in front of an object."""

@@ -77,11 +77,11 @@ def test_an_export_runs_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "project.exp"
     path.write_bytes(EXPORT.encode("cp1252").replace(b"\n", b"\r\n"))
     made = within(path)
-    assert made is not None and usual_dialect([path]) == "codesys"
+    assert made is not None and usual_dialect([path]) == "codesys2"
     source, = made.sources
     assert source.text.count("\n") == EXPORT.count("\n")
     assert [said.message for said in made.diagnostics] == ["the task Fast is not taken over"]
-    compiled = compile_sources([source], runnable=True, dialect="codesys")
+    compiled = compile_sources([source], runnable=True, dialect="codesys2")
     assert compiled.image is not None
     plc = Plc(compiled.image)
     for expected in (2, 6, 14):
@@ -94,7 +94,7 @@ def test_an_import_of_an_export_makes_a_file_of_each_object() -> None:
     made = import_codesys2(EXPORT.encode(), "project.exp")
     assert list(made.files) == ["Doubler.st", "PLC_PRG.st", "Settings.st"] and not made.errors
     assert made.files["Doubler.st"].endswith("END_ACTION\n") and "@" not in "".join(made.files.values())
-    assert compile_sources(made.sources, runnable=True, dialect="codesys").image is not None
+    assert compile_sources(made.sources, runnable=True, dialect="codesys2").image is not None
 
 
 def test_a_diagram_of_an_export_is_refused_by_name() -> None:
@@ -132,7 +132,7 @@ def test_a_library_is_read_and_found_by_name(tmp_path: Path) -> None:
     assert "für alle" in (tmp_path / "libs" / "own" / "Limits.st").read_text(encoding="utf-8")
     program = Source("main.st", "PROGRAM Main VAR p : Pair := (a := 2, b := 9); n, top : INT; t : Twice; END_VAR\n"
                      "n := Sum(p); top := HIGHEST; t(n := n); END_PROGRAM")
-    image = compile_sources([program], runnable=True, dialect="codesys", libraries=[tmp_path / "libs"]).image
+    image = compile_sources([program], runnable=True, dialect="codesys2", libraries=[tmp_path / "libs"]).image
     assert image is not None
     plc = Plc(image)
     plc.scan()

@@ -39,7 +39,7 @@ def test_constructs_tell_the_dialect(text: str, dialect: str) -> None:
     assert ("main.st" in found.because) == (dialect != "standard")
 
 
-@each_of(("name", "dialect"), [("LIB/FILL.EXP", "codesys"), ("plc/pous/programs/main.st", "matiec"),
+@each_of(("name", "dialect"), [("LIB/FILL.EXP", "codesys2"), ("plc/pous/programs/main.st", "matiec"),
                             ("plc/programs/main.st", "standard")])
 def test_names_of_files_tell_the_dialect(name: str, dialect: str) -> None:
     found = guessed([], [Source(name, "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM")])
