@@ -30,12 +30,11 @@ MOST_CAPTURE_BYTES = 2 << 20
 
 @dataclass
 class Traffic:
-    """What has passed between two addresses: how many frames, and the last of them with its scan."""
+    """What has passed between two addresses: how many frames, and the last of them."""
 
     one: str
     other: str
     frames: int = 0
-    scan: int = 0
     info: str = ""
 
 
@@ -171,6 +170,6 @@ class LivePlc:
             for packet in self._dissector.dissect(now_ns, event):
                 one, other = sorted((packet.source.host, packet.destination.host))
                 known = self.traffic.setdefault(f"{one} {other}", Traffic(one, other))
-                known.frames, known.scan, known.info = known.frames + 1, self.plc.scans, packet.info
+                known.frames, known.info = known.frames + 1, packet.info
                 self.packets.append((self.frames, self.plc.scans, packet))
                 self.frames += 1

@@ -52,7 +52,8 @@ def test_shapes_texts_gradients_and_styles_stay_with_ids_of_their_own() -> None:
     svg, left_out = cleaned('<defs><linearGradient id="watch"><stop offset="1" style="stop-color:#fff"/></linearGradient></defs>'
                             '<rect id="log" style="fill:url(#watch);stroke:red;-inkscape-x:1"/><use href="#log"/>'
                             '<text x="1">a &lt;b&gt;<tspan>c</tspan> d</text>')  # fmt: skip
-    assert left_out == []
+    assert left_out == [] and svg.startswith("<svg ") and svg.count('xmlns="http://www.w3.org/2000/svg"') == 1
+    assert 'viewBox="0 0 9 9"' in svg
     assert 'id="m-watch"' in svg and 'fill="url(#m-watch)"' in svg and 'href="#m-log"' in svg and 'stop-color="#fff"' in svg
     assert 'stroke="red"' in svg and "a &lt;b&gt;<tspan>c</tspan> d" in svg
 

@@ -6,6 +6,7 @@ import json
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
+from types import SimpleNamespace
 
 import pytest
 from browsers import Page, frame
@@ -116,3 +117,58 @@ def test_a_file_comes_whole_over_a_socket(host: LiveHost) -> None:
             host.serve(0)
     head, _, body = answer.partition(b"\r\n\r\n")
     assert f"Content-Length: {len(body)}".encode() in head and body.endswith(b"new Page();\n")
+
+
+def test_pages_are_told_that_fbvm_has_ended() -> None:
+    host = LiveHost(Page().bench, token="t")
+    with opened(host) as sock, called(host) as waiting:
+        for one in (sock, waiting):
+            one.settimeout(5)
+        assert b'"re":1' in sock.recv(65536)
+        host.close()
+        told = sock.recv(65536)
+        assert told[0] == 0x88 and b"fbvm has ended" in told and sock.recv(10) == b"" and waiting.recv(10) == b""
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", host.server.guard.port))
+
+
+def test_pages_that_are_open_begin_again_with_other_plcs(host: LiveHost) -> None:
+    with opened(host) as sock:
+        sock.settimeout(5)
+        assert b'"re":1' in sock.recv(65536)
+        other = Page().bench
+        host.show(other)
+        [session] = host.server.sessions
+        assert session.live is other.plcs["pump"]
+        host.update(UPDATE_NS, lambda: False)
+        assert b'{"update":{"restarted":true}}' in sock.recv(65536)
+        other.control.pause()
+        host.after_scan(0, 0)
+        assert host.address.startswith(f"http://127.0.0.1:{host.server.guard.port}/") and "token=t" in host.address
+
+
+def test_who_had_no_turn_is_the_first_at_the_next(host: LiveHost) -> None:
+    with opened(host) as one, opened(host) as two:
+        for sock in (one, two):
+            sock.settimeout(5)
+            sock.recv(65536)
+        first, second = host.server.sessions
+        host.update(UPDATE_NS, lambda: True)
+        while first.is_behind:
+            host.update(UPDATE_NS, lambda: True)
+        assert b'"update"' in one.recv(65536) and host.server.sessions == [second, first]
+
+
+def test_once_in_100_ms_the_run_ticks_and_every_300_files_are_looked_at() -> None:
+    ticks: list[str] = []
+    page = Page()
+    page.bench.changes = SimpleNamespace(look=lambda: ticks.append("look"), step=lambda: ticks.append("step"))  # type: ignore[assignment]
+    host = LiveHost(page.bench, token="t", tick=lambda: ticks.append("tick"))
+    try:
+        for number in range(1, 14):
+            host.update(number * UPDATE_NS // 2, lambda: False)
+        assert ticks == ["tick", "tick", "tick", "look", "tick", "tick", "tick", "look"]
+        host.serve(0)
+        assert ticks[-1] == "step"
+    finally:
+        host.close()

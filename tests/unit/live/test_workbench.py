@@ -1,0 +1,264 @@
+"""What pages may ask of a run, up to its bounds, what is refused in words, and the panels of an update."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from browsers import PUMP, Page
+from rows import each_of
+
+from fbvm import LoopNetwork, Peer
+from fbvm.live.messages import MOST_NAMES, MOST_TEXT
+from fbvm.live.plcs import MOST_CAPTURE_BYTES
+from fbvm.live.updates import ACTS, MEMORY_WORDS, MOST_SHOWN, UPDATE_NS, VIEW_NS
+from fbvm.live.workbench import FASTEST, MOST_STEPS, SLOWEST
+from fbvm.wire.tap import TapEvent, TapKind
+
+CHART = """PROGRAM Main
+VAR go : BOOL; n : INT; END_VAR
+INITIAL_STEP Dark: END_STEP
+STEP Bright: Count(N); END_STEP
+TRANSITION FROM Dark TO Bright := go; END_TRANSITION
+TRANSITION FROM Bright TO Dark := NOT go; END_TRANSITION
+ACTION Count: n := n + 1; END_ACTION
+END_PROGRAM"""
+
+
+def opened(text: str = PUMP, **settings: Any) -> Page:
+    page = Page(text, **settings)
+    page.done("hello", version=1)
+    return page
+
+
+@pytest.fixture
+def page() -> Page:
+    return opened()
+
+
+@each_of(("do", "fields", "said"), [
+    ("step", {"scans": 0}, "a step has 1 to 100,000 scans, not 0"), ("step", {"scans": MOST_STEPS + 1}, "not 100001"),
+    ("speed", {"factor": SLOWEST / 2}, "a speed is 0, as fast as it goes, or 0.001 to 1000"),
+    ("speed", {"factor": -1}, "a speed"), ("speed", {"factor": FASTEST * 1.01}, "a speed is"),
+    ("start", {"plc": "pump", "kind": "lukewarm"}, "warm or cold"), ("mode", {"plc": "pump", "mode": "MONITOR"}, "a mode is"),
+    ("look", {"plc": "none"}, "there is no PLC 'none'; there are pump"),
+    ("look", {"plc": "pump", "memory": "ZZ"}, "no area 'ZZ'"), ("branch", {"plc": "pump"}, "look at a scan of the present run"),
+    ("cable", {"plc": "pump", "unit": "ETN21 7", "plugged": True}, "there is no unit 'ETN21 7' in pump"),
+    ("fault", {"kind": "gone"}, "there is no fault 'gone'; there are"), ("mend", {"number": 0}, "there is no fault 0"),
+    ("fault", {"kind": "lossy", "percent": 101}, "101 is not 0 to 100 percent"),
+    ("fault", {"kind": "lossy", "percent": -1}, "-1 is"),
+    ("fault", {"kind": "slow", "time": "0s"}, "0s is not a time that can pass"),
+    ("unbreak", {"plc": "pump", "number": 0}, "no breakpoint"),
+    ("fault", {"kind": "slow", "peer": "192.168.250.256"}, "no IPv4 address"),
+    ("fault", {"kind": "slow", "peer": "1.2.3"}, "no IPv4"),
+    ("force", {"plc": "pump", "name": "D10..D11", "value": "1"}, "a range; force its places one by one"),
+    ("group", {"name": "a", "names": ["D1"]}, "no file beside which"),
+    ("predict", {"names": [], "values": []}, "has no lesson"), ("check", {}, "has no lesson"),
+    ("solution", {}, "has no lesson"), ("test", {"plc": "pump"}, "a test repeats runs in virtual time"),
+    ("why", {"plc": "pump", "name": "Main.Curve"}, "is no single value"),
+    ("why", {"plc": "pump", "name": "Main.Level"}, "no scan has"),
+    ("view", {"plc": "pump", "scan": 0}, "no scan has been recorded yet"),
+    ("view", {"plc": "pump", "scan": 0, "future": 0}, "no future 0"),
+    ("hello", {"version": 0}, "speaks version 1 of its messages, not 0"),
+    ("search", {"plc": "pump", "text": "x" * (MOST_TEXT + 1)}, "more than"),
+    ("look", {"plc": "pump", "names": ["D0"] * (MOST_NAMES + 1)}, "at most 1000 texts"), ("step", {"scans": True}, "is a int"),
+    ("step", {"scans": 1 << 62}, "is too large"), ("step", {"scans": 1, "more": 1}, "step has no more"),
+    ("step", {}, "step needs scans"),
+])  # fmt: skip
+def test_what_cannot_be_done_is_refused_in_words(do: str, fields: dict[str, Any], said: str) -> None:
+    page = opened()
+    assert said in page.ask(do, **fields)["error"]
+    assert (page.bench.acts, page.network.faults, page.control.steps, page.control.speed) == ([], [], 0, 1.0)
+
+
+def test_bounds_are_taken(page: Page) -> None:
+    for factor in (SLOWEST, FASTEST, 0):
+        page.done("speed", factor=factor)
+        assert page.control.speed == factor
+    page.done("step", scans=MOST_STEPS)
+    assert page.control.steps == MOST_STEPS and page.control.is_paused
+    page.done("pause")
+    assert page.control.stands
+    page.done("fault", kind="lossy", percent=100)
+    page.done("fault", kind="doubled", percent=7, peer="255.255.255.255:65535")
+    assert [act.text for act in page.bench.acts] == ["fault lossy", "fault doubled at 255.255.255.255:65535"]
+    assert [(row.lose_percent, row.duplicate_percent) for row in page.network.faults] == [(100, 0), (0, 7)]
+    assert page.network.faults[1].peer == Peer("255.255.255.255", 65535)
+    assert page.done("search", plc="pump", text="x" * MOST_TEXT)["found"] == []
+    assert len(page.done("look", plc="pump", names=["D0"] * MOST_NAMES)["rows"]) == 1
+    assert page.done("write", plc="pump", name="D10..D12", value="1,2,3")["value"] == "1, 2, 3"
+
+
+def test_with_allow_write_only_values_are_changed() -> None:
+    page = opened(writable=["main.level", "Main.Curve"])
+    page.done("write", plc="pump", name="Main.Level", value="30")
+    page.done("write", plc="pump", name="Main.Curve[2]", value="3")
+    page.done("force", plc="pump", name="Main.Level", value="31")
+    page.done("release", plc="pump", name="Main.Level")
+    assert "may not be written: --allow-write names Main.Level, Main.Curve" in page.ask(
+        "write", plc="pump", name="Main.Pump", value="TRUE")["error"]  # fmt: skip
+    assert "one by one" in page.ask("release", plc="pump")["error"]
+    page.scan(3)
+    page.done("view", plc="pump", scan=1)
+    for do, fields in {"restart": {}, "branch": {"plc": "pump"}, "group": {"name": "a", "names": []}, "fault": {"kind": "cut"},
+                       "mend": {}, "cable": {"plc": "pump", "unit": "ETN21 0", "plugged": False},
+                       "break": {"plc": "pump", "kind": "line", "where": "Main"}, "mode": {"plc": "pump", "mode": "PROGRAM"},
+                       "start": {"plc": "pump", "kind": "warm"}, "statement": {"plc": "pump"}}.items():  # fmt: skip
+        assert page.ask(do, **fields)["error"] == "with --allow-write only values can be changed", do
+        if do == "branch":
+            page.done("view", plc="pump")
+    assert page.plc.scans == 3 and page.plc.mode.value == "RUN" and not len(page.plc.breakpoints)
+
+
+def test_with_real_connections_time_passes_as_it_does() -> None:
+    page = opened(real=True)
+    assert page.ask("speed", factor=2)["error"] == "with real connections time passes as it does"
+    assert "step whole scans" in page.ask("statement", plc="pump")["error"]
+    page.scan(3)
+    assert "pause first" in page.ask("history", plc="pump", names=["Main.Level"], scans=2)["error"]
+    page.done("pause")
+    assert page.done("history", plc="pump", names=["Main.Level"], scans=2)["values"] == {"Main.Level": ["22", "23"]}
+
+
+def test_a_start_waits_until_the_scan_that_stands_has_gone_on(page: Page) -> None:
+    page.done("break", plc="pump", kind="line", where="Main", when="Level = 22")
+    page.run(20)
+    assert page.ask("start", plc="pump", kind="cold")["error"] == "the scan stands at a breakpoint: let it go on first"
+    assert page.plc.halted and page.plc.read("Main.Level") == 22
+
+
+def test_the_present_is_gone_on_with_from_the_past(page: Page) -> None:
+    page.done("look", plc="pump", names=["Main.Level"])
+    page.scan(10)
+    page.done("view", plc="pump", scan=4)
+    found = page.done("history", plc="pump", names=["Main.Level", "D10..D11"], scans=3)
+    assert found["values"] == {"Main.Level": ["23", "24", "25"]}
+    assert page.ask("branch", plc="pump")["error"].startswith("the past of these PLCs cannot be done again")
+    page.done("step", scans=1)
+    assert page.update()["state"] == "run" and page.control.steps == 1
+
+
+# --- what an update has -----------------------------------------------------------------------------------------------
+
+
+def test_a_scan_is_observed_once_for_a_look(page: Page) -> None:
+    page.done("look", plc="pump", names=[], instance="Main", scan=True)
+    page.scan(2)
+    view = page.live.view
+    assert view is not None and view.scan == 0 and not page.live.wants_view
+    page.scan(3)
+    assert page.live.view is view and view.scan == 0, "the scans behind it are nobody's"
+    assert page.update()["inside"]["scan"] == 0
+    page.scan(1)
+    assert page.live.view is not None and page.live.view.scan == 5, "the update has wished for the next one"
+    page.now_ns += VIEW_NS - 2 * UPDATE_NS - 1
+    page.update()
+    page.scan(1)
+    assert page.live.view.scan == 5, "a quarter of a second has to pass between two"
+
+
+@pytest.mark.slow
+def test_a_chart_is_drawn_as_it_was_in_the_scan() -> None:
+    page = opened(CHART)
+    page.done("look", plc="pump", names=[], instance="Main", scan=True)
+    page.scan(1)
+    [[head, drawn]] = page.update()["inside"]["pictures"]
+    assert head == "" and "<svg" in drawn and "Dark" in drawn and "Bright" in drawn
+    page.done("write", plc="pump", name="Main.go", value="TRUE")
+    page.now_ns += VIEW_NS
+    page.update()
+    page.scan(2)
+    page.now_ns += VIEW_NS
+    [[_, later]] = page.update()["inside"]["pictures"]
+    assert later != drawn
+
+
+def test_memory_shows_which_words_are_forced(page: Page) -> None:
+    page.plc.write("D5..D6", [1, 2])
+    for name in ("D4", "D5", "D205", "Main.Level"):
+        page.done("force", plc="pump", name=name, value="9")
+    page.done("look", plc="pump", names=[], memory="D", first=5)
+    shown = page.update()["memory"]
+    assert (shown["area"], shown["first"], len(shown["words"]), shown["forced"]) == ("D", 5, MEMORY_WORDS, [0])
+    page.done("look", plc="pump", names=[], memory="D", first=32_760)
+    assert len(page.update()["memory"]["words"]) == 8
+    page.done("look", plc="pump", names=[], memory="D", first=-7)
+    assert page.update()["memory"]["first"] == 0
+
+
+def test_long_values_are_cut() -> None:
+    page = opened("PROGRAM Main VAR s : STRING[400] := ''; t : STRING[298]; END_VAR END_PROGRAM")
+    page.plc.write("Main.s", "x" * 400)
+    page.plc.write("Main.t", "y" * (MOST_SHOWN - 2))
+    page.done("look", plc="pump", names=["Main.s", "Main.t", "D0..D99"])
+    values = page.update()["values"]
+    assert values["Main.s"] == "'" + "x" * (MOST_SHOWN - 2) + "…" and values["Main.t"] == f"'{'y' * (MOST_SHOWN - 2)}'"
+    assert values["D0..D99"] == "[" + ", ".join(["0"] * 64) + "]"
+
+
+def test_a_page_is_told_the_last_acts_and_then_the_new_ones(page: Page) -> None:
+    for number in range(ACTS + 5):
+        page.done("write", plc="pump", name="D1", value=str(number))
+    assert [text for _, _, text in page.update()["acts"]] == [f"D1 := {number}" for number in range(5, ACTS + 5)]
+    page.done("write", plc="pump", name="D1", value="7")
+    assert page.update()["acts"] == [["pump", 0, "D1 := 7"]]
+    assert "acts" not in page.update()
+
+
+@pytest.mark.slow
+def test_a_plant_shows_what_has_passed_between_whom() -> None:
+    page = opened()
+    unit, peer, other = Peer("192.168.250.21", 1025), Peer("192.168.250.1", 502), Peer("192.168.250.9", 502)
+    tell = page.network.tap
+    assert tell is not None
+    for to, count in ((peer, 3), (other, 1)):
+        for _ in range(count):
+            tell(0, unit.host, TapEvent(TapKind.SYN, unit, to, out=True))
+    tell(0, "192.168.250.99", TapEvent(TapKind.SYN, Peer("192.168.250.99", 1), peer, out=True))
+    page.network.doors = {unit: Peer("127.0.0.1", 1502)}  # type: ignore[attr-defined]
+    page.done("fault", kind="slow", peer="192.168.250.1:502", time="5ms")
+    page.done("cable", plc="pump", unit="ETN21 0", plugged=False)
+    page.done("look", plc="pump", names=[], plant=True, network=True)
+    update = page.update()
+    links = {(one, two): frames for one, two, frames, _ in update["plant"]["links"]}
+    assert links == {("192.168.250.1", "192.168.250.21"): 3, ("192.168.250.21", "192.168.250.9"): 1}
+    assert update["plant"]["doors"] == [["192.168.250.21:1025", "127.0.0.1:1502"]]
+    assert update["plant"]["faults"] == ["192.168.250.1", "192.168.250.21"]
+    assert [text for _, _, text in update["acts"]] == ["fault slow at 192.168.250.1:502", "cable of ETN21 0 pulled"]
+    assert update["plant"]["plcs"][0]["units"] == [{"name": "ETN21 0", "address": "192.168.250.21", "plugged": False}]
+    assert [row["number"] for row in update["frames"]] == [0, 1, 2, 3] and all(row["out"] for row in update["frames"])
+    assert "frames" not in page.update()
+    tell(0, unit.host, TapEvent(TapKind.SYN, unit, peer, out=False))
+    [row] = page.update()["frames"]
+    assert (row["number"], row["out"], row["from"]) == (4, False, str(peer))
+    assert [row["number"] for row in page.live.frame_rows(3, None)] == [3, 4]
+    assert [row["number"] for row in page.live.frame_rows(0, 0, 2)] == [3, 4]
+
+
+@pytest.mark.slow
+def test_a_capture_has_the_last_events_up_to_a_size(page: Page) -> None:
+    unit, peer = Peer("192.168.250.21", 1025), Peer("192.168.250.1", 502)
+    tell = page.network.tap
+    assert tell is not None
+    size, events = 1 << 16, MOST_CAPTURE_BYTES // (1 << 16)
+    tell(0, unit.host, TapEvent(TapKind.SYN, unit, peer, out=True))
+    for _ in range(events + 3):
+        tell(0, unit.host, TapEvent(TapKind.DATA, unit, peer, out=True, data=bytes(size)))
+    assert MOST_CAPTURE_BYTES * 0.9 < len(page.live.capture()) < MOST_CAPTURE_BYTES * 1.1
+
+
+def test_a_change_is_told_before_it_is_checked() -> None:
+    changes = SimpleNamespace(state={"files": ["pump.st"], "ready": False, "mistakes": []}, compile=lambda: False)
+    page = opened(changes=changes)
+    assert page.update()["change"] == {"files": ["pump.st"], "ready": False, "mistakes": []}
+    assert page.ask("restart")["error"] == "the changed program cannot run yet: it is checked, or it has errors"
+    assert not page.bench.wants_restart and not page.control.has_ended
+
+
+def test_a_program_without_a_network_has_no_faults() -> None:
+    page = opened()
+    page.bench.networks.clear()
+    for do, fields in {"fault": {"kind": "cut"}, "mend": {}}.items():
+        assert page.ask(do, **fields)["error"] == "this program has no network"
+    assert isinstance(page.network, LoopNetwork) and page.network.faults == []
