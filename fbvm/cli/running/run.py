@@ -217,7 +217,7 @@ def _run(
                 if capture:  # of a quiet network a buffer would take minutes to fill
                     capture.flush()
 
-            running = Running(plc, scans=scans, for_ns=for_ns, until=until if bounded else _never, max_ns=max_ns, writes=writes,
+            running = Running(plc, scans=scans if bounded else ENDLESS, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes,
                               pace=pace)  # fmt: skip
             _execute(running, debug_port, files, libraries, progress)
     except (LookupError, TypeError, ValueError) as error:
@@ -253,11 +253,6 @@ def _execute(running: Running, debug_port: int | None, files: tuple[Path, ...], 
     paths = {str(path): path for path in files}
     sources = DebugSources(paths, source_texts(running.plc.image, paths, libraries))
     run_with_port({"plc": running}, DebugPort(debug_port, sources), progress)
-
-
-def _never(plc: Plc) -> bool:
-    """The end of a run that only Ctrl-C ends."""
-    return False
 
 
 def _write(plc: Plc, given: Setting) -> TimedWrite:

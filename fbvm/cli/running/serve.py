@@ -118,6 +118,7 @@ def command(
         stack.callback(network.close)
         if log:
             network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
+            plc.watchers.append(lambda _: None)  # no scans in one go: the log says in which one an answer left
         for unit in usual_units(mailbox_names(plc.image), fins=door.unit if door else None):
             plc.attach(unit, network)
         if door:
@@ -146,14 +147,15 @@ def _serve(plc: Plc, reason: str, signals: Signals, debugging: DebugPort | None,
     saved = True
     while reason != "trap" and not signals.end:
         try:
-            reason = loop.run(plc, until=lambda _: signals.is_heard or debugging is not None and debugging.is_called, pace=EVENT,
-                              progress=lambda _: record())
+            running = Running(plc, scans=ENDLESS, pace=EVENT)
+            loop.run_all([running], record, lambda: signals.is_heard or debugging is not None and debugging.is_called)
+            reason = running.reason
             if debugging and debugging.serve(lambda: [Debugged("plc", plc)], lambda: signals.is_heard):
                 signals.end = True
         except OutputError:  # the log; the memory is saved nevertheless
             _save(plc, image)
             raise
-        if reason != "until" or signals.is_heard:
+        if reason or signals.is_heard:
             signals.save = False
             saved = _save(plc, image)
     return reason, saved
