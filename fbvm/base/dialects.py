@@ -19,7 +19,9 @@ class Dialect:
     libraries: tuple[str, ...] = ()
     """Libraries whose blocks stand in place of the standard ones."""
     refused: frozenset[str] = frozenset()
-    """Forms that the tool does not take: POINTER TO, REFERENCE TO, REF_TO, WSTRING, alias."""
+    """Forms that the tool does not take: POINTER TO, REFERENCE TO, REF_TO, WSTRING, alias, and those of objects."""
+    warned: frozenset[str] = frozenset()
+    """The same, of which it is only warned."""
     last_of_mux: bool = False
     lenient_positions: bool = False
     seconds: bool = False
@@ -250,10 +252,15 @@ QUESTIONS = {
                   "as the standard's bodies compute it; '100.0', 'T#1s'; none",
                   "blocks and functions of its own; under matiec '100', 'T#0d0h0m1s'; LEFT_EXT and its like and ROUND "
                   "under rusty, TIME_TO_US under strucpp"),
-    "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
+    "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type, CLASS, INTERFACE, METHOD, PROPERTY, "
+                "EXTENDS, IMPLEMENTS", "taken", "refused (S0903)"),
+    "warned": ("POINTER TO, REFERENCE TO, CLASS, INTERFACE, METHOD, PROPERTY, EXTENDS, IMPLEMENTS", "taken",
+               "taken, with a warning (S0195)"),
 }
 """For each switch: what compilers disagree about, the answer without it, and with it."""
 
+OBJECTS = frozenset(("CLASS", "INTERFACE", "METHOD", "PROPERTY", "EXTENDS", "IMPLEMENTS"))
+"""Forms of objects, which tools of the second edition do not have."""
 STANDARD = Dialect("standard", "the third edition, and CODESYS's answer where it is silent")
 _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made of it", ("codesys/blocks",), last_of_mux=True,
                    lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
@@ -280,7 +287,8 @@ _ROWS = (
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
-            wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True, functions_have_inputs=True),
+            wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True, functions_have_inputs=True,
+            warned=OBJECTS | {"POINTER TO", "REFERENCE TO"}),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional", "strucpp"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
@@ -298,7 +306,7 @@ _ROWS = (
             round_arrays=True, nested_repetitions=True, dates_in_nanoseconds=True, whole_characters=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, plain_names=True,
-            refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
+            refused=OBJECTS | {"POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"}),
 )
 DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}
 SWITCHES = tuple(f.name for f in fields(Dialect) if f.name not in ("name", "for_whom", "offered"))

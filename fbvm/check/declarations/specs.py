@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fbvm.base.dialects import DIALECTS, option
 from fbvm.base.types import (
     ANYTHING,
     BOOL,
@@ -37,6 +36,7 @@ from fbvm.check.symbols import vendor_names
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.elementary_types import elementary_type
 from fbvm.check.symbols.facts import Pou, is_block, is_open
+from fbvm.check.symbols.refused_forms import report_form
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.check.symbols.symbol_table import Resolved, TypeEntry
 from fbvm.syntax import tree
@@ -83,17 +83,14 @@ def resolve(scope: Scope, spec: tree.TypeSpec, name: str = "") -> Resolved | Non
 
 def _refuse_by_dialect(scope: Scope, spec: tree.TypeSpec, name: str = "") -> None:
     """Report a form that the dialect does not take."""
-    dialect = scope.dialect
     if isinstance(spec, tree.RefSpec):
         form = spec.kind
     elif isinstance(spec, tree.StringSpec):
         form = "WSTRING" if spec.wide else "STRING"
     else:
         form = "alias" if name and isinstance(spec, tree.NamedType) else ""
-    if form in dialect.refused and not scope.source.library:
-        what = f"another name for {spec.text}" if isinstance(spec, tree.NamedType) else form
-        scope.error("S0903", spec, f"{what} is not taken by the dialect {dialect.name}: {dialect.for_whom}",
-                    f"take {option(row for row in DIALECTS.values() if form not in row.refused)}")
+    what = f"another name for {spec.text}" if isinstance(spec, tree.NamedType) else form
+    report_form(scope.project.report, scope.dialect, scope.source, spec, form, what)
 
 
 def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:

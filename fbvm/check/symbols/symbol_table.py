@@ -21,6 +21,7 @@ from fbvm.check.symbols.dependencies import Dependencies, Key
 from fbvm.check.symbols.facts import Facts, Pou, Variable
 from fbvm.check.symbols.library import Libraries
 from fbvm.check.symbols.namespaces import Namespaces, full_name
+from fbvm.check.symbols.refused_forms import report_objects
 from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.check.symbols.size_limits import SizeLimits
@@ -209,6 +210,7 @@ class SymbolTable:
             pou.modifiers = frozenset(word.text for word in declaration.modifiers)
             pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)
+            report_objects(self.report, self.dialect, source, declaration)
             if self.dialect.functions_have_inputs and pou.is_function and not source.library and not any(
                     section.kind in ("VAR_INPUT", "VAR_IN_OUT") for section in declaration.sections):
                 self.report.add("S0195", source, declaration.name, f"{name} has no input, and the tool of this dialect wants one",
