@@ -96,6 +96,9 @@ def test_a_room_has_files_and_tests() -> None:
     assert m.files_of("omron/etn21")[0] == Path("fblib/omron/etn21/ETN21_Accept.st")
     tests = m.tests_of(Path("fbvm/record/draw/why.py"))
     assert tests[0].startswith("tests/unit/record/") and {"tests/unit/cli/test_cli.py", "tests/cx/test_diff.py"} <= set(tests)
+    folders = {Path(name).parent.as_posix() for name in m.tests_of(Path("fbvm/cli/projects/mutate.py"))}
+    assert folders == {"tests/unit/cli", "tests/unit/campaign", "tests/unit/testing"}
+    assert {Path(name).parent.name for name in m.tests_of(Path("fbvm/cli/programs/check.py"))} == {"cli"}
     with pytest.raises(ValueError, match="no room 'nowhere'"):
         m.files_of("nowhere")
 

@@ -59,9 +59,15 @@ TESTS = {
         "tests/unit/campaign/test_campaign_items.py", "tests/unit/campaign/test_fleet.py", "tests/unit/live/test_pictures.py",
     ),
     "testing": ("tests/unit/testing", "tests/twincat"), "cli": ("tests/unit/cli",),
+    "cli/editors": ("tests/unit/lsp",), "cli/projects": ("tests/unit/campaign", "tests/unit/testing/test_lessons.py"),
+    "cli/programs/diff.py": ("tests/cx",), "cli/programs/export.py": ("tests/cx", "tests/plcopen"),
+    "cli/programs/import.py": ("tests/cx", "tests/plcopen"), "cli/recordings": ("tests/unit/record",),
+    "cli/running/dap.py": ("tests/unit/dap",), "cli/running/live.py": ("tests/unit/live",),
+    "cli/running/step.py": ("tests/unit/step",), "cli/shared/debug": ("tests/unit/dap",), "cli/shared/live": ("tests/unit/live",),
     "analysis": ("tests/unit/analysis", "tests/unit/lsp"),
 }  # fmt: skip
-"""The folders and files of tests that matter for a room; for others the folder of its own name."""
+"""The folders and files of tests that matter for a room, and those beside them for a part of it; for other rooms the folder of
+their own name."""
 STAGES = {"quick": "not slow", "slow": "slow"}
 """The marks of the tests with which a mutant is tried, one stage after the other until one finds it."""
 NO_TEST = 5
@@ -207,8 +213,10 @@ def files_of(room: str, house: Path = HOUSE) -> list[Path]:
 def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
     """The test files for a source file, in the order in which they run: first those that name the file, by folder."""
     room = path.parts[0] if path.parts[0] == "fblib" else path.parts[1].removesuffix(".py")
+    parts = ["/".join(path.parts[1:count]) for count in range(3, len(path.parts) + 1)]
     files: list[Path] = []
-    for name in TESTS.get(room, (f"tests/unit/{room}",)):
+    of_parts = [name for part in parts for name in TESTS.get(part, ())]
+    for name in dict.fromkeys([*TESTS.get(room, (f"tests/unit/{room}",)), *of_parts]):
         place = house / name
         files += [place] if place.is_file() else sorted(place.rglob("test_*.py"))
     files.sort(key=lambda file: re.search(rf"\b{path.stem}\b", file.read_text(encoding="utf-8")) is None)
