@@ -117,6 +117,7 @@ def _structure(scope: Scope, kind: Type, init: tree.StructInit, default: bytes) 
     if not isinstance(kind, StructType):
         scope.error("S0705", init, f"(name := value) is an initial value of a structure, not of {kind}")
         return default
+    scope.facts.types[init] = kind
     content = bytearray(default)
     seen: set[str] = set()
     for name, value in init.fields:

@@ -65,6 +65,57 @@ END_PROGRAM
     assert tree_of(outline(plant(text=text).files["pump.st"])) == [("PROGRAM", "Main", ["Wait", "Work", "Count"])]
 
 
+def test_the_outline_has_what_stands_around_programs() -> None:
+    text = """\
+NAMESPACE Plant
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+    Twice := 2 * x;
+END_FUNCTION
+END_NAMESPACE
+TYPE Tank : STRUCT Level, Old : INT; State : ARRAY [0..1]
+    OF INT; END_STRUCT; END_TYPE
+VAR_GLOBAL CONSTANT Top : INT := 9; END_VAR
+PROGRAM Main
+END_PROGRAM
+ACTIONS Main
+ACTION Stop: ; END_ACTION
+END_ACTIONS
+CONFIGURATION C
+    VAR_GLOBAL Shared : INT; END_VAR
+    RESOURCE R ON PLC
+        TASK T(INTERVAL := T#10ms, PRIORITY := 1);
+        PROGRAM Run WITH T : Main;
+    END_RESOURCE
+END_CONFIGURATION
+"""
+    found = outline(plant(text=text).files["pump.st"])
+    assert tree_of(found) == [
+        ("NAMESPACE", "Plant", ["Twice"]), ("TYPE", "Tank", ["Level", "Old", "State"]), ("VAR_GLOBAL", "VAR_GLOBAL", ["Top"]),
+        ("PROGRAM", "Main", []), ("ACTION", "Stop", []), ("CONFIGURATION", "C", ["Shared", "T", "Run"])]
+    assert [(each.kind, each.detail) for symbol in (found[0], found[1], found[2], found[5]) for each in symbol.children] == [
+        ("FUNCTION", "INT"), ("member", "INT"), ("member", "INT"), ("member", "ARRAY [0..1] OF INT"),
+        ("constant", "INT (VAR_GLOBAL)"), ("variable", "INT (VAR_GLOBAL)"), ("task", ""), ("instance", "Main")]
+    assert [text[each.name_start:each.name_end] for each in found] == ["Plant", "Tank", "VAR_GLOBAL", "Main", "Stop", "C"]
+
+
+def test_regions_and_comments_of_several_lines_can_be_folded() -> None:
+    text = """\
+PROGRAM Main
+{region 'one'}
+    ; (* a
+         b *)
+{region 'two'}
+    ;
+{endregion}
+{endregion}
+{endregion}
+END_PROGRAM
+"""
+    found = [(each.first + 1, each.last + 1, each.kind) for each in folds(plant(text=text).files["pump.st"])]
+    assert found == [(1, 10, ""), (2, 8, "region"), (3, 4, "comment"), (5, 7, "region")]
+
+
 def test_what_has_several_lines_can_be_folded() -> None:
     found = [(each.first + 1, each.last + 1, each.kind) for each in folds(plant().files["pump.st"])]
     assert found == [(3, 4, "comment"), (5, 11, ""), (8, 10, ""), (13, 25, ""), (14, 16, ""), (20, 24, ""), (21, 23, "")]
