@@ -261,7 +261,6 @@ def _close(piece: Piece, end: End, row: int, text: str) -> None:
     piece.line_down(end.x, row - 1, row, end.thick)
     piece.line_across(end.x, end.x + 1, row, end.thick)
     piece.text(end.x + 1, row, text)
-    piece.height = max(piece.height, row + 1)
 
 
 def _aside(piece: Piece, ends: Sequence[End], least: int, begin: int, row: int) -> tuple[int, list[End]]:

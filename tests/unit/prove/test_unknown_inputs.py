@@ -53,7 +53,8 @@ END_PROGRAM"""
 MEMORY = """TYPE P : STRUCT x : INT; y : DINT; b : BOOL; c : ARRAY[0..1] OF BYTE; END_STRUCT END_TYPE
 PROGRAM Main
 VAR
-    w AT CIO 10 : WORD; b0 AT CIO 10.00 : BOOL; b9 AT CIO 10.09 : BOOL; long AT CIO 10 : DWORD; odd AT %MW5 : UINT;
+    w AT CIO 10 : WORD; b0 AT CIO 10.00 : BOOL; b9 AT CIO 10.09 : BOOL; long AT CIO 10 : DWORD;
+    mid AT CIO 11 : DWORD; far AT CIO 13 : LWORD; lap AT CIO 15 : LWORD; odd AT %MW5 : UINT;
     low AT %MB10 : BYTE; high AT %MB11 : BYTE; bit AT %MX11.3 : BOOL; both AT %MD2 : DWORD;
     i, k : INT; c : BOOL; ps : ARRAY[0..2] OF P; q : P; u : ARRAY[0..3] OF DINT; r : REF_TO INT; x, y : INT; n : WORD; on : BOOL;
     bits AT CIO 20.05 : ARRAY[0..12] OF BOOL;

@@ -86,7 +86,7 @@ def values(columns: Columns, number: int) -> list[Any]:
 
 def collected(plc: Plc, scans: int, watched: str = "", before: Callable[[Plc], None] = lambda plc: None) -> Columns:
     cells = [cell_of(Signal(place(plc, name), ""), number) for number, name in enumerate(NAMES)]
-    areas = [plc.memory.areas[name] for name in ("D", "CIO", "TF")]
+    areas = [plc.memory.areas[name] for name in ("D", "CIO", "TF", "M")]
     columns = Columns(cells, areas, lambda number, moment: str(moment.read(place(plc, NAMES[number]))),
                       frozenset(cell for cell, name in zip(cells, NAMES, strict=True) if name in watched.split()))  # fmt: skip
     for _ in range(scans):
@@ -131,6 +131,7 @@ def test_words_of_areas_that_change_are_columns_and_the_others_constants(program
     plc.write("D100", 77)
     plc.write("D101", 5)
     plc.write("CIO 40", 1)
+    plc.write("%MW3", 9)
 
     def write(plc: Plc) -> None:
         if plc.scans == 5:
@@ -138,7 +139,7 @@ def test_words_of_areas_that_change_are_columns_and_the_others_constants(program
 
     columns = collected(plc, 7, before=write)
     assert columns.constants["D"] == {13: 65536 - 70000 % 65536, 14: 0xFFFE, 100: 77, 101: 5}
-    assert columns.constants["CIO"] == {40: 1} and "TF" not in columns.constants
+    assert columns.constants["CIO"] == {40: 1} and not {"TF", "M"} & {*columns.constants}
     assert {*columns.words["D"]} == {7, 9, 13, 14, 101} and "CIO" not in columns.words
     assert values(columns, columns.words["D"][7]) == [0, 0, 0, *[0x1234] * 4]
     assert values(columns, columns.words["D"][101]) == [5, 5, 5, 5, 5, 6, 6]

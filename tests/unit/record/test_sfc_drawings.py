@@ -5,6 +5,7 @@ The drawings were read by a person, element by element, beside the charts."""
 from __future__ import annotations
 
 import pytest
+from test_sfc_text import BATCH
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import SfcPicture
@@ -192,6 +193,74 @@ JUMPED = """\
                 ┃
                 ┗► S4
 """
+APART = """\
+                ╔══════╗
+                ║ Idle ║
+                ╚═══╤══╝
+                    │
+                   ╶┼╴ t1
+                    │
+      ══╤═══════════╧═══════════╤══
+   ┌────┴────┐  ┌───┬───────┐   └► Heating
+   │ Filling ├──┤ N │ valve │
+   └────┬────┘  └───┴───────┘
+      ══╪══◄ done
+        │
+       ╶┼╴ (1) done
+        │
+  ┌─────┴────┐  ┌───┬──────┐
+  │ Draining ├──┤ N │ pump │
+  └─────┬────┘  └───┴──────┘
+        │
+       ╶┼╴ t3
+        │
+        └► Idle
+
+┌─────────┐  ┌────────┬────────┬─────┐
+│ Heating ├──┤ L T#5s │ heater │ hot │
+└────┬────┘  ├────────┼────────┼─────┤
+     │       │ P1     │ Count  │     │
+     │       └────────┴────────┴─────┘
+     └► done
+
+t1: start
+done: full AND hot
+t3: empty
+"""
+APART_WITH_POWER = """\
+                ╔════════╗
+                ║   Idle ║
+                ╚════╤═══╝
+                     ┃
+                    ╺╋╸ t1
+                     ┃
+       ══╤═══════════╧════════════╤══
+   ┏━━━━━┻━━━━━┓  ┌───┬───────┐   ┗► Heating
+   ┃ ● Filling ┠──┤ N │ valve │
+   ┗━━━━━┳━━━━━┛  └───┴───────┘
+       ══╪══◄ done
+         ┃
+        ╺╋╸ (1) done
+         ┃
+  ┌──────┸─────┐  ┌───┬──────┐
+  │   Draining ├──┤ N │ pump │
+  └──────┬─────┘  └───┴──────┘
+         │
+        ╶┼╴ t3
+         │
+         └► Idle
+
+┏━━━━━━━━━━━┓  ┌────────┬────────┬─────┐
+┃ ● Heating ┠──┤ L T#5s │ heater │ hot │
+┗━━━━━┯━━━━━┛  ├────────┼────────┼─────┤
+      │        │ P1     │ Count  │     │
+      ╽        └────────┴────────┴─────┘
+      ┗► done
+
+t1: start → TRUE
+done: full AND hot → TRUE
+t3: empty
+"""
 
 
 def picture(chart: str) -> SfcPicture:
@@ -209,3 +278,11 @@ def picture(chart: str) -> SfcPicture:
 ])  # fmt: skip
 def test_branches_that_meet_in_part(chart: str, seen: ChartState | None, drawn: str) -> None:
     assert sfc_text(picture(chart), seen=seen) == drawn.splitlines()
+
+
+@pytest.mark.parametrize(("seen", "drawn"), [
+    (None, APART), (ChartState(frozenset({1, 2}), {0: True, 1: True}), APART_WITH_POWER)])  # fmt: skip
+def test_a_branch_that_is_drawn_apart_leads_to_a_transition_by_an_arrow(seen: ChartState | None, drawn: str) -> None:
+    image = compile_text(BATCH, lint=False).image
+    assert image is not None
+    assert sfc_text(image.charts[0], 30, seen) == drawn.splitlines()
