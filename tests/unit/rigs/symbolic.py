@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from encoded import FROM_BYTE
+from encoded import FROM_BYTE, MACHINE_BYTES
 
+from fbvm.base.areas import PAGE_BYTES
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.cells import BIT, BOOL, Cell, Contents, Partition, Reshape, constant_of
@@ -122,3 +123,8 @@ def compare_inputs(image: Image, names: Sequence[str], rows: Sequence[Sequence[A
             after = bytes(plc.memory.u8)
             found = {cell: term_value(scanned.contents.get(cell), values, known) for cell in cells}
             assert found == {cell: held(cell, after) for cell in cells}, row
+            pages = [page for page in range(FROM_BYTE, len(after), PAGE_BYTES)
+                     if memory[page : page + PAGE_BYTES] != after[page : page + PAGE_BYTES]]  # fmt: skip
+            changed = {at for page in pages for at in range(page, min(page + PAGE_BYTES, len(after)))
+                       if memory[at] != after[at] and at not in MACHINE_BYTES}  # fmt: skip
+            assert changed <= scanned.contents.partition.at.keys(), "what was written is known"
