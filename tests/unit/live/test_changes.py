@@ -49,6 +49,9 @@ def test_a_file_that_is_as_it_was_tells_nothing(edited: Edited) -> None:
 
 def test_a_changed_program_can_be_begun(edited: Edited) -> None:
     edited.save(GOOD.replace("n + 1", "n + 2"))
+    edited.changes.look()
+    edited.changes.look()
+    assert edited.changes.state == {"files": ["pump.st"], "ready": False, "mistakes": []} and not edited.changes.compile()
     assert edited.state() == {"files": ["pump.st"], "ready": True, "mistakes": []}
     assert edited.changes.compile()
 

@@ -132,6 +132,15 @@ def test_pages_are_told_that_fbvm_has_ended() -> None:
         socket.create_connection(("127.0.0.1", host.server.guard.port))
 
 
+def test_a_browser_that_never_reads_is_left_at_the_end() -> None:
+    host = LiveHost(Page().bench, token="t")
+    with opened(host) as sock:
+        [browser] = host.server._browsers
+        browser.connection._out += bytes(8 << 20)
+        host.close()
+        assert host.server.sessions == [] and browser.sock.fileno() == -1 and sock.fileno() != -1
+
+
 def test_pages_that_are_open_begin_again_with_other_plcs(host: LiveHost) -> None:
     with opened(host) as sock:
         sock.settimeout(5)
