@@ -150,6 +150,59 @@ def test_exceptions_of_the_server() -> None:
     assert rig.ask("08 00 00 12 34") == "08 00 00 12 34"
 
 
+JUDGE = "PROGRAM Main VAR judged, size : UINT; END_VAR judged := ETN_Modbus_Judge(Size := size); END_PROGRAM"
+
+
+@each_of(("request", "reply", "judged"), [
+    # what is read: as many bytes as were asked for
+    ("03 00 00 00 02", "03 04 11 11 22 22", 0), ("03 00 00 00 02", "03 02 11 11", None),
+    ("04 00 00 00 02", "04 04 11 11 22 22 33", None), ("03 00 00 00 02", "03 05 11 11 22 22", None),
+    ("01 00 00 00 09", "01 02 FF 01", 0), ("02 00 00 00 08", "02 01 FF", 0), ("01 00 00 00 09", "01 01 FF", None),
+    ("02 00 00 00 08", "02 02 FF FF", None), ("03 00 00 80 01", "03 02 00 00", None), ("03 00 00 00 02 00", "03 02 11 11", 0),
+    ("03 00 00 00", "03 02 11 11", 0),  # no requests of the specification
+    ("17 00 00 00 01 00 00 00 00 00", "17 02 00 00", 0), ("17 00 00 00 01 00 00 00 00 00", "17 04 00 00 00 00", None),
+    ("17 00 00 00 01 00 00 00 00", "17 04 00 00 00 00", 0),
+    # what is written: the beginning of the request
+    ("05 00 22 FF 00", "05 00 22 FF 00", 0), ("05 00 22 FF 00", "05 00 23 FF 00", None),
+    ("05 00 22 FF 00", "05 00 22 00 00", None), ("06 00 22 12 34", "06 00 22 12 35", None),
+    ("06 00 22 12 34", "06 00 22 12 34 00", None), ("06 00 22 12 34", "06 00 22 12", None), ("06 00 22 12 34 00", "06 00", 0),
+    ("0F 00 00 00 08 01 55", "0F 00 00 00 08", 0), ("0F 00 00 00 08 01 55", "0F 00 00 00 09", None),
+    ("0F 00 00 00 08 01", "0F 00 00 00 08", 0), ("10 00 00 00 01 02 12 34", "10 00 01 00 01", None),
+    ("10 00 00 00 01", "10 00 01 00 01", 0), ("10 00 00 00 01 02", "10 00 01 00 01", None),
+    ("16 00 04 00 F2 00 25", "16 00 04 00 F2 00 25", 0), ("16 00 04 00 F2 00 25", "16 00 04 00 F2 00 26", None),
+    ("16 00 04 00 F2 00", "16 01", 0),
+    # an echo of any length
+    ("08 00 00 A5 37", "08 00 00 A5 37", 0), ("08 00 00 A5 37", "08 00 00 A5 38", None),
+    ("08 00 00 A5 37", "08 00 00 A5", None), ("08 00 00", "08 00 00", 0), ("08 00 00", "08 00 01", None),
+    ("08 00 00 A5", "08 00 00 A6", None), ("08 00 00 A5", "08 00 00 A5", 0), ("08 00", "08 01", 0),
+    ("08 00 0A 00 00", "08 00 0A 12 34", 0),
+    # others are compared by their function alone, exceptions by their code
+    ("2B 0E 01 00", "2B 00", 0), ("41 01", "42 01", None), ("41 01", "C1 01", 1), ("41 01", "C1 0B", 11),
+    ("41 01", "C1 0C", None), ("41 01", "C1 00", None), ("41 01", "C1 01 00", None), ("41 01", "C2 01", None),
+    ("41", "C1", None),
+])  # fmt: skip
+def test_what_is_an_answer_to_a_request(request: str, reply: str, judged: int | None) -> None:
+    assert _judged(Adu(7, 1, bytes.fromhex(request)).to_bytes(), Adu(7, 1, bytes.fromhex(reply)).to_bytes()) == judged
+
+
+@each_of("reply", ["0008 0000 0003 01 83 02", "0007 0001 0003 01 83 02", "0007 0000 0003 02 83 02", "0107 0000 0003 01 83 02"])
+def test_of_another_transaction_protocol_or_unit_there_is_no_answer(reply: str) -> None:
+    asked = Adu(7, 1, bytes.fromhex("03 00 00 00 01")).to_bytes()
+    assert _judged(asked, bytes.fromhex("0007 0000 0003 01 83 02")) == 2 and _judged(asked, bytes.fromhex(reply)) is None
+
+
+def _judged(request: bytes, reply: bytes) -> int | None:
+    """0 for the reply, an exception code, None for no answer."""
+    plc = Plc(image_of(JUDGE))
+    for first, frame in ((6001, request), (5801, reply)):
+        for number in range(0, len(frame), 2):
+            plc.write(f"CIO {first + number // 2}", int.from_bytes(frame[number : number + 2].ljust(2, b"\0"), "big"))
+    plc.write("Main.size", len(reply))
+    assert plc.scan() is None
+    judged = int(plc.read("Main.judged"))  # type: ignore[call-overload]
+    return None if judged == 0xFFFF else judged
+
+
 @pytest.mark.parametrize(("unit", "sent"), [(0, 0), (1, 1), (255, 255)])
 def test_the_unit_identifier(unit: int, sent: int) -> None:
     rig = Rig(ModbusPeer()).connect()
