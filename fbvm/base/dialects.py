@@ -321,12 +321,12 @@ def dialect(name: str) -> Dialect:
 
 def takers(switch: str, value: bool = True) -> str:
     """The option for a dialect with a switch set, or not set, for hints: `--dialect codesys, twincat or rusty`."""
-    return option(row for row in DIALECTS.values() if row.offered and bool(getattr(row, switch)) is value)
+    return option(row for row in DIALECTS.values() if bool(getattr(row, switch)) is value)
 
 
 def option(rows: Iterable[Dialect]) -> str:
-    """The option for one of some dialects, for hints."""
-    *names, last = (row.name for row in rows)
+    """The option for one of some dialects, for hints; of those that are not offered nothing is said."""
+    *names, last = (row.name for row in rows if row.offered)
     return f"--dialect {', '.join(names)} or {last}" if names else f"--dialect {last}"
 
 

@@ -14,10 +14,11 @@ FAMILIES = {"beremiz": "matiec", "codesys": "codesys", "codesys2": "codesys2", "
 SIGNS = (
     ("twincat", r"\bTc[23]_\w+|\bT_MaxString\b|\bFB_(?:FormatString|File\w+|LocalSystemTime)\b|\bADSLOGSTR\b"),
     ("codesys twincat", r"\{attribute\b|\b__(?:ISVALIDREF|QUERYINTERFACE|QUERYPOINTER|TRY)\b|\bVAR_(?:STAT|INST)\b"
-                        r"|\bAND_THEN\b|\bOR_ELSE\b|\bPLC_PRG\b|\bSFC(?:Init|Reset|Pause)\b"),
+                        r"|\bAND_THEN\b|\bOR_ELSE\b"),
+    ("codesys codesys2 twincat", r"\bPLC_PRG\b|\bSFC(?:Init|Reset|Pause)\b"),
     ("codesys", r"\bGVL\w*\s*\.|\bSMC_\w+|\bAXIS_REF_SM3\b|\bSysTimeRtc\w+"),
     ("codesys twincat strucpp", r"\b__(?:NEW|DELETE)\b|\bREFERENCE\s+TO\b"),
-    ("codesys twincat rusty strucpp", r"\bPOINTER\s+TO\b"),
+    ("codesys codesys2 twincat rusty strucpp", r"\bPOINTER\s+TO\b"),
     ("matiec", r"\bRESOURCE\s+(?:Res0|resource1)\s+ON\s+PLC\b|\bCONFIGURATION\s+Config0\b"
                r"|\b_TMP_\w+_OUT\b|\bCOMPUTE_FUNCTION_BLOCKS\b|\{\{|\{(?:disable|enable)\s+code\s+generation\}"
                r"|:\s*(?:HMI_[A-Z]+|python_(?:eval|poll)|LOGGER|RTC|SEMA)\s*;"),
@@ -27,14 +28,14 @@ SIGNS = (
               r"|\bGet1[mu]sCnt\b|\bAry(?:Move|SDCL|Search|Max|Min|ByteTo)\w*\b"),
 )
 """Dialects, and patterns of what few but their tools take."""
-COMMENTS = (("codesys", r"\(\*\s*@(?:NESTEDCOMMENTS|PATH|OBJECTFLAGS|SYMFILEFLAGS|GLOBAL_VARIABLE_LIST)\b"),)
+COMMENTS = (("codesys2", r"\(\*\s*@(?:NESTEDCOMMENTS|PATH|OBJECTFLAGS|SYMFILEFLAGS|GLOBAL_VARIABLE_LIST)\b"),)
 """The same for comments, in which exports of CODESYS 2.3 keep what they know of an object."""
 FILES = (
     ("codesys2", r"(?i)\.exp$"),
     ("matiec", r"(?:^|[/\\])pous[/\\](?:programs|functions|function-blocks)[/\\]"),
 )
 """Dialects, and patterns of names of files: exports of CODESYS 2.3, folders of OpenPLC Editor."""
-PREFERRED = ("codesys", "twincat", "matiec", "rusty", "strucpp", "omron")
+PREFERRED = ("codesys", "twincat", "codesys2", "matiec", "rusty", "strucpp", "omron")
 """Of dialects with as many signs the first one is taken."""
 _COMMENTS = re.compile(r"(?s)//[^\n]*|\(\*.*?\*\)|(')(?:\$.|[^'$\n])*'")
 _MAKERS = {"codesys2": "CODESYS 2.3", "matiec": "OpenPLC Editor"}

@@ -207,7 +207,7 @@ def mismatch_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
         hint = literal_hint(expr.value if isinstance(expr.value, int | float | str) else None, base(target))
     else:
         hint = bcd_hint(expr, target) or conversion_hint(kind, target)
-    takers = [row for row in DIALECTS.values() if converted_by_dialect(kind, target, row)]
+    takers = [row for row in DIALECTS.values() if row.offered and converted_by_dialect(kind, target, row)]
     return hint + (", or " if hint and takers else "") + (f"take {option(takers)}" if takers else "")
 
 
