@@ -59,7 +59,8 @@ VAR
     i, k : INT; c : BOOL; ps : ARRAY[0..2] OF P; q : P; u : ARRAY[0..3] OF DINT; r : REF_TO INT; x, y : INT; n : WORD; on : BOOL;
     bits AT CIO 20.05 : ARRAY[0..12] OF BOOL;
 END_VAR
-bits[k] := c; on := bits[i + 3]; b9 := c; n := w; w.3 := b0; long := long OR 16#8000_0000; on := w.15 XOR b9;
+bits[k] := c; on := bits[i + 3]; b9 := c; n := w; w.3 := b0; long := long OR 16#8000_0000; mid := ROL(mid, 4);
+far := ROL(WORD_TO_LWORD(n), 41); lap := far XOR DWORD_TO_LWORD(mid); far := lap; on := w.15 XOR b9;
 low := 16#5A; bit := c; odd := odd + 1; both := ROL(both, 8); high := high XOR low;
 ps[i].x := k; ps[i].b := c; ps[1].c[k] := 7; q := ps[i]; ps[2] := q; q.y := ps[k].x; u[i] := u[k] + 5;
 r := REF(x); IF c THEN r := REF(y); END_IF r^ := k + 1; IF i = 1 THEN r := NULL; END_IF IF k = 1 THEN x := r^; END_IF
