@@ -36,7 +36,7 @@ def holds(text: str) -> bool:
     "c = Colour#Green",
     "c = 5", "list[1] = 3", "n / 2 = -3", "n MOD 2 = -1", "D200 - 13 = 5 * 10 * 10",
     "(1 + 2) * 3 = 9", "1 + 2 * 3 = 7", "TRUE OR FALSE AND FALSE", "NOT done OR n < 0", "done = TRUE", "done XOR FALSE",
-    "-n = 7", "n.0", "%D200 <= 513", "done = 1", "INT#5 > 4", "n < 1e3",
+    "-n = 7", "n.0", "%D200 <= 513", "done = 1", "done = 2 - 1", "INT#5 > 4", "n < 1e3",
 ])  # fmt: skip
 def test_holds(text: str) -> None:
     assert holds(text)
@@ -49,7 +49,7 @@ def test_a_number_beside_a_real_is_rounded_to_32_bits_as_in_a_program(text: str)
     assert holds(text)
 
 
-@pytest.mark.parametrize("text", ["tenth = LREAL#0.1", "tenth = long", "long + 0.1 = 0.3"])
+@pytest.mark.parametrize("text", ["tenth = LREAL#0.1", "tenth + LREAL#0.1 = 0.2", "tenth = long", "long + 0.1 = 0.3"])
 def test_64_bits_are_not_rounded(text: str) -> None:
     assert not holds(text)
 
@@ -81,6 +81,7 @@ def test_literals_are_those_of_a_program(text: str) -> None:
 @each_of(("text", "message"), [
     ("wait > 10", "wait is TIME and takes a time such as 10ms, not 10"),
     ("10 < wait", "wait is TIME and takes a time such as 10ms, not 10"),
+    ("wait > 5 + 5", "wait is TIME and takes a time such as 10ms, not 5 + 5"),
     ("wait + 5 > 1s", "+ needs numbers"),
     ("wait + 5s > 10", "> compares TIME with a number"),
     ("n = 'a'", "n is INT and takes a whole number, not 'a'"),

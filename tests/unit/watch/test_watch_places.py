@@ -84,6 +84,24 @@ def test_a_bit_is_that_of_a_located_bool_or_of_its_address(plc: Plc, names: Name
     assert found.name == name or name.startswith("Main.bits")
 
 
+def test_the_first_and_the_last_byte_of_an_area_are_its_own(plc: Plc, names: Names) -> None:
+    for area in plc.memory.areas.values():
+        for offset in (area.offset, area.offset + area.size_bytes - 1):
+            found = names.at(offset)
+            assert found is not None and (found.area == area.name or found.name.startswith("Main.")), (area.name, offset)
+
+
+def test_a_reference_that_is_read_as_what_it_is_bound_to_is_read_so_in_a_structure_and_an_array() -> None:
+    image = compile_text("""TYPE S : STRUCT r : REFERENCE TO INT; n : INT; END_STRUCT END_TYPE
+PROGRAM Main VAR a, b : INT; s : S; rs : ARRAY[0..1] OF REFERENCE TO INT; END_VAR
+a := 5; b := 300; s.r REF= a; rs[0] REF= b; rs[1] REF= a; END_PROGRAM""", dialect="codesys", lint=False).image
+    assert image is not None
+    plc = Plc(image)
+    plc.scan()
+    assert plc.read("Main.s") == {"r": 5, "n": 0}
+    assert plc.read("Main.rs") == [300, 5]
+
+
 def test_nothing_has_a_name_behind_all_areas(plc: Plc, names: Names) -> None:
     assert names.at(0) is None and names.at(plc.memory.size - 1) is None
 

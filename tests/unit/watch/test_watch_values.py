@@ -70,6 +70,7 @@ def test_literals(text: str, value: object) -> None:
     (COLOUR, "Colour#Red", 0), (COLOUR, "Colour.Red", 0), (t.BOOL, "on", True), (t.BOOL, "OFF", False),
     (t.DT, "DT#2024-01-01-00:00:00", 1_704_067_200_000_000_000), (t.DATE, "2024-01-01", 1_704_067_200_000_000_000),
     (t.TOD, "TOD#00:00:01", 1_000_000_000), (t.REAL, "0.1", nearest_real(0.1)), (t.string(), "'a$27b'", "a'b"),
+    (t.string(), "a\u00ff", "a\u00ff"),
     (t.array(((1, 3),), t.INT), "1,2,3", [1, 2, 3]), (t.array(((1, 3),), t.INT), "[1, -2, 16#F]", [1, -2, 15]),
     (t.array(((1, 2),), t.string()), "'a,b', c", ["a,b", "c"]), (COLOUR, "5", 5), (LEVEL, "100", 100),
     (CHAR, "a", "a"), (CHAR, "'", "'"), (CHAR, "'$0A'", "\n"), (CHAR, "CHAR#'x'", "x"), (WCHAR, '"$20AC"', "\u20ac"),
