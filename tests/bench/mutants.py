@@ -51,7 +51,12 @@ TESTS = {
     "check": ("tests/unit/check", "tests/lang", "tests/unit/code"),
     "interchange": ("tests/unit/interchange", "tests/plcopen", "tests/cx", "tests/twincat"),
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
-    "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
+    "engine": ("tests/unit/engine", "tests/lang", "tests/property"),
+    "engine/counted.py": ("tests/unit/machine/test_counting.py",), "engine/powered.py": ("tests/unit/machine/test_power.py",),
+    "engine/stops.py": ("tests/unit/machine/test_breakpoints.py",),
+    "engine/choice": ("tests/unit/machine/test_breakpoints.py", "tests/unit/machine/test_many_scans.py"),
+    "engine/native/scans": ("tests/unit/machine/test_many_scans.py", "tests/unit/machine/test_units_in_code.py"),
+    "units": ("tests/unit/units", "tests/fblib"),
     "processor": ("tests/unit/processor", "tests/unit/machine", "tests/unit/units"),
     "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run", "tests/fblib/test_network_instructions.py"),
     "record": ("tests/unit/record", "tests/unit/cli", "tests/cx/test_diff.py"), "run": (

@@ -62,3 +62,19 @@ def test_no_answer_says_why(call, code: str, values: tuple[object, ...]) -> None
 ])
 def test_power_beyond_the_range_and_at_zero(a: float, b: float, expected: float) -> None:
     assert repr(power(a, b)) == repr(expected)
+
+
+@each_of("how, value, kind, expected", [
+    ("nearest", -32768.4, "i16", -32768), ("nearest", 32767.4, "i16", 32767), ("nearest", 32767.5, "i16", None),
+    ("nearest", -32768.5, "i16", -32768), ("nearest", -32769.5, "i16", None), ("nearest", 254.5, "u8", 254),
+    ("nearest", -0.5, "u8", 0), ("nearest", -0.6, "u8", None), ("truncate", -128.9, "i8", -128), ("truncate", -129.0, "i8", None),
+    ("truncate", 127.9, "i8", 127), ("truncate", 128.0, "i8", None), ("truncate", -0.9, "u8", 0), ("truncate", 255.9, "u8", 255),
+    ("nearest", NAN, "i16", None), ("truncate", INF, "i64", None), ("truncate", -(2.0**63), "i64", -(2**63)),
+])
+def test_a_real_becomes_an_integer_up_to_both_ends_of_its_range(how: str, value: float, kind: str, expected: int | None) -> None:
+    try:
+        found: int | None = getattr(arithmetic, how)(value, kind)
+    except Undefined as error:
+        assert error.code == "R0105"
+        found = None
+    assert found == expected

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -161,18 +162,21 @@ def test_the_state_of_a_folder_is_that_of_all_files_below(tmp_path: Path) -> Non
     assert list(cache._state(str(tmp_path))) != before
 
 
-def written(root: Path, kept: Cache, count: int) -> list[int]:
-    """Writes so many files of 100 bytes, each used a second later than the one before; returns which of them are there."""
+def written(root: Path, kept: Cache, count: int, processes: bool) -> list[int]:
+    """Writes so many files of 100 bytes, each used a second later than the one before; returns which of them are there.
+
+    Each `process` lists the folder at its first write, so that all files count."""
     for number in range(count):
+        kept = replace(kept, _held={}) if processes else kept
         kept.write(str(number), bytes(100 - len(kept.head) - 32))
-        os.utime(kept.folder / str(number), (number, number)) if (kept.folder / str(number)).exists() else None
+        if (kept.folder / str(number)).exists():
+            os.utime(kept.folder / str(number), (number, number))
     return sorted(int(path.name) for path in kept.folder.iterdir())
 
 
+@pytest.mark.parametrize("processes", [False, True], ids=["one process", "several processes"])
 @pytest.mark.parametrize("limits", [(1000, 99), (1 << 20, 10)], ids=["bytes", "files"])
-def test_above_a_limit_the_oldest_files_go_until_a_quarter_is_free(root: Path, limits: tuple[int, int]) -> None:
-    assert written(root, Cache("full", b"head", *limits), 10) == list(range(10))
-    assert written(root, Cache("more", b"head", *limits), 11) == list(range(4, 11))
-    again = Cache("full", b"head", *limits)  # another process, which finds the folder full
-    again.write("10", bytes(64))
-    assert sorted(int(path.name) for path in again.folder.iterdir()) == list(range(4, 11))
+def test_above_a_limit_the_oldest_files_go_until_a_quarter_is_free(root: Path, limits: tuple[int, int], processes: bool) -> None:
+    assert written(root, Cache("full", b"head", *limits), 10, processes) == list(range(10))
+    assert written(root, Cache("more", b"head", *limits), 11, processes) == list(range(4, 11))
+    assert written(root, Cache("most", b"head", *limits), 14, processes) == list(range(4, 14))
