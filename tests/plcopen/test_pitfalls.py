@@ -41,6 +41,20 @@ def test_a_function_of_the_project_is_called_once_where_its_en_is_true(pins: str
     assert states(made, "x", ["", "a=1", "a=0"]) == x
 
 
+def test_literals_have_the_type_of_the_result_to_which_they_lead() -> None:
+    """Nothing else says which type MOVE keeps while its EN is FALSE."""
+    drawn = (value(2, "a") + value(3, "30") + block(4, "MOVE", "EN=2 IN=3", "ENO,OUT") + value(5, "b")
+             + block(6, "MOVE", "EN=5 IN=3", "ENO,OUT") + block(7, "ADD", "IN1=4.OUT IN2=6.OUT", "OUT") + value(8, "5")
+             + block(9, "MAX", "IN1=7.OUT IN2=8", "OUT") + result(10, "9.OUT", "Speed"))
+    declared = f"<inputVars>{variable('a')}{variable('b')}</inputVars>"
+    function = pou(drawn, declared, "function", "Speed").replace("<returnType><BOOL/>", "<returnType><INT/>")
+    main = pou(value(2, "x") + value(3, "y") + block(4, "Speed", "a=2 b=3", "OUT") + result(5, "4.OUT", "n"),
+               variable("x") + variable("y") + variable("n", "INT"))
+    made = imported(function, main)
+    assert not made.errors
+    assert states(made, "n", ["", "x=1", "y=1", "x=0"]) == ["5", "30", "60", "30"]
+
+
 def test_a_function_without_enable_that_two_variables_take_is_called_once() -> None:
     drawn = value(4, "3") + block(3, "Twice", "v=4", "OUT") + result(5, "3.OUT", "n") + result(6, "3.OUT", "m")
     made = imported(TWICE, pou(drawn, variable("n", "INT") + variable("m", "INT"), language="FBD"))

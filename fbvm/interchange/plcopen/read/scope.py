@@ -165,6 +165,8 @@ class Scope:
         _, found = self.own.get(first.strip().upper(), ("", None))
         if found is None:
             found = self.document.globals_by_name.get(first.upper())
+        if found is None and not rest and self.is_function and first.upper() == self.pou.name.upper():
+            return self.pou.result
         if found is not None and not rest:
             return found.type
         if found is not None and len(rest) == 1:
