@@ -95,6 +95,7 @@ class Dialect:
     short_addresses: bool = False
     dates_take_durations: bool = False
     callables_apart: bool = False
+    sizes_apart: bool = False
     short_names: bool = False
     own_time: bool = False
     short_circuit_words: bool = False
@@ -224,6 +225,9 @@ QUESTIONS = {
                         "pointer"),
     "dates_take_durations": ("D#2024-12-31 + T#1d: a DATE and a TIME", "an error",
                              "the DATE so much later or earlier, which may have hours in it"),
+    "sizes_apart": ("a AT %QX0.0 beside b AT %QW0: a bit of the word", "shares memory with it",
+                    "shares memory with it, with a warning (S0691): on a PLC of OpenPLC or Beremiz each size of address has "
+                    "memory of its own"),
     "callables_apart": ("DAY_OF_MONTH(d), where a variable that is no instance has the name of the function", "an error",
                         "the function"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
@@ -288,7 +292,7 @@ _ROWS = (
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
             wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True, functions_have_inputs=True,
-            warned=OBJECTS | {"POINTER TO", "REFERENCE TO"}),
+            sizes_apart=True, warned=OBJECTS | {"POINTER TO", "REFERENCE TO"}),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional", "strucpp"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,

@@ -257,3 +257,17 @@ def test_a_falling_edge_of_beremiz_is_its_f_trig_also_in_the_first_scan(order: s
     assert machine.read("Main.x") is x
     machine.scan()
     assert machine.read("Main.x") is False
+
+
+@each_of(("header", "configuration", "family"), [
+    ('companyName="Unknown" productName="Line 4"', "plant", "beremiz"),
+    ('companyName="Acme" productName="Unnamed"', "plant", "beremiz"),
+    ('companyName="Acme" productName="Line 4"', "Config0", "beremiz"),
+    ('companyName="Acme" productName="Line 4"', "plant", ""),
+    ('companyName="Acme" productName="CODESYS"', "Config0", "codesys"),
+])
+def test_a_renamed_project_of_beremiz_is_known_by_what_its_user_left(header: str, configuration: str, family: str) -> None:
+    text = document(pou(coil(2, "1", "a") + RAIL, "a")).decode().replace("<types>", f"<fileHeader {header}/><types>")
+    text = text.replace("</project>", f'<instances><configurations><configuration name="{configuration}"><resource name="Res0"/>'
+                        "</configuration></configurations></instances></project>")
+    assert import_xml(text.encode()).family == family

@@ -28,7 +28,8 @@ GIVEN = "it was given"
 """Why an order is taken that somebody asked for."""
 _UNNAMED = frozenset((
     "unknown", "unnamed", "unbekannt", "unbenannt", "desconocido", "sin nombre", "desconhecido", "sem nome", "inconnu", "sansnom",
-    "sans nom", "sconosciuto", "senza nome", "неизвестно", "неизвестный", "безымянный", "未知", "未命名", "不明", "名称未設定"))
+    "sans nom", "sconosciuto", "senza nome", "неизвестно", "неизвестный", "безымянный", "neznámo",
+    "未知", "未命名", "不明", "名称未設定"))
 """What Beremiz and OpenPLC Editor write as company and product, in the language of the desktop."""
 _NAMED = {"twincat": ("twincat",), "codesys": ("codesys", "e!cockpit", "machine expert", "somachine"),
           "beremiz": ("beremiz", "openplc"), "fbvm": ("fbvm",)}
@@ -71,8 +72,12 @@ def _family(root: Element) -> tuple[str, str]:
     for family, words in _NAMED.items():
         if any(word in said for word in words):
             return family, f"the header names {product or company}"
-    if company.casefold() in _UNNAMED and product.casefold() in _UNNAMED:
-        return "beremiz", f"the header says {company} and {product}, as Beremiz and OpenPLC Editor write it"
+    unnamed = [name for name in (company, product) if name.casefold() in _UNNAMED]
+    if unnamed:
+        return "beremiz", f"the header says {' and '.join(unnamed)}, as Beremiz and OpenPLC Editor write it"
+    if any(one.get("name") == "Config0" and any(part.get("name") == "Res0" for part in one.walk() if part.name == "resource")
+           for one in root.walk() if one.name == "configuration"):
+        return "beremiz", "it has the configuration Config0 with the resource Res0, as Beremiz and OpenPLC Editor name them"
     return "", "the header names no known tool"
 
 
