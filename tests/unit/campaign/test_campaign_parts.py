@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from fbvm import Plc, compile_text
-from fbvm.campaign import project_copies
+from fbvm.base.diagnostics import Source
+from fbvm.campaign import project_copies, runs
 from fbvm.campaign.axes import axis_from_text
 from fbvm.campaign.execution import Execution, Result
 from fbvm.campaign.groups import grouped, in_common
@@ -23,7 +24,7 @@ from fbvm.campaign.mutation.mutants import EQUAL, KILLED, SURVIVED, TIMED_OUT, C
 from fbvm.campaign.mutation.session import NotPossible, Outcome, Settings
 from fbvm.campaign.mutation.trial import AsItIs, Equality
 from fbvm.campaign.plan import Axis, Judging, Plan, Response
-from fbvm.campaign.plan_file import Written, with_about
+from fbvm.campaign.plan_file import Written, read_plan_file, with_about
 from fbvm.campaign.planning import Unfit, images_of, plan_of, program_project, unfit_conditions
 from fbvm.campaign.processes import Crashed, Late
 from fbvm.campaign.project_copies import TooLarge, copy_project, files_of, pack_project, unpack_project
@@ -141,6 +142,49 @@ def test_a_plan_that_judges_nothing_but_traps_is_told(program: tuple[Project, An
         {"responses": (Response("Main.Busy", "Main.Done", MS),)}]  # fmt: skip
     assert [list(unfit_conditions(plan(program, **about))) for about in judged] == [[]] * 4
     assert [said[:15] for said in unfit_conditions(plan(program))] == ["only traps fail"]
+
+
+class Ends:
+    """An executor in whose hands some runs end their process."""
+
+    count = 1
+
+    def __init__(self, *bad: int) -> None:
+        self.bad, self.asked = set(bad), list[tuple[int, ...]]()
+
+    def done(self, tasks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
+        for task in tasks:
+            self.asked.append(task.numbers)
+            ends = self.bad & set(task.numbers)
+            yield task, Crashed("by SIGKILL") if ends else [Result(number) for number in task.numbers]
+
+
+def test_of_a_batch_that_has_ended_its_process_each_run_is_tried_alone() -> None:
+    executor, taken = Ends(3), list[Result]()
+    runs._execute(executor, range(6), 2, taken.extend)  # type: ignore[arg-type]
+    assert executor.asked == [(0, 1), (2, 3), (4, 5), (2,), (3,)]
+    assert [(result.number, result.failure is None) for result in taken] == [
+        (0, True), (1, True), (4, True), (5, True), (2, True), (3, False)]  # fmt: skip
+
+
+def test_a_mutant_has_the_line_in_which_its_change_begins() -> None:
+    found = session.mutants_of([Source("b.st", "FUNCTION_BLOCK B\nVAR a : INT; END_VAR\n\n    a := 1;\nEND_FUNCTION_BLOCK\n")])
+    assert found and {each.line for each in found} == {4} and [each.number for each in found] == [*range(1, len(found) + 1)]
+    only = session.mutants_of([Source("b.st", BLOCKS)], {"b.st": {2}})
+    assert {each.change.pou for each in only} == {"Sum"} and session.mutants_of([Source("b.st", BLOCKS)], {"c.st": {1}}) == []
+    assert session.sample(only, 2, 5) == session.sample(only, 2, 5) and len(session.sample(only, 2, 5)) == 2
+    assert session.sample(only, 99, 5) == only
+
+
+def test_a_parameter_of_a_file_is_written_at_power_on_unless_it_says_when(tmp_path: Path) -> None:
+    file = tmp_path / "campaign.toml"
+    file.write_text('[campaign]\nruns = 3\n[[vary]]\nname = "Main.a"\nvalues = [1, 2]\n[[vary]]\nname = "Main.b"\nfrom = 1\n'
+                    'to = 7\nstep = 3\nat = "5ms"\n[[vary]]\nsetting = "cycle"\nplc = "pump"\nvalues = ["10ms"]\n')  # fmt: skip
+    written = read_plan_file(file)
+    assert isinstance(written, Written), written
+    assert [(axis.name, axis.at_ns, axis.values, axis.plc) for axis in written.axes] == [
+        ("Main.a", 0, (1, 2), ""), ("Main.b", 5 * MS, (1, 4, 7), ""), ("pump.cycle", 0, (10 * MS,), "pump")]
+    assert written.about["runs"] == 3 and written.about["seed"] == 0 and written.judging == Judging()
 
 
 # --- axes -------------------------------------------------------------------------------------------------------------
