@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 
 from fbvm.net.faults import Fault
-from fbvm.net.relays import Relay
+from fbvm.net.relays import Relay, RelayedPort
 from fbvm.net.stream import WINDOW_BYTES, End
-from fbvm.wire.link import Close, Peer, Request, Send, Sent
+from fbvm.wire.link import Close, Peer, Received, Request, Send, SendTo, Sent
 from fbvm.wire.tap import TapKind
 
 CLIENT, SERVER = Peer("192.168.250.2", 1024), Peer("192.168.250.1", 502)
@@ -121,3 +122,27 @@ def test_a_relay_holds_no_more_than_a_window_that_the_host_has_not_taken() -> No
     carrier.run()
     relay.told(Sent(7, WINDOW_BYTES), 0)
     assert asked[2:] == [Send(7, bytes(WINDOW_BYTES)), Close(7)]
+
+
+def test_a_port_under_faults_that_was_closed_sends_and_hears_nothing_more() -> None:
+    asked: list[object] = []
+    link = SimpleNamespace(pending=[])
+    behind = SimpleNamespace(submit=lambda requests, now_ns: asked.extend(requests))
+    late: list[Callable[[int], None]] = []
+    relays = SimpleNamespace(is_unit=lambda remote: remote.host == "10.0.0.1", run=lambda now_ns: None,
+                             pass_datagram=lambda local, remote, data, deliver: late.append(lambda now_ns: deliver(data, now_ns)))
+    unit, host = Peer("10.0.0.1", 9600), Peer("10.0.0.9", 9600)
+    port = RelayedPort(relays, link, 3, behind, 7, Peer("10.0.0.2", 9600))  # type: ignore[arg-type]
+    assert port.send_to(host, b"out", 0) == ""
+    port.told(Received(7, b"in", host), 0)
+    port.told(Received(7, b"unit", unit), 0)
+    assert link.pending == [Sent(3, 3), Received(3, b"unit", unit)] and len(late) == 2
+    for deliver in late:
+        deliver(1)
+    assert asked == [SendTo(7, host, b"out")] and link.pending[2:] == [Received(3, b"in", host)]
+    port.close(False, 2)
+    assert asked[1:] == [Close(7)]
+    for deliver in late:
+        deliver(3)
+    port.told(Received(7, b"unit", unit), 3)
+    assert len(asked) == 2 and len(link.pending) == 3

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import socket
 
+import pytest
+
 from fbvm.net.notices import Notice, NoticeKind
 from fbvm.net.tcp import TcpNetwork
-from fbvm.wire.link import Close, Grant, Listen, Peer
+from fbvm.wire.link import Close, Grant, Listen, Opened, Peer
 
 MS = 1_000_000
 DOOR = Peer("192.168.250.2", 502)
@@ -49,4 +51,31 @@ def test_a_caller_who_is_let_in_soon_is_no_news() -> None:
             if scan == 10:
                 link.submit([Close(1), Listen(1, 502), Grant(1, 99)], scan * 10 * MS)
     assert [notice.kind for notice in told] == [NoticeKind.LISTENING]
+    network.close()
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_who_came_beside_the_last_caller_is_let_in_by_the_next_socket_unless_gone_by_then(stays: bool) -> None:
+    network = TcpNetwork({DOOR: ("127.0.0.1", 0)})
+    link, where = network.attach(DOOR.host), network.host_endpoint(DOOR)
+    link.submit([Listen(1, 502), Grant(1, 99)], 0)
+
+    def opened(now_ns: int) -> list[int]:
+        """The channels that are opened within a second at most, in which nothing else has to happen."""
+        found: list[int] = []
+        for _ in range(100):
+            found += [event.channel for event in link.events(now_ns) if isinstance(event, Opened)]
+            if found or not network.wait(0.01):
+                break
+        return found
+
+    with socket.create_connection((where.host, where.port), 5), socket.create_connection((where.host, where.port), 5) as second:
+        assert opened(MS) == [1]
+        if not stays:
+            second.close()
+        link.submit([Listen(2, 502), Grant(2, 99)], 2 * MS)
+        assert opened(2 * MS) == ([2] if stays else [])
+        if not stays:
+            with socket.create_connection((where.host, where.port), 5):
+                assert opened(3 * MS) == [2]
     network.close()
