@@ -283,7 +283,7 @@ _ROWS = (
     _CODESYS,
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
             libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit"), unsigned_ltime=True,
-            large_memory=True),
+            large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
             libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
@@ -378,6 +378,15 @@ ALIKE = (
      "another name, and the block declares what has an address. RuSTy takes both."),
     ("__FPOINTER, __VOID, __vtable, POINTER TO Block.Method, REF_TO Function, Table#(p^) of RuSTy", "Errors: RuSTy makes "
      "calls of methods from them inside; a program calls a method through a base or an interface instead."),
+    ("-2 ** 2, -x ** 2", "4: the sign belongs to the base, with a warning (S0392); some compilers give -4."),
+    ("1.0 / 0.0 as a constant", "Infinity, as at run time, with a warning (S0792)."),
+    ("ET of a timer in the scan in which IN rises", "0; ladder-logic-editor and truST have one period at once, so that Q comes a "
+     "scan earlier."),
+    ("ET of TP behind the pulse, when IN is FALSE", "0; IronPLC keeps PT."),
+    ("FOR i := 1 TO 5: i behind the loop", "6: the first value beyond the limit."),
+    ("CASE 10..1", "An error (S0503)."),
+    ("WHILE and REPEAT that never end", "The program stops when its step budget is spent (R0104)."),
+    ("A coil behind a coil in a drawing, with two wires into the first", "OR, as it is drawn; older OpenPLC makes AND of it."),
     ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),
 )
 """What users ask about, and every dialect answers alike."""
