@@ -322,7 +322,7 @@ def test_what_is_said_of_tests_that_execute_everything(
         "missed": [{"place": f"text.st:{line}", "scans": scans} for (line, _), scans in missed.items()]}
 
 
-REPORT = """<coverage><packages><package><classes><class filename="text.st"><lines>
+THREE_LINES = """<coverage><packages><package><classes><class filename="text.st"><lines>
 <line number="2" hits="4" branch="true" condition-coverage="50% (1/2)"/><line number="3" hits="{}"/><line number="5" hits="4"/>
 </lines></class></classes></package></packages></coverage>"""
 
@@ -334,7 +334,7 @@ def test_what_a_report_says_to_be_executed(hits: int, ways: str, known: list[boo
                                            monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
     """`known` are the statement in the branch, and the way past the branch: executed if more ways were taken than branches."""
     monkeypatch.chdir(tmp_path)
-    Path("report.xml").write_text(REPORT.format(hits).replace("1/2", ways), encoding="utf-8")
+    Path("report.xml").write_text(THREE_LINES.format(hits).replace("1/2", ways), encoding="utf-8")
     asked = prove_tests._known(Path("report.xml"))
     inside, whole = Site("text.st", "Main", 3, 5), Site("text.st", "Main", 2, 1)
     assert [asked(inside, []), asked(whole, [inside])] == known
