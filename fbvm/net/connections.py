@@ -189,7 +189,8 @@ class Connection(HostChannel):
             self._watch()
         else:
             self.granted -= len(data)
-            self._tap(now_ns, DATA, False, data)
+            if self.network.tap:
+                self._tap(now_ns, DATA, False, data)
             self.link.pending.append(Received(self.channel, data))
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
@@ -208,7 +209,8 @@ class Connection(HostChannel):
         except OSError as error:
             self._broke(error, now_ns)
             return
-        self._finish(sock, now_ns)
+        if self._orphan:
+            self._finish(sock, now_ns)
         if self._outbox or self.watched & WRITE:
             self._watch()
 

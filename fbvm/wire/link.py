@@ -6,6 +6,9 @@ them is one of these values.  A *channel* is a number that the unit chooses (its
 
 Flow control: a network hands over received bytes only as far as the unit has granted them with `Grant`.  What the unit
 has no room for stays in the network, so that the TCP window closes instead of data being lost.
+
+Nobody changes one of these values.  Those of which exchanges consist are not frozen all the same, since a frozen one takes three
+times as long to make.
 """
 
 from __future__ import annotations
@@ -68,7 +71,7 @@ class Bind:
     local_port: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, unsafe_hash=True)
 class Send:
     """Hand bytes to the TCP connection.  Answer: one `Sent` (all were taken) or `Failed`."""
 
@@ -85,7 +88,7 @@ class SendTo:
     data: bytes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, unsafe_hash=True)
 class Grant:
     """Room for `size` bytes in all from now on (not added to an earlier grant).  No answer."""
 
@@ -129,7 +132,7 @@ class Failed:
     error: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, unsafe_hash=True)
 class Sent:
     """The network has taken all bytes of the last `Send` or `SendTo`."""
 
@@ -137,7 +140,7 @@ class Sent:
     size: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, unsafe_hash=True)
 class Received:
     """Bytes of the TCP stream, or one datagram with its sender.  Never more TCP bytes than granted."""
 
