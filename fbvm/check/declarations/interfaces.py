@@ -249,7 +249,7 @@ class _Interface:
             return
         if self.scope.dialect.pragmas_act and passes_places(self.pou.source, section):
             made.kind, made.by_reference = "VAR_IN_OUT", True
-        elif isinstance(made.type, AnyType) or self._is_instance_elsewhere(made) or self._is_open_input(made):
+        elif isinstance(made.type, AnyType) or self._is_instance_elsewhere(made) or isinstance(made.type, OpenArrayType):
             made.kind, made.by_reference = "VAR_IN_OUT", True
             made.constant = not isinstance(made.type, AnyType)
 
@@ -257,9 +257,12 @@ class _Interface:
         """True for an input that is an instance and reads it where it lies; some dialects copy it into one of the block's own."""
         return is_block(made.type) and (self.pou.is_function or not self.scope.dialect.instances_are_values)
 
-    def _is_open_input(self, made: Variable) -> bool:
-        """True for an input ARRAY [*] of a FUNCTION, which reads the argument where it lies and may not write it."""
-        return isinstance(made.type, OpenArrayType) and self.pou.is_routine and not self.scope.dialect.no_open_inputs
+    def _takes_bounds(self, variable: Variable) -> bool:
+        """True for what takes bounds, size or type from an argument: an in-out, ANY, and an input ARRAY [*] of a FUNCTION, which
+        reads the argument where it lies and may not write it."""
+        if not variable.by_reference or not isinstance(variable.type, OpenArrayType):
+            return variable.kind == "VAR_IN_OUT"
+        return self.pou.is_routine and not self.scope.dialect.no_open_inputs
 
     def _place(self, variable: Variable, declared: tree.VarDecl) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
@@ -296,15 +299,16 @@ class _Interface:
     def _check_bounds(self, variable: Variable, declared: tree.VarDecl) -> None:
         """Report ARRAY [*] and ANY that are no in-outs: they take bounds, size and type from the argument."""
         kind = variable.type
-        if isinstance(kind, _WITH_BOUNDS) and variable.kind != "VAR_IN_OUT":
+        if isinstance(kind, _WITH_BOUNDS) and not self._takes_bounds(variable):
             what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"
-            if variable.kind == "VAR_INPUT" and self.pou.is_routine:
+            section = "VAR_INPUT" if variable.by_reference else variable.kind
+            if section == "VAR_INPUT" and self.pou.is_routine:
                 self._error("S0903", declared.spec, f"{what} as an input is not in the dialect {self.scope.dialect.name}",
                             f"declare it in VAR_IN_OUT, or take {takers('no_open_inputs', False)}")
             else:
-                self._error("S0205", declared.spec, f"{what} cannot be {variable.kind} of a {self.pou.kind}",
+                self._error("S0205", declared.spec, f"{what} cannot be {section} of a {self.pou.kind}",
                             "declare it in VAR_IN_OUT" + ("; only a FUNCTION takes it as VAR_INPUT" if
-                                                          variable.kind == "VAR_INPUT" and what == "ARRAY [*]" else ""))
+                                                          section == "VAR_INPUT" and what == "ARRAY [*]" else ""))
 
     def _edge(self, variable: Variable, declared: tree.VarDecl) -> None:
         if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or self.pou.is_routine:

@@ -99,6 +99,7 @@ _SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
     (r"\?", "write SEL(condition, if_false, if_true)"),
     (r"#[ \t]*(?:include|define|if|ifdef|ifndef|pragma)\b", "there is no preprocessor: declare constants in VAR CONSTANT"),
     (r"(?<!\.)%[A-Za-z]", "an address has a number behind its letters: %QX0.0, %MW10"),
+    (r"(?<=\w)\$", "a name has letters, digits and `_`"),
     (r"#[A-Za-z_]", "`#` in front of a name is Siemens SCL: leave it out"),
     (r"(?i)@EXTERNAL\b", "RuSTy now writes the pragma {external}, in front of a POU whose body is in another language"),
     (r"#", "a type stands in front of `#`, and no space"),
@@ -106,7 +107,7 @@ _SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
 """Characters with which no token begins, and a hint."""
 _WRITTEN = tuple((re.compile(row[0]), *row[1:]) for row in (
     (r"#([0-9.]+(?:[mun]s|[dhms]))\b", "TYPED_LITERAL", r"T#\1", r"`\g<0>` is no duration", r"a duration is written T#\1"),
-    (r"[#$]([0-9A-Fa-f]+)\b", "NUMBER", r"16#\1", r"`\g<0>` is no number", r"hexadecimal digits are written 16#\1"),
+    (r"(?<!\w)[#$]([0-9A-Fa-f]+)\b", "NUMBER", r"16#\1", r"`\g<0>` is no number", r"hexadecimal digits are written 16#\1"),
     (r"[\u2018-\u201f`\u00b4]([^'\u2018-\u201f`\u00b4\r\n]*)[\u2018-\u201f`\u00b4]", "STRING_LITERAL", r"'\1'",
      "the quotes are not straight", r"a text is written '\1'"),
     (r"#[ \t]+[A-Za-z][^\r\n]*", "", "", "`#` begins no comment", "a comment begins with // or stands in (* *)")))
