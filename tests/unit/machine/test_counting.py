@@ -114,3 +114,27 @@ def test_a_scan_that_is_done_again_counts_once(image: Image) -> None:
         counts.back_to(before)
         plc.run(scans=1)
     assert lines(image, counts.executed()) == {4: 3, 8: 3, 9: 3, 10: 3, 11: 0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["python", *["native"] * native.available()])
+def test_statements_in_front_of_a_trap_count_each_time(engine: str) -> None:
+    """Machine code counts a piece at its beginning and takes back what a trap has left out, once for each trap."""
+    text = """PROGRAM Main
+VAR n, d : INT; END_VAR
+  n := n + 1;
+  d := d + 1;
+  IF n > 2 THEN
+    d := 10 / (n - 4);
+    d := d + 1;
+  END_IF;
+END_PROGRAM"""
+    made = compile_text(text).image
+    assert made is not None
+    plc = Plc(made, engine=engine)
+    with counting(plc) as counts:
+        for times in (1, 2, 3):
+            assert plc.run(scans=10) == "trap"
+            assert lines(made, counts.executed()) == {3: 4 * times, 4: 4 * times, 5: 4 * times, 6: 2 * times, 7: times}
+            assert lines(made, counts.skipped()) == {5: 2 * times}
+            plc.warm_start()
