@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from images import counter_image
+from rows import each_of
 from test_run_loop import MS, Clock, RealNetwork, real_plc
 
 from fbvm.machine.plc import Plc
+from fbvm.run import project_reader as reader
 from fbvm.run import real_pace, slices, time_limit
 from fbvm.run.plc_names import PlcNames
 from fbvm.run.real_pace import RealPace
 from fbvm.run.slices import SLICE_NS, TOLD_NS, Slices
 from fbvm.watch.paths import UnknownPlace
+from fbvm.wire.link import Peer
 
 
 def names(alone: bool, *plcs: str) -> tuple[PlcNames, dict[str, Plc]]:
@@ -92,3 +97,54 @@ def test_under_a_debugger_real_time_stands_while_no_scan_is_executed(monkeypatch
     pace.begin()
     assert 55 * MS <= pace.wait(55 * MS) < 56 * MS and len(served) == 3
     assert network.driven is False
+
+
+WEEK = reader.time_between(10 * MS, 1000 * MS, "from 10 ms to 1 s")
+RANGE, TIMES = reader.first_and_last(reader.whole(1, 9)), reader.one_or_more(reader.time_ns)
+
+
+@each_of(("kind", "written", "value"), [
+    (reader.text, "a", "a"), (reader.texts, ["a", "b"], ("a", "b")), (reader.texts_by_name, {"TRUE": "red"}, {"TRUE": "red"}),
+    (reader.flag, False, False), (reader.time_ns, "1ms", MS), (reader.moment_ns, "0s", 0), (reader.ip, "0.0.0.255", "0.0.0.255"),
+    (reader.endpoint, "1.2.3.4:65535", Peer("1.2.3.4", 65535)), (reader.host, "localhost:0", ("localhost", 0)),
+    (RANGE, 3, (3, 3)),
+    (reader.host, "::1:5", ("::1", 5)), (reader.whole(-1, 3), -1, -1), (reader.whole(-1, 3), 3, 3), (WEEK, "10ms", 10 * MS),
+    (WEEK, "1s", 1000 * MS), (RANGE, [1, 9], (1, 9)), (RANGE, [2, 2], (2, 2)), (TIMES, "1ms", (MS,)),
+    (TIMES, ["2ms", "1ms"], (2 * MS, MS)),
+    (reader.one_of(("a", "b")), "b", "b"), (reader.anything, [1], [1]),
+])  # fmt: skip
+def test_what_is_written_for_a_key(kind: reader.Kind, written: object, value: object) -> None:
+    assert kind.value(written) == value
+
+
+@each_of(("kind", "written", "said"), [
+    (reader.text, "", "no text"), (reader.text, 5, "no text"), (reader.texts, [], "no list"),
+    (reader.texts, ["a", ""], "no list"),
+    (reader.texts, "a", "no list"), (reader.texts, ["a", 1], "no list"), (reader.texts_by_name, {}, "no table"),
+    (reader.texts_by_name, {"a": ""}, "no table"), (reader.texts_by_name, ["a"], "no table"),
+    (reader.texts_by_name, {"a": 1}, "no table"),
+    (reader.flag, 1, "neither true nor false"), (reader.time_ns, "0s", "no time that can pass"),
+    (reader.time_ns, 5, "no time; write it"),
+    (reader.moment_ns, "-1ms", "before power-on"), (reader.ip, "1.2.3.256", "no IPv4"), (reader.ip, "1.2.3", "no IPv4"),
+    (reader.ip, "1.2.3.x", "no IPv4"), (reader.ip, 5, "no IPv4"), (reader.endpoint, "1.2.3.4:65536", "no address and port"),
+    (reader.endpoint, ":502", "no address and port"), (reader.host, "localhost", "no address and port; write"),
+    (WEEK, "9ms", "no time from"),
+    (reader.host, "localhost:x", "no address"), (reader.whole(-1, 3), -2, "no whole number from -1 to 3"),
+    (reader.whole(-1, 3), 4, "no whole"),
+    (reader.whole(-1, 3), True, "no whole number"), (reader.whole(-1, 3), 1.0, "no whole number"),
+    (WEEK, "1001ms", "no time from 10 ms"),
+    (RANGE, [2, 1], "no range; write"), (RANGE, [1], "no range"), (RANGE, [1, 2, 3], "no range"),
+    (RANGE, [1, 10], "no whole number"),
+    (TIMES, [], "says nothing"), (TIMES, ["0s"], "no time"), (reader.one_of(("a", "b")), "c", "'c' is none of a, b"),
+])  # fmt: skip
+def test_what_is_no_value_of_a_key(kind: reader.Kind, written: Any, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        kind.value(written)
+
+
+def test_what_kinds_are_called() -> None:
+    kinds = (reader.whole(1, 3), reader.whole(0, 1 << 62), reader.one_of(("a", "b")), RANGE, TIMES, WEEK)
+    assert [kind.called for kind in kinds] == [
+        "a whole number from 1 to 3", "a whole number from 0", '"a" or "b"',
+        "a whole number from 1 to 9, or a list of two, the first and the last", 'a time above 0, such as "10ms", or a list of such',
+        "a time from 10 ms to 1 s"]  # fmt: skip
