@@ -146,5 +146,6 @@ def test_what_kinds_are_called() -> None:
     kinds = (reader.whole(1, 3), reader.whole(0, 1 << 62), reader.one_of(("a", "b")), RANGE, TIMES, WEEK)
     assert [kind.called for kind in kinds] == [
         "a whole number from 1 to 3", "a whole number from 0", '"a" or "b"',
-        "a whole number from 1 to 9, or a list of two, the first and the last", 'a time above 0, such as "10ms", or a list of such',
+        "a whole number from 1 to 9, or a list of two, the first and the last",
+        'a time above 0, such as "10ms", or a list of such',
         "a time from 10 ms to 1 s"]  # fmt: skip

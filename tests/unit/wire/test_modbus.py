@@ -77,8 +77,19 @@ def test_the_sheets_frames(request_hex: str, reply_hex: str) -> None:
         ("08 00 00", "88 03"),
         ("08 00 00 01", "88 03"),
         ("08 00 15 00 00", "88 01"),
+        ("17 00 63 00 01 00 62 00 02 04 00 01 00 02", "17 02 00 02"),
+        ("17 00 00 00 01 00 63 00 02 04 00 00 00 00", "97 02"),
+        ("17 00 63 00 02 00 00 00 01 02 00 00", "97 02"),
+        ("17 00 00 00 00 00 00 00 01 02 00 00", "97 03"),
+        ("17 00 00 00 01 00 00 00 00 00", "97 03"),
+        ("08 00 0B 12 34", "88 03"),
+        ("08 00 0B 00 00 00 00", "88 03"),
         ("2B 0D 01 00", "AB 01"),
         ("2B 0E 05 00", "AB 03"),
+        ("2B 0E 00 00", "AB 03"),
+        ("2B 0E 01", "AB 03"),
+        ("2B 0E 01 00 00", "AB 03"),
+        ("2B", "AB 01"),
     ],
 )
 def test_order_of_the_servers_checks(request_hex: str, reply_hex: str) -> None:
@@ -287,6 +298,31 @@ def test_every_counter_of_diagnostics_can_be_asked(sub: int, count: int) -> None
     assert reply is not None and reply[7:10] == bytes((8, 0, sub))
     assert int.from_bytes(reply[10:12], "big") == count
     assert server.answer(Adu(1, 1, bytes((8, 0, 0x13, 0, 0))).to_bytes()) == Adu(1, 1, b"\x88\x01").to_bytes()
+
+
+@each_of(("ids", "code", "reply"), [
+    ([0, 1, 2], 1, "81 00 00 03 00 01 02"), ([0, 1, 2], 3, "81 00 00 03 00 01 02"), ([0, 2, 3], 1, "82 00 00 02 00 02"),
+    ([0, 2, 3], 2, "82 00 00 03 00 02 03"), ([0, 0x7F, 0x80], 2, "83 00 00 02 00 7F"), ([0, 0x80], 3, "83 00 00 02 00 80"),
+    ([0, 0x80], 1, "83 00 00 01 00"), ([], 1, "81 00 00 00"),
+])  # fmt: skip
+def test_the_levels_of_an_identity(ids: list[int], code: int, reply: str) -> None:
+    """MODBUS Application Protocol V1.1b3, 6.21: basic to 02, regular to 7F, extended to FF; the conformity says what there is."""
+    answer = ModbusServer(identity=dict.fromkeys(ids, "")).answer_pdu(modbus.identify(code))
+    head, found = answer[:7], answer[7:]
+    assert (head[:3], found[1::2]) == (bytes((0x2B, 0x0E, code)), bytes(len(found) // 2))
+    assert (head[3:] + found[::2]).hex(" ").upper() == reply
+
+
+def test_coils_and_inputs_are_tables_of_their_own() -> None:
+    server = ModbusServer(coils=8, discrete_inputs=8, holding_registers=2, input_registers=2)
+    server.coils[1], server.discrete_inputs[2], server.holding_registers[0], server.input_registers[0] = 1, 1, 3, 4
+    replies = [server.answer_pdu(modbus.read(code, 0, 8 if code < 3 else 1)).hex(" ") for code in (1, 2, 3, 4)]
+    assert replies == ["01 01 02", "02 01 04", "03 02 00 03", "04 02 00 04"]
+
+
+def test_an_exception_without_a_code_names_none() -> None:
+    assert (decode_reply(b"\x83").exception, decode_reply(b"\x83\x00").fault) == (0, "wrong length")
+    assert decode_reply(b"\x83\x00").function == 3
 
 
 def test_an_identity_that_begins_nowhere_begins_with_its_first_object() -> None:
