@@ -12,6 +12,7 @@ from fbvm.engine.native import engine as native
 from fbvm.net.faults import KINDS, Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.run import run_all
+from fbvm.run.fault_rows import FAULT
 from fbvm.run.plant import MANY, Plant
 from fbvm.run.project import PLC, RUN, SERVER, Project, project_file, read_project
 from fbvm.run.toml_keys import span
@@ -401,6 +402,18 @@ def test_what_says_nothing_or_too_much_is_refused(folder: Path, text: str, messa
     found = read(folder, ONE + text)
     assert isinstance(found, list)
     assert said(found) == messages
+
+
+@each_of(("key", "least", "most"), [
+    ("lose_percent", 1, 100), ("duplicate_percent", 1, 100), ("segment_bytes", 1, 65535), ("from_scan", 0, 1 << 62),
+    ("until_scan", 1, 1 << 62), ("reset_after_bytes", 1, 1 << 62),
+])  # fmt: skip
+def test_numbers_of_a_fault_have_bounds(key: str, least: int, most: int) -> None:
+    value = FAULT[key].kind.value  # type: ignore[union-attr]
+    assert (value(least), value(most)) == (least, most)
+    for wrong in (least - 1, most + 1):
+        with pytest.raises(ValueError, match="no whole number"):
+            value(wrong)
 
 
 def test_faults_by_scan_and_by_kind(folder: Path) -> None:

@@ -11,7 +11,25 @@ from rows import each_of
 from fbvm.base.areas import AREAS, E_NAMES
 from fbvm.wire.fins.areas import SPANS, WORD_CODES, place_of, span_at, spans_of
 from fbvm.wire.fins.codes import COMMANDS, END_CODES, EndCode, command_name, meaning_of
-from fbvm.wire.fins.frames import Address, Command, Damaged, Header, Response, parse_frame
+from fbvm.wire.fins.frames import (
+    ANY_ETHERNET_UNIT,
+    CPU_BUS_UNITS,
+    CPU_UNIT,
+    EVERY_NODE,
+    LAST_NODE,
+    MAX_DATA_BYTES,
+    MAX_FRAME_BYTES,
+    MAX_PARAMETER_BYTES,
+    MIN_COMMAND_BYTES,
+    MIN_RESPONSE_BYTES,
+    PORT,
+    Address,
+    Command,
+    Damaged,
+    Header,
+    Response,
+    parse_frame,
+)
 from fbvm.wire.fins.tcp import ERRORS, Error, Kind, Message, Splitter, Unreadable, client_node, server_node
 from fbvm.wire.fins.text import described, described_message
 
@@ -82,6 +100,9 @@ def test_area_codes_name_what_the_manual_says() -> None:
             continue
         bits, words, first, count, area = row.split()
         start, size = int(first, 16), int(count)
+        for outside in (start - 1, start + size):
+            found = span_at(int(words, 16), outside)
+            assert found is None or found.area != area, row
         for number, at in ((start, 0), (start + size - 1, size - 1)):
             found = span_at(int(words, 16), number)
             assert found is not None and str(found.address(number - start)) == f"{_front(area)}{at}", row
@@ -93,6 +114,8 @@ def test_area_codes_name_what_the_manual_says() -> None:
         for code, name in ((int(flags, 16), flag_area), (int(words, 16), area)):
             found = span_at(code, int(first, 16) + int(count) - 1)
             assert found is not None and (found.area, found.count, found.start) == (name, int(count), 0), row
+            placed = place_of(code, int(first, 16), 0)
+            assert placed is not None and str(placed[0].address(placed[1])) == f"{name}0", row
             assert place_of(code, int(first, 16), 1) is None, "a flag has no bits"
 
 
@@ -166,12 +189,20 @@ def test_each_end_code_that_is_given_has_its_words() -> None:
     ("80 00 02 00 01 00 00 19 00 01 01 01 82 0000 00 00", "FINS 25 -> 1, service 1: memory area read"),
     ("80 00 02 00 01 00 00 19 00 01 01 05 82 0000 00 A0 0064 00 00", "FINS 25 -> 1, service 1: memory area transfer"),
     ("80 00", "no FINS: 2 bytes are less than the 12 of the shortest frame"),
-    ("00 00 02 00 01 00 00 19 00 01 04 02", "no FINS: ICF bit 7 is 0"),
+    ("7F 00 02 00 01 00 00 19 00 01 04 02", "no FINS: ICF bit 7 is 0"),
     ("80 01 02 00 01 00 00 19 00 01 04 02", "no FINS: RSV is not 00"),
     ("C0 00 02 00 19 00 00 01 00 01 01 01 11", "no FINS: a response without an end code"),
 ])  # fmt: skip
 def test_what_a_decoder_says(frame: str, said: str) -> None:
     assert described(parse_frame(bytes.fromhex(frame))) == said
+
+
+def test_numbers_of_the_manuals() -> None:
+    """W421 7-2 p162 and W342 3-5 p57: what fits into a frame; W342 3-4-2 p36: units and nodes."""
+    assert MAX_FRAME_BYTES == MIN_COMMAND_BYTES + MAX_PARAMETER_BYTES == MIN_RESPONSE_BYTES + MAX_DATA_BYTES == 2012
+    assert (CPU_UNIT, CPU_BUS_UNITS, ANY_ETHERNET_UNIT, LAST_NODE, EVERY_NODE, PORT) == (0x00, 0x10, 0xFE, 254, 0xFF, 9600)
+    header = Header(Address(), Address())
+    assert (header.service, header.icf, header.gateways, header.reserved) == (0, 0x80, 2, 0)
 
 
 def test_the_bytes_of_a_frame() -> None:

@@ -20,8 +20,8 @@ def test_an_endpoint_of_a_file(host: str, port: int) -> None:
 
 @each_of(("host", "port", "said"), [
     ("1.2.3.4", -1, "-1 is no port"), ("1.2.3.4", 65536, "65536 is no port"), ("1.2.3.4", True, "True is no port"),
-    ("1.2.3.4", "502", "'502' is no port"), ("1.2.3.4", 502.0, "502.0 is no port"), ("1.2.3", 502, "1.2.3"), ("here", 502, "here"),
-    (None, 502, "None"),
+    ("1.2.3.4", "502", "'502' is no port"), ("1.2.3.4", 502.0, "502.0 is no port"), ("1.2.3", 502, "1.2.3"),
+    ("here", 502, "here"), (None, 502, "None"),
 ])  # fmt: skip
 def test_what_is_no_endpoint_is_refused(host: Any, port: Any, said: str) -> None:
     with pytest.raises(ValueError, match=said):
