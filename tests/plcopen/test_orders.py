@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, result, value, variable, wires
+from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, result, states, value, variable, wires
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -271,3 +271,14 @@ def test_a_renamed_project_of_beremiz_is_known_by_what_its_user_left(header: str
     text = text.replace("</project>", f'<instances><configurations><configuration name="{configuration}"><resource name="Res0"/>'
                         "</configuration></configurations></instances></project>")
     assert import_xml(text.encode()).family == family
+
+
+@each_of(("order", "expected"), [("network", ["0 0 7", "1 1 8", "1 1 8"]), ("document", ["0 0 7", "1 1 8", "0 1 8"])])
+def test_a_function_that_is_not_enabled_gives_what_its_tool_gives(order: str, expected: list[str]) -> None:
+    """Behind a generator of Beremiz a coil takes FALSE then; a variable keeps its value, as everywhere."""
+    drawn = (value(2, "a") + value(3, "3") + value(4, "5") + block(5, "LT", "EN=2 IN1=3 IN2=4", "ENO,OUT") + coil(6, "5.OUT", "x")
+             + result(7, "5.OUT", "y") + block(8, "ADD", "EN=2 IN1=3 IN2=4", "ENO,OUT") + result(9, "8.OUT", "n"))
+    declared = variable("a") + variable("x") + variable("y") + variable("n", "INT", "7")
+    made = import_xml(document(pou(drawn, declared)), order=order)
+    assert not made.errors
+    assert states(made, "x y n", ["", "a=1", "a=0"]) == expected

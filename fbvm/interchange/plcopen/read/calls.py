@@ -207,12 +207,13 @@ class Calls:
         return next((sink for sink, found in self._next_sinks(item) if found == wire), None)
 
     def _result(self, item: Object, wire: Wire) -> str:
-        """The name of a new variable that keeps a result from pass to pass."""
+        """The name of a new variable that keeps a result from pass to pass; in text of a generator it has the first value of its
+        type in each pass in which EN is FALSE, as functions of matiec give it then."""
         scope = self.context.scope
         kind = scope.wire_type(wire) or self.context.sink_type(wire)
         if not kind:
             raise Unexecutable(item, f"the type of the result of {item.text} is not known", "lead it to a variable")
-        return scope.new(f"Result_{item.id}", kind, True)
+        return scope.new(f"Result_{item.id}", kind, not self.context.generates)
 
     def _function(self, item: Object) -> None:
         """A function of the project or of a library, which may write more than its result."""

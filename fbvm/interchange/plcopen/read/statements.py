@@ -64,7 +64,8 @@ class Statements:
             context.warn(item, f"{item.text} is not connected, and is not written")
             return
         target, writes = context.target(item)
-        guard = self.calls.guard(pin)
+        is_bare = context.generates and item.kind == "coil"  # a generator has no IF around coils
+        guard = None if is_bare else self.calls.guard(pin)
         value = context.modified(item, context.value_at(item, pin), item.negated, item.edge)
         if item.storage and item.negated and context.generates:
             context.warn(item, f"negated and {item.storage}: Beremiz and OpenPLC Editor assign the inverse in every scan")
@@ -87,7 +88,9 @@ class Statements:
         context = self.context
         if item.inputs[0].connected:
             target, writes = context.target(item)
-            context.write(f"{target} := {context.value_at(item, item.inputs[0]).text};", writes)
+            text = f"{target} := {context.value_at(item, item.inputs[0]).text};"
+            guard = self.calls.guard(item.inputs[0])
+            context.write(when(guard, text) if guard else text, writes)
         if not context.generates:  # a generator reads the variable wherever it is used
             context.set_output(Wire(item, ""), context.modified(item, context.expression(item.text), item.negated, item.edge))
 
