@@ -104,7 +104,7 @@ class Judge:
 
     def document(self, path: Path, name: str) -> None:
         """Judge the import of a document, and the export of what comes of it."""
-        imported = import_xml(path.read_bytes(), name, order=ORDER)
+        imported = import_xml(path, name, ORDER)
         sources = [Source(file, text) for file, text in imported.files.items()]
         image = _runnable(sources) if sources and not imported.errors else None
         if image is None:

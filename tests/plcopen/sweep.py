@@ -38,7 +38,7 @@ def sweep(folder: Path, dialect: str = "") -> Sweep:
 
 
 def _document(made: Sweep, path: Path, name: str, dialect: str) -> None:
-    imported = import_xml(path.read_bytes(), name)
+    imported = import_xml(path, name)
     dialect = dialect or FAMILIES.get(imported.family, "matiec")
     made.note("imported", name, cause(imported.errors))
     if not imported.files:

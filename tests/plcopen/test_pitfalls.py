@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from drawings import (
     RAIL,
@@ -11,6 +13,7 @@ from drawings import (
     contact,
     document,
     imported,
+    plc,
     pou,
     result,
     states,
@@ -20,6 +23,7 @@ from drawings import (
 )
 from rows import each_of
 
+from fbvm.interchange.formats.given import within
 from fbvm.interchange.plcopen.read.importing import import_xml
 
 BRANCH = RAIL + contact(2, "1", "a") + contact(3, "1", "b")
@@ -445,3 +449,27 @@ def test_an_instance_that_nothing_in_a_whole_project_declares_is_declared() -> N
     assert "nothing declares late: it becomes a variable of Main of the type TON" in made.diagnostics[0].message
     assert states(made, "x", ["a=1", "", "", "a=0"]) == ["0", "0", "1", "0"]
     assert "late : TON" not in imported(drawn).files["Main.st"]
+
+
+def test_variables_of_python_beside_a_document_begin_with_their_values(tmp_path: Path) -> None:
+    """A project of Beremiz declares them in the file of its Python code, which is not executed."""
+    code = ('<?xml version="1.0"?><PyFile><variables><variable name="Speed" type="INT" initial="5"/>'
+            '<variable name="Mode" type="STRING" initial="fast"/><variable name="ON" type="BOOL" initial="True"/></variables>'
+            "<globals><p>Speed = 7</p></globals></PyFile>")
+    (tmp_path / "python_0@py_ext").mkdir()
+    (tmp_path / "python_0@py_ext" / "pyfile.xml").write_text(code, encoding="utf-8")
+    (tmp_path / "broken@py_ext").mkdir()
+    (tmp_path / "broken@py_ext" / "pyfile.xml").write_text("<PyFile><variables>", encoding="utf-8")
+    outside = (f"<externalVars>{variable('Speed', 'INT')}{variable('Mode', 'string')}{variable('ON')}{variable('Other')}"
+               "</externalVars>").replace('<derived name="string"/>', "<string/>")
+    drawn = value(2, "Speed") + result(3, "2", "n") + value(4, "ON") + result(5, "4", "x")
+    text = document(pou(drawn, outside + f"<localVars>{variable('n', 'INT')}{variable('x')}</localVars>")).decode()
+    header = '<fileHeader companyName="Unknown" productName="Unnamed"/>'
+    (tmp_path / "plc.xml").write_text(text.replace("<types>", f"{header}<types>"), encoding="utf-8")
+    for made in (import_xml(tmp_path / "plc.xml"), within(tmp_path / "plc.xml")):
+        assert made is not None and not made.errors
+        said = [one.message for one in made.diagnostics if one.code == "X0292"]
+        assert [message.partition(": ")[0] for message in said] == ["Speed, Mode, ON", "no global list has Other"]
+        machine = plc(made)
+        machine.scan()
+        assert (machine.read("Main.n"), machine.read("Main.x"), machine.read("Mode")) == (5, True, "fast")

@@ -88,9 +88,9 @@ def _within(data: bytes, name: str, suffix: str, resource: str | None, memory: b
         texts = {source.name: source.text} if source else {}
         return Imported(texts, made.diagnostics, "twincat", f"{name} is an object of TwinCAT")
     if data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and DOCUMENT in data[:HEAD_BYTES]:
-        from fbvm.interchange.plcopen.read.importing import import_xml
+        from fbvm.interchange.plcopen.read.importing import declared_beside, import_xml
 
-        return _below(name, import_xml(data, name))
+        return _below(name, import_xml(data, name, beside=declared_beside(Path(name))))
     if is_binary(data):
         from fbvm.interchange.codesys2.importing import read_binary
 

@@ -5,7 +5,7 @@ Types, values and expressions are text of Structured Text by then; bodies are st
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -24,6 +24,8 @@ class Reading:
     where: str = ""
     counted: dict[str, tuple[Element, int]] = field(default_factory=dict)
     """What is left out in many places and not needed to run -> the first place, and how often."""
+    beside: Mapping[str, Variable] = field(default_factory=dict)
+    """Variables that other files of the project declare, by name in capitals."""
 
     def report(self, code: str, at: Element, message: str, hint: str = "") -> None:
         """A message about an element."""

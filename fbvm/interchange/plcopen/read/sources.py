@@ -55,6 +55,14 @@ def _outside(reading: Reading, document: Document, files: SourceFiles) -> None:
             if variable.name.upper() not in document.globals_by_name:
                 missing.setdefault(variable.name.upper(), variable)
     reading.where = ""
+    known = {name: reading.beside[name] for name in missing if name in reading.beside}
+    for name in known:
+        del missing[name]
+    if known:
+        names = ", ".join(variable.name for variable in known.values())
+        reading.report("X0292", document.pous[0].element, f"{names}: files of Python or C beside the document declare them; "
+                       "their code is not executed, so nothing but the program writes them")
+        files.add(f"{OUTSIDE}_code", _section(VarList("VAR_GLOBAL", (), tuple(known.values()))))
     if missing and reading.producer.family == "beremiz":
         names = ", ".join(variable.name for variable in missing.values())
         reading.report("X0292", document.pous[0].element, f"no global list has {names}: another file of the project declares "

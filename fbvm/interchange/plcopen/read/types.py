@@ -96,6 +96,11 @@ def value_text(holder: Element | None, kind: str = "", family: str = "") -> str:
         fields = [f"{v.get('member')} := {value_text(v)}" for v in inner.all("value")]
         return f"({', '.join(fields)})" if fields else ""
     text = inner.get("value").strip()
+    return initial_text(text, kind, family)
+
+
+def initial_text(text: str, kind: str, family: str) -> str:
+    """What a variable of a type begins with, as it is written in Structured Text."""
     quote = "'" if _TEXT.fullmatch(kind) else '"' if kind.startswith("WSTRING") else ""
     return quoted(text, quote, family) if quote and text else text
 
