@@ -6,18 +6,25 @@ import io
 import sys
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import click
 import pytest
 from click.testing import CliRunner, Result
 from rows import each_of
 
+from fbvm.campaign.progress import INTERRUPTED, OVER
 from fbvm.cli.main import main
+from fbvm.cli.projects.shown_progress import ShownProgress
+from fbvm.cli.running import dap, demo, project_run, serve
+from fbvm.cli.running import run as run_verb
+from fbvm.cli.running.live import _wiring
 from fbvm.cli.running.step import _chosen
+from fbvm.cli.shared.live.origins import FileOrigin
 from fbvm.cli.shared.run_result import RunProgress
 from fbvm.cli.shared.streams import give_up_output
 from fbvm.cli.shared.traces import LAST_SCAN, ScanRange
+from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 
 COUNTER = "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n"
@@ -182,3 +189,80 @@ END_PROGRAM
     assert "SECTION Lamps" in shown
     assert [line.split() for line in shown if "button" in line or "panel" in line] == [
         ["Start", "W0.00", "the", "green", "button"], ["Lamp", "W1.00", "on", "the", "panel"]]
+
+
+# --- what cannot be used ----------------------------------------------------------------------------------------------
+
+
+def test_a_demo_without_a_network_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> object:
+        raise OSError("no port is free")
+
+    monkeypatch.setattr(demo, "own_server", refused)
+    result = fbvm("demo", "--server", "own")
+    assert (result.exit_code, result.stdout) == (5, "The network cannot be used: no port is free\n")
+
+
+def test_a_project_whose_network_cannot_be_used_has_status_5(counter: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> object:
+        raise OSError(98, "Address already in use")
+
+    Path("fbvm.toml").write_text("[plc.a]\nsources = ['counter.st']\n", encoding="utf-8")
+    monkeypatch.setattr(project_run, "Plant", refused)
+    result = fbvm("run", "--scans", "1")
+    assert (result.exit_code, result.stderr) == (5, "the network cannot be used: Address already in use\n")
+
+
+@pytest.mark.slow
+def test_the_page_is_only_asked_for_where_it_is_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise click.UsageError("the page is not installed")
+
+    for module in (serve, run_verb, demo):
+        monkeypatch.setattr(module, "check_live_installed", missing)
+    for arguments in (("serve", "--bind", "nobody"), ("run", "no.st"), ("run", "counter.st", "--scans", "x")):
+        assert "not installed" not in fbvm(*arguments).stderr
+    for arguments in (("serve", "--live", "--bind", "nobody"), ("demo", "--live")):
+        result = fbvm(*arguments)
+        assert result.exit_code == 2 and "the page is not installed" in result.stderr
+
+
+@pytest.mark.slow
+def test_tests_are_looked_for_of_a_program_only(counter: str) -> None:
+    Path("two.st").write_text("FUNCTION F : INT\n    F := 1;\nEND_FUNCTION\n", encoding="utf-8")
+    result = fbvm("prove", "two.st", "--tests", "test_two.py")
+    assert result.exit_code == 3 and "S0209" in result.stderr
+
+
+def test_an_adapter_that_is_told_something_wrong_ends_with_status_2(capsys: pytest.CaptureFixture[str]) -> None:
+    dap._report("")
+    with pytest.raises(SystemExit) as ended:
+        dap._report("this is no message")
+    assert ended.value.code == 2 and capsys.readouterr().err == "this is no message\n"
+    for address in ("here", "here:", "127.0.0.1:x", ":-1"):
+        with pytest.raises(click.UsageError, match=r"is no \[HOST:\]PORT"):
+            dap._connected(address)
+
+
+# --- pages ------------------------------------------------------------------------------------------------------------
+
+
+@each_of("done, state", [(0, INTERRUPTED), (1, INTERRUPTED), (2, OVER)])
+def test_the_page_of_a_campaign_says_whether_it_is_over(tmp_path: Path, done: int, state: str) -> None:
+    result = SimpleNamespace(number=0, failure=None, variant=None, time_ns=0)
+    outcome = SimpleNamespace(plan=SimpleNamespace(count=2), results=dict.fromkeys(range(done), result))
+    shown = ShownProgress(cast(Any, outcome), tmp_path / "progress.html", False)
+    shown.end({})
+    assert shown._progress.state == state
+    assert state in (tmp_path / "progress.html").read_text(encoding="utf-8")
+
+
+def test_a_page_of_files_keeps_its_groups_beside_the_first(counter: str) -> None:
+    origin = FileOrigin([Path("a/pump.st"), Path("b/tank.st")], (), None, cast(Any, None), cast(Any, None))
+    assert origin.groups_file == Path("a/pump.watch.toml") and list(origin.files) == [Path("a/pump.st"), Path("b/tank.st")]
+    image = compile_files([counter], runnable=True).image
+    assert image is not None
+    plc, close = _wiring(5_000_000, "loop", (), ())(image)
+    plc.run(scans=3)
+    assert (plc.read("Main.n"), plc.cycle_ns, [unit.unit.name for unit in plc.units]) == (3, 5_000_000, ["ETN21 0"])
+    close()
