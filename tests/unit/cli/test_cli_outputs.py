@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,13 +14,15 @@ import pytest
 from click.testing import CliRunner, Result
 from rows import each_of
 
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.campaign.progress import INTERRUPTED, OVER
 from fbvm.cli.main import main
 from fbvm.cli.projects.shown_progress import ShownProgress
-from fbvm.cli.running import dap, demo, project_run, serve
+from fbvm.cli.running import dap, demo, peer, project_run, serve
 from fbvm.cli.running import run as run_verb
 from fbvm.cli.running.live import _wiring
 from fbvm.cli.running.step import _chosen
+from fbvm.cli.shared import sources
 from fbvm.cli.shared.live.origins import FileOrigin
 from fbvm.cli.shared.run_result import RunProgress
 from fbvm.cli.shared.streams import give_up_output
@@ -234,6 +237,21 @@ def test_tests_are_looked_for_of_a_program_only(counter: str) -> None:
     assert result.exit_code == 3 and "S0209" in result.stderr
 
 
+def test_a_peer_says_that_its_port_cannot_be_used_also_if_the_host_would_give_it(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        peer._unusable("127.0.0.1", 0)
+    assert ended.value.code == 5 and capsys.readouterr().err == "127.0.0.1:0 cannot be used\n"
+
+
+@pytest.mark.slow
+def test_the_server_of_the_demo_ends_with_it() -> None:
+    with demo.own_server() as server:
+        assert server.port > 0
+    assert server.process.poll() is not None  # type: ignore[attr-defined]
+    with demo.own_server() as server:
+        assert server.registers(5, 3) == [1005, 1006, 1007] == server.registers(5, 3)
+
+
 def test_an_adapter_that_is_told_something_wrong_ends_with_status_2(capsys: pytest.CaptureFixture[str]) -> None:
     dap._report("")
     with pytest.raises(SystemExit) as ended:
@@ -242,6 +260,20 @@ def test_an_adapter_that_is_told_something_wrong_ends_with_status_2(capsys: pyte
     for address in ("here", "here:", "127.0.0.1:x", ":-1"):
         with pytest.raises(click.UsageError, match=r"is no \[HOST:\]PORT"):
             dap._connected(address)
+
+
+def test_what_is_said_of_a_document_comes_before_its_program(counter: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = Source("doc.xml", "<project/>")
+    warned, wrong = Diagnostic("S0290", source, 0, 1, "left out"), Diagnostic("S0101", source, 0, 1, "no document")
+    found: list[Diagnostic] = [warned]
+    monkeypatch.setattr(sources, "inputs", lambda files: (list(files), found))
+    result = fbvm("run", counter, "--scans", "2", "--show", "Main.n")
+    assert (result.exit_code, result.stdout) == (0, "Main.n = 2\n") and "doc.xml:1:1: warning S0290: left out" in result.stderr
+    found.append(wrong)
+    result = fbvm("run", counter, "--scans", "2")
+    assert result.exit_code == 3 and "1 error and 1 warning; `fbvm explain CODE`" in result.stderr
+    told = json.loads(fbvm("run", counter, "--scans", "2", "--json").stdout)["diagnostics"]
+    assert [each["code"] for each in told] == ["S0290", "S0101"]
 
 
 # --- pages ------------------------------------------------------------------------------------------------------------
