@@ -48,13 +48,15 @@ class Goal:
 
 
 class BoundedSearch:
-    """Looks for runs to a goal.  `cleared` is the number of scans after power-on in which it is known that none gets there."""
+    """Looks for runs to a goal.  `cleared` is the number of scans after power-on in which it is known that none gets there;
+    `is_shortest` tells of the run that was found whether it is known that no shorter one gets there."""
 
     def __init__(self, summary: Summary, goal: Goal, clock: Clock, expired: Callable[[], bool]) -> None:
         self.summary, self.terms, self.clock = summary, summary.terms, clock
         self.unrolling: Unrolling = from_power_on(summary, goal.terms, clock)
         self.solver = Solver(expired)
         self.cleared = 0
+        self.is_shortest = False
         self._expired = expired
         self._alive: list[Term] = [self.terms.true]
         """Before each scan: no trap until then, and all assumptions kept."""
@@ -70,8 +72,8 @@ class BoundedSearch:
         return terms.all_of(self._alive[number], given, hit)
 
     def until(self, scans: int) -> Inputs | None:
-        """The inputs of the shortest run of at most so many scans that gets to the goal, None if there is none or the time is
-        over (then `cleared` is less than `scans`)."""
+        """The inputs of a run of at most so many scans that gets to the goal, the shortest unless the time is over before that
+        is known; None if there is none or the time is over before (then `cleared` is less than `scans`)."""
         while self.cleared < scans:
             end = min(scans, self.cleared + self._block)
             hits = []
@@ -109,7 +111,9 @@ class BoundedSearch:
             values = self.solver.values(hits)
             last = next(number for number, hit in enumerate(hits) if values[hit])
             model = self._model(self.cleared + last)
-            if not last or self.solver.ask(self.terms.any_of(*hits[:last])) != SAT:
+            answer = self.solver.ask(self.terms.any_of(*hits[:last])) if last else UNSAT
+            if answer != SAT:
+                self.is_shortest = answer == UNSAT
                 break
             hits = hits[:last]
         return self._simplest(model, self.cleared + last)

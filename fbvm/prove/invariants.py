@@ -17,6 +17,8 @@ from fbvm.prove.solver import SAT, UNSAT, Solver
 from fbvm.prove.unrolling import from_anywhere, from_power_on
 
 MOST_LITERALS = 80
+MOST_BITS = 32
+"""The widest number whose bits are looked at."""
 FEW_VALUES = 8
 """Different values of a number up to which each is looked at by itself."""
 
@@ -91,6 +93,22 @@ class Bounds:
 
 
 @dataclass(frozen=True)
+class Bit:
+    """A bit of a number has a value."""
+
+    variable: Term
+    number: int
+    value: int
+
+    def term(self, terms: Terms, state: dict[Term, Term], now: Term) -> Term:
+        bit = terms.extract(state[self.variable], self.number, 1)
+        return terms.eq(bit, terms.constant(1, self.value))
+
+    def holds(self, sample: Sample) -> bool:
+        return sample.values[self.variable] >> self.number & 1 == self.value
+
+
+@dataclass(frozen=True)
 class Ordered:
     """A number is not greater than another of its width, both signed; than the time of the scan, if there is no other."""
 
@@ -131,7 +149,18 @@ def _about_number(variable: Term, seen: set[int]) -> list[Guess]:
     numbers, top = [signed(value, variable.width) for value in seen], 1 << (variable.width - 1)
     low, high = min(numbers), max(numbers)
     found: list[Guess] = [Bounds(variable, low, high), Bounds(variable, min(low, 0), top - 1), Bounds(variable, -top, high)]
-    return [*found, Ordered(variable, None)] if variable.width == 64 else found
+    return [*found, *_bits(variable, seen), *([Ordered(variable, None)] if variable.width == 64 else [])]
+
+
+def _bits(variable: Term, seen: set[int]) -> list[Guess]:
+    """The bits of a word that had one value only, if others had two: statements write single bits of words."""
+    ones, zeros = ((1 << variable.width) - 1, 0)
+    for value in seen:
+        ones, zeros = ones & value, zeros | value
+    fixed = [number for number in range(variable.width) if ones >> number & 1 == zeros >> number & 1]
+    if variable.width > MOST_BITS or len(fixed) == variable.width or len(seen) > 1 << (variable.width - len(fixed)):
+        return []
+    return [Bit(variable, number, zeros >> number & 1) for number in fixed]
 
 
 def _holding(found: list[Guess], samples: Sequence[Sample], doubted: Collection[Guess]) -> list[Guess]:

@@ -38,6 +38,7 @@ from fbvm.prove.question import (
     Verdict,
 )
 from fbvm.prove.runs import Judge, Machine, replayed, sampled, simulated
+from fbvm.prove.shortening import shortened
 from fbvm.prove.solver import UNSAT
 from fbvm.prove.unit_rules import Word, free_words, offset_of, words_of
 from fbvm.prove.unit_rules import rules as rules_of
@@ -269,13 +270,13 @@ class Prover:
     # --- methods
 
     def _simulated(self, scans: int) -> Verdict | None:
-        """Random runs of so many scans; what they find is made shorter by the solver."""
+        """Random runs of so many scans; what they find is made shorter on the engine, and then by the solver."""
         self.tell("trying random inputs")
         for found in simulated(self.machine, self.judge, self.inputs, scans, self.limits.seed):
             if found is not None:
-                self.tell(f"a random run gets there after {_scans(len(found.inputs))}: looking for the shortest")
-                shorter = self._searched(min(len(found.inputs), self.limits.scans))
-                return shorter or self._met(found.inputs, False)
+                inputs = shortened(self.machine, self.judge, found.inputs, self.limits.expired)
+                self.tell(f"a random run gets there after {_scans(len(inputs))}: looking for the shortest")
+                return self._searched(min(len(inputs), self.limits.scans)) or self._met(inputs, False)
             if self.limits.expired():
                 break
         return None
@@ -284,7 +285,7 @@ class Prover:
         self.tell(f"searching {scans} scans")
         inputs = self.search.until(scans)
         if inputs is not None:
-            return self._met(inputs, True)
+            return self._met(inputs, self.search.is_shortest)
         if self.search.cleared and self.search.all_runs_end():
             raise Refused("no run keeps the assumptions, or does not trap, for longer than "
                           f"{self.search.cleared} scans: there is nothing to prove")
@@ -295,7 +296,7 @@ class Prover:
         run = replayed(self.machine, self.judge, inputs, is_shortest)
         if run is not None:
             word = REACHED if self.question.is_reach else BROKEN
-            how = "the shortest run" if is_shortest else "a random run"
+            how = "the shortest run" if is_shortest else "a run that may not be the shortest"
             return self._verdict(word, f"after {_scans(run.scans)}, by {how}", run)
         if self.unwound:
             site = self.image.sites[self.unwound[0].site]

@@ -12,8 +12,9 @@ from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.prover import Limits, Prover, prove
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
-from fbvm.prove.runs import repeated
-from fbvm.prove.solver import UNKNOWN, Solver
+from fbvm.prove.runs import repeated, replayed, simulated
+from fbvm.prove.shortening import shortened
+from fbvm.prove.solver import UNKNOWN, UNSAT, Solver
 from fbvm.prove.unreached import unreached
 from fbvm.watch.paths import UnknownPlace
 
@@ -120,6 +121,43 @@ def test_statements_of_which_nothing_is_known_yet_are_not_said_to_be_unreached(m
     assert unreached(*asked) == []
     monkeypatch.setattr(Solver, "ask", lambda *terms: UNKNOWN)
     assert unreached(*asked) == []
+
+
+@each_of(("answer", "known"), [(UNSAT, True), (UNKNOWN, False)])
+def test_a_run_is_called_the_shortest_only_if_that_is_known(monkeypatch: pytest.MonkeyPatch, answer: str, known: bool) -> None:
+    """Once a run is found, it is asked whether there is a shorter one: an answer that does not come in time says nothing."""
+    prover = Prover(program(COUNTER, COUNTED), Question(REACH, "Main.Q"), Limits(), lambda said: None)
+    asks, ask = iter([None, answer]), Solver.ask
+    monkeypatch.setattr(Solver, "ask", lambda solver, *terms: next(asks, None) or ask(solver, *terms))
+    assert prover.search.until(16) is not None
+    assert prover.search.is_shortest is known
+
+
+LATCHED = "IF Other THEN n := 0; ELSIF In THEN n := n + 1; END_IF"
+
+
+@each_of(("body", "text", "fewest"), [
+    (LATCHED, "Main.n = 30", 30), (COUNTER, "Main.n = 40", 40), ("n := n + 1;", "Main.n = 90", 90),
+    (LATCHED, "Main.n = 4 AND Main.Other", 0)])
+def test_a_random_run_is_made_shorter_on_the_engine(body: str, text: str, fewest: int) -> None:
+    prover = Prover(program(body, COUNTED), Question(REACH, text), Limits(), lambda said: None)
+    found = next((each for each in simulated(prover.machine, prover.judge, prover.inputs, 2000, 1) if each), None)
+    assert (found is not None) == bool(fewest)
+    if found:
+        inputs = shortened(prover.machine, prover.judge, found.inputs, lambda: False)
+        assert (len(inputs), inputs.times_ns) == (fewest, [number * 10_000_000 for number in range(fewest)])
+        run = replayed(prover.machine, prover.judge, inputs, False)
+        assert run is not None and run.scans == fewest
+        assert shortened(prover.machine, prover.judge, found.inputs, lambda: True) == found.inputs
+
+
+def test_bits_of_a_word_that_never_change_are_an_invariant() -> None:
+    """Rungs and statements write single bits of a word, of which a condition asks as a number."""
+    words = image_of("PROGRAM Main\nVAR In AT %IX0.0 : BOOL; Other AT %IX0.1 : BOOL; w : WORD := 16#0100; END_VAR\n"
+                     "w.6 := In; w.2 := Other AND NOT In;\nEND_PROGRAM\n")  # fmt: skip
+    assert asked(words, NEVER, "Main.w > 16#0140").word == "proved"
+    assert asked(words, NEVER, "Main.w = 16#0144").word == "proved"
+    assert asked(words, NEVER, "Main.w = 16#0140").word == "broken"
 
 
 def test_no_time_at_all_is_undecided() -> None:
