@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fbvm.code.image import Image
-from fbvm.code.operations import Address, Node
+from fbvm.code.operations import Address, Node, caught
 from fbvm.prove.encoding.cells import Cell, Contents
 from fbvm.prove.encoding.terms import Term, Terms
 from fbvm.prove.encoding.writes import Writes
@@ -99,6 +99,39 @@ class State:
         self.used = max(other.used for other in others)
 
 
+@dataclass
+class Attempt:
+    """An attempt whose body is executed: `ended` has a row for each place that may stop it, earlier ones first.
+
+    A row is a condition, what the attempt gives then, what was written up to there, and the steps that were used."""
+
+    traps: bool
+    begun: Contents
+    ended: list[tuple[Term, int, dict[Cell, Term], int]] = field(default_factory=list)
+    is_certain: bool = False
+    """Whether the last of them stops it on every path."""
+
+    def note(self, state: State, condition: Term, code: str) -> None:
+        """Notes that a code stops the body here."""
+        cells = {cell: state.contents.get(cell) for cell in state.contents.written_since(self.begun)}
+        self.ended.append((condition, caught(code, self.traps), cells, state.used))
+
+    def join(self, state: State, number: int, end: State | None) -> None:
+        """Makes `state` that behind the attempt; `end` is the state behind its body, None if nothing gets there."""
+        terms, ends, conditions = state.contents.terms, list[State](), list[Term]()
+        for condition, what, cells, used in self.ended:
+            made = state.child(state.path)
+            made.contents.written.update(cells)
+            made.temporaries[number], made.used = terms.constant(32, what), used
+            ends.append(made)
+            conditions.append(condition)
+        if end is not None:
+            end.temporaries[number] = terms.constant(32, 0)
+            ends.append(end)
+            conditions.append(terms.true)
+        state.join(ends, conditions)
+
+
 Row = Callable[..., Any]
 
 
@@ -113,6 +146,8 @@ class Execution:
         self.image, self.terms, self.now, self.budget = image, terms, now, budget
         self.expressions, self.statements = expressions, statements
         self.traps: list[TrapCondition] = []
+        self.attempts: list[Attempt] = []
+        """Those whose bodies are executed now, the innermost last."""
         self.reached: dict[int, Term] = {}
         """When the statement at a site is executed."""
         self.unknowns: dict[str, int] = {}
@@ -138,6 +173,14 @@ class Execution:
     def trap(self, state: State, condition: Term, code: str, site: int) -> None:
         """Notes that a trap is reached if `condition` holds here.  Raises Trapped if that is certain."""
         reached = self.terms.and_(state.path, condition)
+        attempt = next((each for each in reversed(self.attempts) if caught(code, each.traps)), None)
+        if attempt is not None and reached is not self.terms.false:
+            attempt.note(state, reached, code)
+            attempt.is_certain = reached is self.terms.true
+            if attempt.is_certain:
+                raise Trapped(code, site)
+            state.path = self.terms.and_(state.path, self.terms.not_(condition))
+            return
         if reached is self.terms.true:
             self.traps.append(TrapCondition(reached, code, site))
             raise Trapped(code, site)

@@ -12,7 +12,7 @@ from typing import Any
 from fbvm.code.image import Body
 from fbvm.code.operations import SIZES, TEXT_UNITS, WHOLE_BYTES, Address, Block, Node, detail_size
 from fbvm.prove.encoding.addresses import Target, targets
-from fbvm.prove.encoding.execution import UNWOUND, Execution, Held, Refused, Row, State
+from fbvm.prove.encoding.execution import UNWOUND, Attempt, Execution, Held, Refused, Row, State, Trapped
 from fbvm.prove.encoding.expressions import is_signed
 from fbvm.prove.encoding.terms import Term
 
@@ -317,7 +317,21 @@ def _call(x: Execution, state: State, pou: int, address: Address | None) -> None
 
 
 def _attempt(x: Execution, state: State, pou: int, address: Address | None, number: int, traps: bool) -> None:
-    raise Refused("__TRY is not followed", x.site)
+    """The body of an attempt is a part of this one, for the same instance."""
+    attempt, inner = Attempt(traps, state.contents), state.child(state.path)
+    outer = x.base, x.site, x.callers, x.calls
+    x.attempts.append(attempt)
+    end: State | None = None
+    try:
+        end = call(x, inner, x.image.bodies[pou], x.base if address else 0)
+    except Trapped:
+        if not attempt.is_certain:
+            raise
+        x.base, x.site, x.callers, x.calls = outer
+    finally:
+        x.attempts.pop()
+    x.stored = None
+    attempt.join(state, number, end)
 
 
 def _charge(x: Execution, state: State, count: int, site: int) -> None:
