@@ -248,8 +248,6 @@ def test_the_server_of_the_demo_ends_with_it() -> None:
     with demo.own_server() as server:
         assert server.port > 0
     assert server.process.poll() is not None  # type: ignore[attr-defined]
-    with demo.own_server() as server:
-        assert server.registers(5, 3) == [1005, 1006, 1007] == server.registers(5, 3)
 
 
 def test_an_adapter_that_is_told_something_wrong_ends_with_status_2(capsys: pytest.CaptureFixture[str]) -> None:
