@@ -18,12 +18,12 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.campaign.progress import INTERRUPTED, OVER
 from fbvm.cli.main import main
 from fbvm.cli.projects.shown_progress import ShownProgress
-from fbvm.cli.running import dap, demo, peer, project_run, serve
+from fbvm.cli.running import dap, demo, live, peer, project_run, serve
 from fbvm.cli.running import run as run_verb
-from fbvm.cli.running.live import _wiring
 from fbvm.cli.running.step import _chosen
 from fbvm.cli.shared import sources
 from fbvm.cli.shared.live.origins import FileOrigin
+from fbvm.cli.shared.live.page import PageOptions
 from fbvm.cli.shared.run_result import RunProgress
 from fbvm.cli.shared.streams import give_up_output
 from fbvm.cli.shared.traces import LAST_SCAN, ScanRange
@@ -292,7 +292,14 @@ def test_a_page_of_files_keeps_its_groups_beside_the_first(counter: str) -> None
     assert origin.groups_file == Path("a/pump.watch.toml") and list(origin.files) == [Path("a/pump.st"), Path("b/tank.st")]
     image = compile_files([counter], runnable=True).image
     assert image is not None
-    plc, close = _wiring(5_000_000, "loop", (), ())(image)
+    plc, close = live._wiring(5_000_000, "loop", (), ())(image)
     plc.run(scans=3)
     assert (plc.read("Main.n"), plc.cycle_ns, [unit.unit.name for unit in plc.units]) == (3, 5_000_000, ["ETN21 0"])
     close()
+
+
+def test_a_run_under_a_page_has_the_page_that_the_verb_for_pages_has() -> None:
+    usual = {parameter.name: parameter.default for parameter in live.command.params}
+    options = PageOptions()
+    assert (options.bind, options.port) == (usual["bind"], usual["port"]) and not options.read_only
+    assert tuple(options.writable) == tuple(options.frames) == () and options.debug_port is None
