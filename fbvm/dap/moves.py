@@ -208,11 +208,6 @@ class Moves:
         if running:
             self.running = Running(running.begin, running.begin(), running.reason, running.nothing, running.ends_run)
 
-    def pause(self) -> None:
-        """pause: gives up the present move, and tells where it stands."""
-        if self.interrupted():
-            self.stopped("pause")
-
     def _stop(self, running: Running, reached: Reached | None) -> None:
         if reached is None:
             session = self._debug.plc()

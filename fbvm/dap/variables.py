@@ -4,6 +4,7 @@ A variable is named by its whole path or its address wherever it comes back (`ev
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -24,6 +25,8 @@ MOST_ROWS = 256
 SECTIONS = (("Inputs", ("VAR_INPUT",), "arguments"), ("Outputs", ("VAR_OUTPUT",), ""), ("In-outs", ("VAR_IN_OUT",), ""))
 """Scopes by the sections of a POU, and their presentation hints; all others are Locals."""
 FORCED = " (forced)"
+_BESIDE = re.compile(r" \((?:16#[0-9A-F]+|-?\d+)\)(?:  .*)?$", re.S)
+"""What is shown behind a literal: its number, or its value in hexadecimal, and what the word means."""
 
 
 def scopes(debug: DebugSession, frame: StackFrame) -> list[Body]:
@@ -300,7 +303,7 @@ def _shown(debug: DebugSession, place: Place, value: Value) -> str:
     plain = base(place.type)
     is_number = isinstance(value, int) and not isinstance(value, bool)
     if isinstance(plain, EnumType) and is_number:
-        return f"{show(place.type, value)} ({value})"
+        return show(place.type, value)
     if debug.hexadecimal or place.hexadecimal:
         return in_hexadecimal(place.type, value) if is_number and isinstance(value, int) else show(place.type, value, True)
     text = show(place.type, value)
@@ -330,6 +333,14 @@ def _runtime(debug: DebugSession, name: str) -> list[Body]:
             for name, value in rows.items()]
 
 
+def _written(text: str) -> str:
+    """The literal in the text of a value as it is shown, which editors send back."""
+    text = text.strip()
+    if text[:1] in ("'", '"'):
+        return text.removesuffix(FORCED)
+    return _BESIDE.sub("", text.removesuffix(FORCED)).strip()
+
+
 def set_variable(debug: DebugSession, place: Place | Span, text: str) -> Body:
     """Writes a value at this position, once.  Raises Refusal, ValueError or TypeError."""
     session = debug.plc()
@@ -337,7 +348,7 @@ def set_variable(debug: DebugSession, place: Place | Span, text: str) -> Body:
         raise Refusal("set one value after the other")
     if isinstance(base(place.type), StructType):
         raise Refusal(f"{place.name} is {place.type.name}: set its members")
-    value = parse_for(place, text.removesuffix(FORCED).partition(" (16#")[0].strip())
+    value = parse_for(place, _written(text))
     end = session.units.scans if isinstance(session, Session) else 0
     here = session.here
     session.act(lambda plc: plc.write(place, value))
