@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from random import Random
+from types import SimpleNamespace
 
 import pytest
 from symbolic import CYCLE_NS, encoded, held, term_value
@@ -13,6 +14,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.cells import BIT, NUMBER, Cell
 from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.encoding.expressions import constant_term, constant_value
 from fbvm.prove.encoding.properties import condition_term
 from fbvm.prove.encoding.scan import read_bool
 from fbvm.prove.encoding.terms import Term, Terms
@@ -33,6 +35,7 @@ IF a > 5 THEN m := Fast; ELSIF b > 5 THEN m := Slow; END_IF t := INT_TO_TIME(b);
 r := REF(a); IF p THEN r := REF(b); END_IF g := REF(q);
 END_PROGRAM"""
 ROWS = [(-1.5, -0.0), (0.0, 2.5), (float("nan"), 2.5), (2.5, 2.5), (1.0, -1.5)]
+NAN = float("nan")
 NUMBERS = [(0, 0), (-32768, 7), (6, -1), (100, 200), (300, 9), (32767, -300), (-1, -128)]
 
 
@@ -105,6 +108,15 @@ def test_what_cannot_be_followed_says_why(
 ) -> None:
     with pytest.raises(Refused, match=reason):
         condition_term(scanned[0].contents, parse_condition(text, lambda name: found(plc, name)).term)  # type: ignore[attr-defined]
+
+
+def test_constants_of_code_are_terms_of_their_value_and_back() -> None:
+    x = SimpleNamespace(terms=T)
+    for machine, value in (("b", True), ("b", False), ("i16", -5), ("u16", 65_531), ("f32", -0.5), ("f64", 1e300), ("s8", b"ab")):
+        term = constant_term(x, machine, value)  # type: ignore[arg-type]
+        assert term.is_constant and constant_value(machine, term) == value and type(constant_value(machine, term)) is type(value)
+    assert constant_term(x, "b", True) is T.true and constant_term(x, "b", False) is T.false  # type: ignore[arg-type]
+    assert constant_term(x, "f32", NAN).value == 0x7FC0_0000  # type: ignore[arg-type]
 
 
 # --- inputs of random runs --------------------------------------------------------------------------------------------

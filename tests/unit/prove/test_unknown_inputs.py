@@ -39,15 +39,19 @@ END_PROGRAM"""
 PATHS = """FUNCTION Sign : INT VAR_INPUT x : INT; END_VAR
 IF x < 0 THEN Sign := -1; RETURN; ELSIF x = 0 THEN RETURN; END_IF Sign := 1;
 END_FUNCTION
+FUNCTION Place : INT VAR_INPUT x : INT; END_VAR VAR i : INT; END_VAR
+FOR i := 0 TO 3 DO IF 2 * i = x THEN Place := i; RETURN; END_IF END_FOR
+Place := 77;
+END_FUNCTION
 PROGRAM Main
-VAR a, b, i, k, n, m, found, s : INT; t : ARRAY[-1..4] OF INT := [9, 3, 7, 7, 1, 4]; range : INT(-5..5); last : BOOL; END_VAR
+VAR a, b, i, k, n, m, found, s, p : INT; t : ARRAY[-1..4] OF INT := [9, 3, 7, 7, 1, 4]; range : INT(-5..5); last : BOOL; END_VAR
 CASE a OF 1: n := 10; 2, 4: n := 20 + b; -5..-2: n := -a; ELSE n := 99; END_CASE
 found := -9;
 FOR i := -1 TO 4 DO IF t[i] = b THEN found := i; EXIT; END_IF IF t[i] = 3 THEN CONTINUE; END_IF m := m + t[i]; END_FOR
 IF a > 2 THEN k := 6; ELSIF a < 0 THEN k := -1; ELSE k := 3; END_IF
 WHILE s < k DO s := s + 2; IF s = 4 THEN last := TRUE; END_IF END_WHILE
 REPEAT s := s - 1; UNTIL s <= b OR s < -3 END_REPEAT
-n := n + Sign(b) * 1000; range := a;
+n := n + Sign(b) * 1000; p := Place(b); range := a;
 IF a > 3 THEN t[a] := b; ELSIF b > 3 THEN t[b - 1] := t[b - 1] + 1; END_IF
 END_PROGRAM"""
 MEMORY = """TYPE P : STRUCT x : INT; y : DINT; b : BOOL; c : ARRAY[0..1] OF BYTE; END_STRUCT END_TYPE

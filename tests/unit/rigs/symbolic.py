@@ -11,11 +11,13 @@ from encoded import FROM_BYTE, MACHINE_BYTES
 
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.code.image import Image
+from fbvm.machine.counting import counting
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.cells import BIT, BOOL, Cell, Contents, Partition, Reshape, constant_of
 from fbvm.prove.encoding.clocks import FixedCycle
 from fbvm.prove.encoding.scan import Scanned, Signal, scan
 from fbvm.prove.encoding.terms import Term, Terms, signed
+from fbvm.prove.unreached import own_files
 from fbvm.watch.paths import Place
 
 CYCLE_NS, BUDGET = 10_000_000, 20_000
@@ -114,12 +116,16 @@ def compare_inputs(image: Image, names: Sequence[str], rows: Sequence[Sequence[A
         memory = bytes(plc.memory.u8)
         values = {term: held(cell, memory) for term, cell in variables.items()}
         assert all(value < 2 for term, value in values.items() if variables[term].kind == BOOL)
-        plc.scan()
+        with counting(plc, own_files(image)) as counts:
+            plc.scan()
+            executed = counts.executed()
         known: dict[Term, int] = {}
         trap = next(((each.code, plc.image.sites[each.site]) for each in scanned.execution.traps
                      if term_value(each.condition, values, known)), None)  # fmt: skip
         assert trap == ((plc.trap.code, plc.trap.site) if plc.trap else None), row
         if trap is None:
+            reached = {site for site, term in scanned.execution.reached.items() if term_value(term, values, known)}
+            assert {site for site, count in executed.items() if count} == reached & executed.keys(), row
             after = bytes(plc.memory.u8)
             found = {cell: term_value(scanned.contents.get(cell), values, known) for cell in cells}
             assert found == {cell: held(cell, after) for cell in cells}, row

@@ -134,6 +134,14 @@ def test_references_are_read_as_names(plc: Plc, names: Names) -> None:
     assert names.read(plc.read, place(plc, "Main.flag")) is False
 
 
+def test_an_array_in_out_that_is_bound_to_nothing_yet_is_read_as_none() -> None:
+    image = compile_text("""FUNCTION_BLOCK Low VAR_IN_OUT all : ARRAY[0..1] OF REF_TO INT; one : INT; END_VAR END_FUNCTION_BLOCK
+PROGRAM Main VAR low : Low; END_VAR ; END_PROGRAM""", lint=False).image
+    assert image is not None
+    plc = Plc(image)
+    assert Names.of(image, plc.memory.areas).read(plc.read, place(plc, "Main.low")) == {"all": None, "one": None}
+
+
 def test_a_reader_gives_what_read_gives_for_each_type(plc: Plc) -> None:
     for name, value in (("pair.b", -70_000), ("flag", True), ("bit", True), ("t", "ab"), ("c", "x"), ("l", 2.5), ("wide[1]", 77),
                         ("bits[11]", True), ("d", 86_400_000_000_000)):  # fmt: skip
