@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import selectors
 import signal
 import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -95,6 +100,63 @@ def test_signals_that_a_system_lacks(monkeypatch: pytest.MonkeyPatch) -> None:
         signal.raise_signal(signal.SIGABRT)
     assert (signals.end, signals.save) == (True, False)
     assert signal.getsignal(signal.SIGABRT) is signal.SIG_DFL
+
+
+@pytest.mark.parametrize("system", [sys.platform, "win32"])
+def test_another_thread_interrupts_the_main_one(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host, "sys", SimpleNamespace(platform=system))
+    asking = threading.Thread(target=host.interrupt, args=[threading.get_ident()])
+    with pytest.raises(KeyboardInterrupt):
+        asking.start()
+        asking.join(5)
+        time.sleep(5)
+
+
+def test_ctrl_c_waits_for_the_end_of_what_holds_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt), host.interrupt_held():
+        signal.raise_signal(signal.SIGINT)
+        done.append(1)
+    assert done == [1] and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with host.interrupt_held():
+        done.append(2)
+    with pytest.raises(KeyboardInterrupt), host.signals_held():
+        signal.raise_signal(signal.SIGINT)
+        done.append(3)
+    monkeypatch.setattr(host, "sys", SimpleNamespace(platform="win32"))  # where nothing holds it back
+    with pytest.raises(KeyboardInterrupt), host.signals_held():
+        signal.raise_signal(signal.SIGINT)
+        done.append(4)
+    with host.deaf_children():
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    monkeypatch.undo()
+    with host.deaf_children():
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    assert done == [1, 2, 3] and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there another call locks")
+def test_a_file_that_one_process_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "taken"
+    path.write_bytes(b"kept")
+    with open(path, "rb+") as first, open(path, "rb+") as second:
+        assert host.taken_alone(first) and not host.taken_alone(second)
+        assert second.read() == b"kept"
+    with open(path, "rb+") as again:
+        assert host.taken_alone(again)
+        for number, expected in ((errno.EACCES, False), (errno.EDEADLK, False), (errno.ENOLCK, True), (errno.ENOTSUP, True)):
+            monkeypatch.setattr("fcntl.flock", _refusing(number))
+            assert host.taken_alone(again) is expected, number
+        monkeypatch.setattr("fcntl.flock", _refusing(errno.EIO))
+        with pytest.raises(OSError):
+            host.taken_alone(again)
+
+
+def _refusing(number: int) -> Callable[..., None]:
+    def refuse(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    return refuse
 
 
 # --- files ------------------------------------------------------------------------------------------------------------
