@@ -11,7 +11,8 @@ from fbvm import Plc
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.formats.given import given_sources, inputs, usual_dialect, within
-from fbvm.interchange.twincat.project import read_project
+from fbvm.interchange.markup import parse_markup
+from fbvm.interchange.twincat.project import TaskSettings, _own, read_project
 
 
 def test_the_objects_in_the_order_of_the_project_and_the_tasks_behind_them(tmp_path: Path) -> None:
@@ -133,3 +134,14 @@ def test_systems_that_cannot_be_run(tmp_path: Path, projects: tuple[str, ...], s
     [found] = made.errors
     assert found.message.endswith(said)
     assert made.sources == []
+
+
+@pytest.mark.parametrize(("said", "own"), [
+    ("", TaskSettings(10_000, 20)), ("<CycleTime>2000</CycleTime><Priority>7</Priority>", TaskSettings(2_000, 7)),
+    ("<CycleTime>often</CycleTime><Priority></Priority>", TaskSettings(10_000, 20)),
+])  # fmt: skip
+def test_a_task_of_which_a_file_says_nothing_runs_as_a_new_one_does(said: str, own: TaskSettings) -> None:
+    """Every 10 ms, with priority 20."""
+    parsed = parse_markup(f'<Task Name="T">{said}</Task>'.encode(), "T.TcTTO")
+    assert isinstance(parsed, tuple)
+    assert _own(parsed[1]) == own
