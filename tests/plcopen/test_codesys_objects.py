@@ -28,3 +28,4 @@ def test_what_stands_beside_heads_is_in_the_text() -> None:
     assert "    METHOD PROTECTED Own : INT\n" in files["Motor.st"]
     assert files["Fast.st"].startswith("FUNCTION_BLOCK Fast EXTENDS Motor\n")
     assert "fast : Fast (1, second := 2);" in files["Main.st"]
+    assert files["NamedDrive.st"].startswith("INTERFACE NamedDrive EXTENDS Drive\n")

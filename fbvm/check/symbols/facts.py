@@ -430,8 +430,8 @@ def is_open(location: tree.Location, kind: Type) -> bool:
 
 
 _LEVELS = re.compile(r"%[IQM](?:[BWDL]\d+(?:\.\d+){2,}|X?\d+(?:\.\d+){2,})", re.I)
-_WORD_LEVELS = re.compile(r"%[IQM][BWDL]\d+\.\d+", re.I)
-"""With a BOOL it is a bit of that byte or word."""
+_WORD_LEVELS = re.compile(r"%[IQM][BWDL]?\d+\.\d+", re.I)
+"""With a BOOL it is a bit of that byte or word, and without a size a bit; Beremiz has structures of extensions at %I3.0."""
 
 
 def holds_block(kind: Type) -> bool:

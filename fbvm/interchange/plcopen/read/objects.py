@@ -6,7 +6,7 @@
     .../addData/data[name=.../accessmodifiers]          AccessModifiers, with attributes or elements that name them
     .../addData/data[name=.../attributes]               Attributes/Attribute with Name and Value
     variable/addData/data[name=.../inputassignments]    InputAssignments/InputAssignment/[Name,] Value, for FB_init
-    project/addData/data[name=.../interface]/Interface  Methods/Method, Properties/Property, addData
+    project/addData/data[name=.../interface]/Interface  Methods/Method, Properties/Property, Inheritance, addData
 
 Source: exports of CODESYS V3; that of properties is assumed.
 """
@@ -63,6 +63,9 @@ def head(element: Element) -> Head:
     extends: list[str] = []
     implements: list[str] = []
     pragmas: list[str] = []
+    for own in element.all("Inheritance"):  # INTERFACEs have it without addData
+        extends += _names(own, "Extends")
+        implements += _names(own, "Implements")
     for data in (*added(element.one("interface")), *added(element)):
         word = last_word(data)
         for inner in data.children:

@@ -31,6 +31,8 @@ _UNNAMED = frozenset((
     "sans nom", "sconosciuto", "senza nome", "неизвестно", "неизвестный", "безымянный", "neznámo",
     "未知", "未命名", "不明", "名称未設定"))
 """What Beremiz and OpenPLC Editor write as company and product, in the language of the desktop."""
+_USUAL = {"Config0": "Res0", "config": "resource1"}
+"""Configuration and resource of a new project in Beremiz and OpenPLC Editor."""
 _NAMED = {"twincat": ("twincat",), "codesys": ("codesys", "e!cockpit", "machine expert", "somachine"),
           "beremiz": ("beremiz", "openplc"), "fbvm": ("fbvm",)}
 """Families, and words of headers that name one of their tools."""
@@ -75,9 +77,10 @@ def _family(root: Element) -> tuple[str, str]:
     unnamed = [name for name in (company, product) if name.casefold() in _UNNAMED]
     if unnamed:
         return "beremiz", f"the header says {' and '.join(unnamed)}, as Beremiz and OpenPLC Editor write it"
-    if any(one.get("name") == "Config0" and any(part.get("name") == "Res0" for part in one.walk() if part.name == "resource")
-           for one in root.walk() if one.name == "configuration"):
-        return "beremiz", "it has the configuration Config0 with the resource Res0, as Beremiz and OpenPLC Editor name them"
+    for one in root.walk():
+        resource = _USUAL.get(one.get("name")) if one.name == "configuration" else None
+        if resource and any(part.get("name") == resource for part in one.all("resource")):
+            return "beremiz", f"it has a {one.get('name')} with a {resource}, as Beremiz and OpenPLC Editor name them"
     return "", "the header names no known tool"
 
 
