@@ -90,6 +90,7 @@ class Dialect:
     any_width_at: bool = False
     bits_of_words: bool = False
     whole_characters: bool = False
+    short_references: bool = False
     steps_apart: bool = False
     times_are_numbers: bool = False
     short_addresses: bool = False
@@ -244,6 +245,9 @@ QUESTIONS = {
                       "behind all %IX, %QX and %MX, as devices with word addressing do"),
     "whole_characters": ("LEN, LEFT, MID, FIND ... of a WSTRING with a character beyond 16#FFFF",
                          "count units of UTF-16, of which it has two", "count characters"),
+    "short_references": ("REF(x), where x is a variable of a FUNCTION or METHOD, or an in-out",
+                         "an error (S0407): x ends with the call; ADR(x) and REF= are taken, and stop the program (R0110) if "
+                         "they are followed later", "taken as ADR(x) is"),
     "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
                          "0"),
     "wrong_bcd_is_zero": ("BCD_TO_UINT(16#9A): a digit above 9", "stops the program (R0105)", "0"),
@@ -292,12 +296,13 @@ _ROWS = (
             locals_are_written=True, comments_end_at_once=True, pragmas_of_c=True, first_label_counts=True, idle_constants=True,
             fixed_counters=True, names_of_edition_2=True, spaced_durations=True, own_in_outs=True,
             wrong_bcd_is_zero=True, reals_wrap=True, negative_is_zero=True, functions_have_inputs=True,
-            sizes_apart=True, warned=OBJECTS | {"POINTER TO", "REFERENCE TO"}),
+            sizes_apart=True, short_references=True, warned=OBJECTS | {"POINTER TO", "REFERENCE TO"}),
     Dialect("strucpp", "programs for STruC++, the compiler of the newer OpenPLC editors",
             ("codesys/blocks", "matiec/additional", "strucpp"),
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
-            constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True),
+            constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True,
+            short_references=True),
     Dialect("rusty", "programs for RuSTy", ("rusty",), reals_of_other_widths=True, loop_ends_each_pass=True,
             loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
@@ -307,7 +312,7 @@ _ROWS = (
             whole_powers=True, idle_statements=True, idle_constants=True, outputs_with_assign=True, constants_wrap=True,
             short_circuits=True, ampersand_refers=True, bare_construction=True, bits_by_name=True, zero_durations=True,
             generic_functions=True, times_are_numbers=True, places_for_all=True, own_time=True,
-            round_arrays=True, nested_repetitions=True, dates_in_nanoseconds=True, whole_characters=True),
+            round_arrays=True, nested_repetitions=True, dates_in_nanoseconds=True, whole_characters=True, short_references=True),
     Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             comments_end_at_once=True, plain_names=True,
             refused=OBJECTS | {"POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"}),
@@ -368,8 +373,6 @@ ALIKE = (
     ("VAR_OUTPUT of a METHOD or FUNCTION when its call begins", "Its initial value; in RuSTy the value of the variable that the "
      "call names for it, where that is an array, a structure or a text."),
     ("m(x => v), where x is VAR_IN_OUT", "An error (S0402): := passes an in-out; RuSTy takes => as well."),
-    ("REF(x), where x is a variable of a FUNCTION or METHOD", "An error (S0407): x ends with the call; ADR(x) and REF= are "
-     "taken, and stop the program (R0110) if they are followed later. RuSTy takes REF too, and checks nothing."),
     ("A value, as a property gives it, for VAR_INPUT {ref}", "An error (S0407) where {ref} has an effect, which is under rusty: "
      "assign it to a variable first; RuSTy passes a hidden one."),
     ("PROPERTY whose GET and SET have no statement", "Keeps nothing: GET gives the first value of its type. The first RuSTy "

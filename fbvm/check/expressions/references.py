@@ -7,6 +7,7 @@ A pointer is moved in the variable that it was made of, or, in an instance, in i
 
 from __future__ import annotations
 
+from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BYTE,
     ArrayType,
@@ -39,9 +40,9 @@ def refer(scope: Scope, expr: tree.Expr, lasting: bool) -> Type | None:
         return None
     root = scope.facts.root(expr)
     variable = scope.facts.variables.get(root) if root not in scope.facts.followed else None
-    if lasting and variable is not None and (reason := _short_lived(variable)):
+    if lasting and variable is not None and not scope.dialect.short_references and (reason := _short_lived(variable)):
         scope.error("S0407", expr, f"{variable.name} is {reason}, which may end before the reference is followed",
-                    "ADR gives a pointer to it that holds until then")
+                    f"ADR gives a pointer to it that holds until then; or take {takers('short_references')}")
         return None
     if lasting and not writable(scope, expr, "be referred to"):
         return None
