@@ -9,17 +9,44 @@ import pytest
 import test_noc as noc
 from fins_rig import FinsRig, TcpClient
 from test_fins_connections import ClientRig
-from test_noc import COMMAND, LINE, STATE, ScriptedPeer
+from test_noc import COMMAND as LINE_COMMAND
+from test_noc import LINE, STATE, ScriptedPeer
 
+from fbvm.base.areas import NEVER
 from fbvm.units.etn21 import data
 from fbvm.units.etn21.faults import Fault
-from fbvm.units.etn21.fins.state import Connection, FinsSettings, FinsState, endpoints_of
+from fbvm.units.etn21.fins.service import FinsService
+from fbvm.units.etn21.fins.state import (
+    BEFORE_CLIENTS,
+    TCP_CHANNELS,
+    UDP_CHANNEL,
+    Connection,
+    FinsSettings,
+    FinsState,
+    endpoints_of,
+)
 from fbvm.units.etn21.fins.unit_commands import Asked, execute
 from fbvm.units.etn21.map import Switch
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.fins import tcp
+from fbvm.wire.fins.frames import Address, Command, Header
 from fbvm.wire.fins.tcp import Kind, Message
-from fbvm.wire.link import Broken, Close, Closed, Connect, Failed, Opened, Peer, Received, Send, SendTo
+from fbvm.wire.link import (
+    Broken,
+    Close,
+    Closed,
+    Connect,
+    Event,
+    Failed,
+    Listen,
+    Opened,
+    Peer,
+    PeerClosed,
+    Received,
+    Request,
+    Send,
+    SendTo,
+)
 
 UNIT = "192.168.250.3"
 SERVER = Peer("192.168.250.26", 9600)
@@ -110,6 +137,122 @@ def test_another_server_is_taken_for_a_connection_that_is_a_client_and_leads_els
     assert done(0x2730, other, connected, clients={1: SERVER, 2: Peer("10.0.0.9", 9600)})[0] != 0, "it leads there already"
     assert done(0x2730, other, FinsState(), clients={2: Peer("10.0.0.9", 9600)})[0] == 0
     assert done(0x2730, other, FinsState(), clients={1: SERVER})[0] != 0, "connection 2 waits for clients"
+
+
+# --- FINS: the service ------------------------------------------------------------------------------------------------
+
+CHANNEL = TCP_CHANNELS[0]
+S = 1_000_000_000
+
+
+class Service(FinsService):
+    """A service that is told events one servicing after another, without a CPU unit."""
+
+    def told(self, *events: Event, now_ns: int = 0) -> list[Request]:
+        assert self.take(events) == []
+        return self.serve(None, now_ns)  # type: ignore[arg-type]
+
+
+def begun(**settings: Any) -> Service:
+    """A service whose channels are open."""
+    made = Service(FinsSettings(UNIT, **settings))
+    made.told()
+    made.told(Opened(UDP_CHANNEL, 9600, Peer("0.0.0.0", 0)))
+    return made
+
+
+def test_a_service_opens_its_channels_once() -> None:
+    made = Service(FinsSettings(UNIT, clients={3: SERVER}))
+    requests = made.told()
+    assert [type(request).__name__ for request in requests] == ["Bind", *["Listen"] * len(TCP_CHANNELS), "Connect"]
+    assert requests[-1].remote == SERVER and made.told() == []  # type: ignore[union-attr]
+
+
+def test_a_channel_that_cannot_be_opened_stays_shut_and_one_that_was_closed_is_opened_again() -> None:
+    made = begun()
+    assert made.told(Failed(CHANNEL, "open", "EADDRINUSE")) == [] and made.state.failed == {CHANNEL}
+    assert made.told(Closed(CHANNEL + 1)) == [Listen(CHANNEL + 1, 9600)]
+
+
+def test_a_client_whose_server_refuses_tries_again_three_seconds_later() -> None:
+    made = begun(clients={3: SERVER})
+    channel = BEFORE_CLIENTS + 3
+    assert made.told(Failed(channel, "open", "ECONNREFUSED"), now_ns=S) == [] and made.wake_ns == 4 * S
+    assert made.told(now_ns=4 * S - 1) == [] and made.told(now_ns=4 * S) == [Connect(channel, SERVER)]
+
+
+def test_a_service_wakes_for_what_waits_and_for_those_who_owe_something() -> None:
+    made = begun()
+    assert made.wake_ns == NEVER
+    made.told(Opened(CHANNEL, 9600, SERVER), now_ns=5)
+    assert made.wake_ns == 5 + 10 * S, "the client owes its node"
+    made.told(Received(CHANNEL, tcp.client_node(26).to_bytes()), now_ns=7)
+    assert made.wake_ns == NEVER and made.connection_bits == 1
+    made.told(Received(CHANNEL, b"FI"), now_ns=9)
+    assert made.wake_ns == 9 + 10 * S, "the rest of a message"
+    assert made.told(now_ns=9 + 10 * S) == [Close(CHANNEL, True)] and made.connection_bits == 0
+    made.take([Closed(CHANNEL)])
+    assert made.wake_ns == 0
+
+
+@pytest.mark.parametrize(("event", "reset"), [(PeerClosed(CHANNEL), False), (Broken(CHANNEL, "ECONNRESET"), False),
+                                              (Failed(CHANNEL, "send", "ENOBUFS"), True)])  # fmt: skip
+def test_a_connection_that_has_ended_or_fails_is_closed(event: Event, reset: bool) -> None:
+    made = begun()
+    made.told(Opened(CHANNEL, 9600, SERVER))
+    assert made.told(event) == [Close(CHANNEL, reset)] and made.state.connections == {}
+    assert made.told(event) == [], "once"
+
+
+COMMAND = Command(Header(Address(0, 26), Address(0, 3), 9), 0x0101, bytes.fromhex("82 0064 00 0001"))
+
+
+def test_a_command_goes_over_the_connection_of_its_node_and_by_udp_to_others() -> None:
+    made, data = begun(), COMMAND.to_bytes()
+    assert made.send(COMMAND) == 0 and made.wake_ns == 0
+    assert made.told() == [SendTo(UDP_CHANNEL, Peer("192.168.250.26", 9600), data)] and made.state.sent == 1
+    made.told(Opened(CHANNEL, 9600, SERVER), Received(CHANNEL, tcp.client_node(26).to_bytes()))
+    assert made.send(COMMAND) == 0
+    assert made.told() == [Send(CHANNEL, Message(Kind.FRAME, data).to_bytes())]
+    made.send(COMMAND)
+    assert made.told(PeerClosed(CHANNEL)) == [Close(CHANNEL, False)], "what was for a connection that has ended is lost"
+
+
+def test_commands_wait_for_the_port_and_are_refused_without_one() -> None:
+    made = Service(FinsSettings(UNIT))
+    made.told()
+    assert made.send(COMMAND) == 0 and made.told() == []
+    assert [type(request) for request in made.told(Opened(UDP_CHANNEL, 9600, Peer("0.0.0.0", 0)))] == [SendTo]
+    shut = Service(FinsSettings(UNIT))
+    shut.told()
+    shut.send(COMMAND)
+    assert shut.told(Failed(UDP_CHANNEL, "open", "EADDRINUSE")) == [] and shut.state.outgoing == []
+    assert shut.send(COMMAND) == 0x0101
+
+
+def test_a_restart_breaks_everything_off_but_what_closes_already() -> None:
+    made = begun()
+    made.told(Opened(CHANNEL, 9600, SERVER), Opened(CHANNEL + 1, 9600, SERVER))
+    assert made.told(PeerClosed(CHANNEL)) == [Close(CHANNEL, False)]
+    made.take([Closed(CHANNEL + 2), Failed(CHANNEL + 3, "open", "EIO")])
+    closed = [request.channel for request in made.reset() if isinstance(request, Close) and request.reset]
+    assert closed == [channel for channel in (UDP_CHANNEL, *TCP_CHANNELS) if channel not in (CHANNEL, CHANNEL + 2, CHANNEL + 3)]
+    assert made.state.received == 0 and not made.state.udp_open and made.state.closing == made.state.busy
+    assert {request.channel for request in made.told()} == {CHANNEL + 2, CHANNEL + 3}, "those are opened again"
+
+
+def test_events_of_others_are_given_back_and_all_that_came_is_counted() -> None:
+    made = begun()
+    mine, other = Received(UDP_CHANNEL, b"x", SERVER), Received(500, b"y")
+    assert made.take([mine, other, Closed(501)]) == [other, Closed(501)]
+    assert made.state.received == 2 and made.state.events == [mine]
+
+
+def test_a_unit_without_fins_has_a_node_and_sends_nothing() -> None:
+    plain, unit = Etn21(5, "192.168.250.77"), Etn21(0, "192.168.250.77", fins=True, fins_node=9)
+    assert (plain.has_fins, plain.node, plain.unit_number) == (False, 77, 5) and (unit.has_fins, unit.node) == (True, 9)
+    assert plain.send(COMMAND) == 0x0101 and plain.execute(COMMAND, None)[1] == b""  # type: ignore[arg-type]
+    assert plain.serve(None, 0) == [] and unit.send(COMMAND) == 0  # type: ignore[arg-type]
 
 
 # --- FINS over connections --------------------------------------------------------------------------------------------
@@ -207,10 +350,10 @@ def test_a_line_that_closes_shows_nothing_to_send_and_hears_nothing_until_that_i
     rig = noc.Rig()
     rig.network.place(noc.SERVER, ScriptedPeer())
     words, line = noc.slot(rig.memory), rig.noc._port._lines[0]
-    noc.command(words, COMMAND.connect)
+    noc.command(words, LINE_COMMAND.connect)
     rig.step(3)
     noc.say(words, b"late")
-    words[LINE.command] = COMMAND.close
+    words[LINE.command] = LINE_COMMAND.close
     assert line.exchange(words, True) == [Close(0)] and not line.is_idle
     assert (words[LINE.state], words[LINE.sending]) == (STATE.closing, 0)
     for event in (Opened(0, 1, Peer("10.0.0.1", 1)), Received(0, b"old"), Failed(0, "open", "EIO"), Broken(0, "ECONNRESET")):
@@ -221,11 +364,11 @@ def test_a_line_that_closes_shows_nothing_to_send_and_hears_nothing_until_that_i
     words[LINE.sending] = 4
     assert line.is_idle and line.exchange(words, True) == [] and (words[LINE.state], words[LINE.sending]) == (STATE.closed, 0)
     line.take(Closed(0), words)
-    noc.command(words, COMMAND.connect)
+    noc.command(words, LINE_COMMAND.connect)
     assert [type(request) for request in line.exchange(words, True)] == [Connect], "a confirmation too many changes nothing"
     line.take(Opened(0, 9, noc.SERVER), words)
     assert words[LINE.state] == STATE.open
-    words[LINE.command] = COMMAND.close
+    words[LINE.command] = LINE_COMMAND.close
     line.exchange(words, True)
     line.take(Closed(0), words)
     assert line.is_idle
@@ -235,7 +378,7 @@ def test_a_line_that_is_not_the_unit_s_any_more_is_closed_and_its_words_are_left
     rig = noc.Rig()
     rig.network.place(noc.SERVER, ScriptedPeer())
     words, line = noc.slot(rig.memory), rig.noc._port._lines[0]
-    noc.command(words, COMMAND.connect)
+    noc.command(words, LINE_COMMAND.connect)
     rig.step(3)
     assert line.exchange(words, False) == [Close(0)]
     line.take(Closed(0), words)
