@@ -17,6 +17,7 @@ from rows import each_of
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.campaign.progress import INTERRUPTED, OVER
 from fbvm.cli.main import main
+from fbvm.cli.projects import planned_runs
 from fbvm.cli.projects.shown_progress import ShownProgress
 from fbvm.cli.running import dap, demo, live, peer, project_run, serve
 from fbvm.cli.running import run as run_verb
@@ -303,3 +304,15 @@ def test_a_run_under_a_page_has_the_page_that_the_verb_for_pages_has() -> None:
     options = PageOptions()
     assert (options.bind, options.port) == (usual["bind"], usual["port"]) and not options.read_only
     assert tuple(options.writable) == tuple(options.frames) == () and options.debug_port is None
+
+
+@each_of("names, chosen", [
+    ([], "campaign.toml"), (["."], "campaign.toml"), (["sub"], None), (["sub/runs.toml"], "sub/runs.toml"), (["fbvm.toml"], None),
+    (["counter.st"], None), ([".", "sub"], None), (["campaign.toml"], "campaign.toml"),
+])
+def test_which_file_says_what_a_campaign_does(counter: str, names: list[str], chosen: str | None) -> None:
+    Path("sub").mkdir(exist_ok=True)
+    for name in ("campaign.toml", "sub/runs.toml", "fbvm.toml"):
+        Path(name).write_text("", encoding="utf-8")
+    found = planned_runs._plan_file([Path(name) for name in names], "campaign.toml", lambda path: path.name != "fbvm.toml")
+    assert (found and found.as_posix()) == chosen
