@@ -19,8 +19,12 @@ from rows import each_of
 from fbvm.cli.main import main
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import notice_teller
+from fbvm.cli.shared.networks import try_doors
 from fbvm.cli.shared.options import Door, door
+from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
 from fbvm.net.notices import Notice, NoticeKind
+from fbvm.net.tcp import TcpNetwork
 from fbvm.wire.link import Peer
 
 UNIT = "192.168.250.21"
@@ -293,3 +297,14 @@ def test_twenty_callers_are_told_of_and_not_more() -> None:
         tell(Notice(NoticeKind.UNREACHED, HERE, REAL, "refused"))
     lines = file.getvalue().splitlines()
     assert len(lines) == 21 and "127.0.0.1:19" in lines[19] and "nobody answers" in lines[20]
+
+
+def test_a_real_network_tells_what_happens_at_its_doors() -> None:
+    image = compile_text("PROGRAM Main END_PROGRAM").image
+    assert image is not None
+    network = TcpNetwork()
+    with redirect_stderr(StringIO()) as file:
+        try_doors(Plc(image), network, (), ())
+        network.notices.note(NoticeKind.UNREACHED, HERE, REAL, "refused")
+    network.close()
+    assert file.getvalue() == "192.168.250.1:502: nobody answers at 127.0.0.1:1502 (refused)\n"
