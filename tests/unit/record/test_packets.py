@@ -51,6 +51,19 @@ def test_frames_are_put_together_however_they_were_cut() -> None:
     ]  # fmt: skip
 
 
+def test_a_server_is_who_was_called_on_whatever_port_and_also_if_that_is_the_unit() -> None:
+    """Both ask from, and are called at, other ports than that of Modbus; a new call begins anew."""
+    asked, reply = (modbus.Adu(1, 1, pdu).to_bytes() for pdu in (modbus.read(3, 7, 1), modbus.data_reply(3, b"\0\5")))
+    here, there = Peer("192.168.250.21", 5020), Peer("192.168.250.1", 49_152)
+    for calls in (False, True):
+        events = [TapEvent(kind, here, there, out is calls, content) for kind, out, content in (
+            (TapKind.SYN, True, b""), (TapKind.DATA, True, asked), (TapKind.DATA, False, reply), (TapKind.DATA, True, asked[:3]),
+            (TapKind.SYN, True, b""), (TapKind.DATA, True, asked))]  # fmt: skip
+        lines = [line.rpartition(": ")[2] for line in said(*events)]
+        assert lines[1] == lines[-1] == "03 read holding registers, address 7, quantity 1"
+        assert lines[2] == "03 read holding registers, data 00 05"
+
+
 def test_without_its_beginning_a_conversation_is_known_by_the_port() -> None:
     asked = modbus.Adu(1, 1, modbus.read(3, 7, 1)).to_bytes()
     assert said(data(True, asked))[0].endswith("address 7, quantity 1")

@@ -309,6 +309,23 @@ def test_a_scan_that_stood_at_a_breakpoint_does_not_lead_astray(image: Image) ->
     assert kept.at(2).read("Main.n") == 2
 
 
+@pytest.mark.parametrize("again_ns", [module.AGAIN_NS, 0])
+def test_forces_are_inputs(image: Image, again_ns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where each scan has a keyframe of its own."""
+    monkeypatch.setattr(module, "AGAIN_NS", again_ns)
+    plc, seen = Plc(image), list[object]()
+    kept = recorded(plc)
+    for scan in range(8):
+        if scan in (2, 4):
+            plc.force("Main.Go" if scan == 2 else "D7", scan == 2 or 5)
+        elif scan == 6:
+            plc.unforce()
+        plc.scan()
+        seen.append((plc.forces, plc.read("Main.Steps.Count"), plc.read("D7")))
+    assert [(done.forces, done.read("Main.Steps.Count"), done.read("D7")) for done in kept.again(range(8))] == seen
+    assert [len(forces) for forces, _, _ in seen] == [0, 0, 1, 1, 2, 2, 0, 0]  # type: ignore[misc]
+
+
 def test_many_inputs_lead_to_a_keyframe(image: Image, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_INPUT_BYTES", 1000)
     plc = Plc(image)

@@ -258,6 +258,7 @@ def test_a_unit_without_fins_has_a_node_and_sends_nothing() -> None:
 # --- FINS over connections --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_server_may_have_node_1() -> None:
     rig = ClientRig(fins_node=7, fins_nodes={"30": "192.168.250.30"})
     rig.plc.run(for_ns=4_000_000_000)
