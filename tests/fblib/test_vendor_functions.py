@@ -6,6 +6,7 @@ Expected values follow the vendors' pages that each source names; a test's name 
 from __future__ import annotations
 
 from functools import cache
+from random import Random
 from typing import Any
 
 import pytest
@@ -84,7 +85,10 @@ def test_blocks_from_and_to_bits(block: str, whole: str, bits: list[str]) -> Non
     [found] = outputs(block, f"{whole} -> {' '.join(bits)}", (0, number))
     assert sum(bit << place for place, bit in enumerate(found)) == number
     back = f"BIT_AS_{block.partition('_')[0]}" if block != "UNPACK" else "BIT_AS_BYTE"
-    assert outputs(back, f"{' '.join(bits)} -> {whole}", (0, *found)) == [number]
+    alone = [(0, *(at == place for at in range(len(bits)))) for place in range(len(bits))]
+    single = [1 << place for place in range(len(bits))]
+    assert outputs(back, f"{' '.join(bits)} -> {whole}", (0, *found), *alone) == [number, *single]
+    assert outputs(block, f"{whole} -> {' '.join(bits)}", *((0, value) for value in single)) == [row[1:] for row in alone]
 
 
 # --- Util: curves, values -----------------------------------------------------------------------------------------------
@@ -272,3 +276,73 @@ def test_freq_measure_is_the_mean_of_periods() -> None:
 ])  # fmt: skip
 def test_functions_of_texts(expression: str, type: str, value: object) -> None:
     assert value_of(expression, type) == value
+
+
+# --- Tc2_Utilities: texts of arguments, records in a buffer ---------------------------------------------------------------
+
+
+FORMATS = [
+    ("%d and %5d.", ["F_INT(n)", "F_DINT(m)"], "-7 and    42."), ("%-5d|%05d", ["F_DINT(m)", "F_INT(n)"], "42   |-0007"),
+    ("%u %x %X %o %b", ["F_UINT(u)"] * 5, "171 ab AB 253 10101011"), ("100%%%d%%", ["F_DINT(m)"], "100%42%"),
+    ("%f %.2f %.0f", ["F_REAL(r)", "F_LREAL(l)", "F_LREAL(l)"], "1.500000 -2.25 -2"), ("%8.1f|", ["F_REAL(r)"], "     1.5|"),
+    ("%s,%.2s,%4.1s", ["F_STRING(t)"] * 3, "abc,ab,   a"), ("%c", ["F_BYTE(b)"], "A"),
+    ("%4c|%-4c|", ["F_BYTE(b)"] * 2, "   A|A   |"), ("%d%d%d%d%d%d%d%d%d%d", ["F_DINT(m)"] * 10, "42" * 10),
+    ("plain", [], "plain"), ("", [], ""),
+]  # fmt: skip
+WRONG_FORMATS = [("%d", []), ("%q", ["F_DINT(m)"]), ("%d", ["F_STRING(t)"]), ("%s", ["F_DINT(m)"]), ("%f", ["F_DINT(m)"]),
+                 ("x%", ["F_DINT(m)"]), ("%d%d%d%d%d%d%d%d%d%d%d", ["F_DINT(m)"] * 10), ("%d %d", ["F_DINT(m)"])]  # fmt: skip
+ARGUMENTS = """VAR f : FB_FormatString; n : INT := -7; m : DINT := 42; u : UINT := 171; r : REAL := 1.5; l : LREAL := -2.25;
+    t : T_MaxString := 'abc'; b : BYTE := 65; what : INT; END_VAR"""
+
+
+@pytest.mark.slow
+def test_arguments_are_put_into_a_text_and_what_does_not_fit_is_an_error() -> None:
+    calls = [*((text, arguments, (False, 0, said)) for text, arguments, said in FORMATS),
+             *((*wrong, (True, 1, "")) for wrong in WRONG_FORMATS)]  # fmt: skip
+    pins = ["".join(f", arg{at} := {one}" for at, one in enumerate(arguments, 1)) for _, arguments, _ in calls]
+    rows = "\n".join(f"{number}: f(sFormat := '{call[0]}'{pins[number]});" for number, call in enumerate(calls))
+    plc = Plc(image_of(f"{ARGUMENTS}\nCASE what OF\n{rows}\nEND_CASE;"))
+    for number, (text, _, expected) in enumerate(calls):
+        plc.cold_start()
+        plc.write("Main.what", number)
+        assert plc.scan() is None
+        assert (plc.read("Main.f.bError"), plc.read("Main.f.nErrId"), plc.read("Main.f.sOut")) == expected, text
+
+
+RING = """VAR f : FB_MemRingBuffer; buffer : ARRAY[0..18] OF BYTE; give, take : ARRAY[0..15] OF BYTE; size, room : UDINT;
+    what : INT; END_VAR
+f.pBuffer := ADR(buffer); f.cbBuffer := SIZEOF(buffer);
+f.pWrite := ADR(give); f.cbWrite := size; f.pRead := ADR(take); f.cbRead := room;
+CASE what OF 0: f.A_AddTail(); 1: f.A_GetHead(); 2: f.A_RemoveHead(); 3: f.A_Reset(); END_CASE;"""
+RING_BYTES, LENGTH_BYTES = 19, 4
+
+
+@pytest.mark.slow
+def test_records_come_out_of_a_ring_as_they_went_in() -> None:
+    """Against a list of records, with which the ring goes round several times; lengths of 0 are refused."""
+    draw, plc, records = Random(1), Plc(image_of(RING)), list[bytes]()
+    refused = 0
+    for _ in range(300):
+        what, size, room = draw.choices((0, 1, 2, 3), (12, 4, 10, 1))[0], draw.randrange(9), draw.randrange(10)
+        given = bytes(draw.randrange(256) for _ in range(16))
+        plc.write("Main.give", list(given))
+        for name, value in (("what", what), ("size", size), ("room", room)):
+            plc.write(f"Main.{name}", value)
+        assert plc.scan() is None
+        used = sum(len(record) + LENGTH_BYTES for record in records)
+        good, length = True, plc.read("Main.f.cbReturn")
+        if what == 0:
+            good = size > 0 and used + size + LENGTH_BYTES <= RING_BYTES
+            records += [given[:size]] * good
+        elif what == 3:
+            records.clear()
+        else:
+            head = records[0] if records else b""
+            good = bool(records) and len(head) <= room
+            assert length == len(head)
+            assert not good or bytes(plc.read("Main.take")[:length]) == head
+            records = records[1:] if good and what == 2 else records
+        refused += not good
+        now = sum(len(record) + LENGTH_BYTES for record in records)
+        assert (plc.read("Main.f.bOk"), plc.read("Main.f.nCount"), plc.read("Main.f.cbSize")) == (good, len(records), now)
+    assert 50 < refused < 250
