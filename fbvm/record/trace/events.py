@@ -117,7 +117,6 @@ class ObservedEngine:
                  stands_still: bool = False, most: int | None = None) -> None:  # fmt: skip
         self.memory = memory
         self.report = report
-        self.program = program
         self.stands_still, self.most = stands_still, most
         known: object = program._engine if isinstance(program, ObservedEngine) else program
         self._counter: object = program._counter if isinstance(program, ObservedEngine) else program
