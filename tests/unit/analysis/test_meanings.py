@@ -25,10 +25,10 @@ END_FUNCTION_BLOCK
 PROGRAM Main
 VAR_EXTERNAL Total : INT; END_VAR
 VAR P1 : Pump := (Level := 4); i : INT; m : Mode := Filling; END_VAR
-VAR a : ARRAY [0..1] OF Tank := [(Level := 5), (State := Off)]; r : REF_TO Tank; b : BYTE; END_VAR
+VAR a : ARRAY [0..1] OF Tank := [(Level := 5), (State := Off)]; r : REF_TO Tank; b : BYTE; on : BOOL; END_VAR
 VAR CONSTANT third : INT := 2; END_VAR
     FOR i := 0 TO 1 DO a[i].Level := Total; END_FOR
-    P1.Stop(); P1(Level := i, Runs => b.0);
+    P1.Stop(); P1(Level := i, Runs => on);
     r := REF(a[0]); r^.Level := 1;
     m := Mode#Off; Big.Level := Big.Height + ABS(i);
     b.third := P1.Runs;
@@ -58,9 +58,9 @@ def meanings(program: Program, line: int) -> list[str]:
     (5, "PUMP="), (6, "PUMP.LEVEL="), (7, "PUMP.RUNS="), (8, "PUMP.INNER= FULL VESSEL.HEIGHT!"), (9, "PUMP.STOP()"),
     (10, "PUMP.STOP= PUMP.RUNS! PUMP.INNER TANK.LEVEL"), (12, "MAIN="), (13, "TOTAL"),
     (14, "MAIN.P1= PUMP PUMP.LEVEL! MAIN.I= MAIN.M= MODE MODE.FILLING"),
-    (15, "MAIN.A= TANK TANK.LEVEL! TANK.STATE! MODE.OFF MAIN.R= TANK MAIN.B="), (16, "MAIN.THIRD="),
+    (15, "MAIN.A= TANK TANK.LEVEL! TANK.STATE! MODE.OFF MAIN.R= TANK MAIN.B= MAIN.ON="), (16, "MAIN.THIRD="),
     (17, "MAIN.I! MAIN.A MAIN.I TANK.LEVEL! TOTAL"),
-    (18, "MAIN.P1 PUMP.STOP() MAIN.P1() PUMP.LEVEL! MAIN.I PUMP.RUNS MAIN.B"), (19, "MAIN.R! REF() MAIN.A MAIN.R TANK.LEVEL!"),
+    (18, "MAIN.P1 PUMP.STOP() MAIN.P1() PUMP.LEVEL! MAIN.I PUMP.RUNS MAIN.ON!"), (19, "MAIN.R! REF() MAIN.A MAIN.R TANK.LEVEL!"),
     (20, "MAIN.M! MODE MODE.OFF BIG TANK.LEVEL! BIG VESSEL.HEIGHT ABS() MAIN.I"), (21, "MAIN.B MAIN.THIRD! MAIN.P1 PUMP.RUNS"),
     (24, "SHARED="), (27, "RUN= MAIN"),
 ])

@@ -87,6 +87,17 @@ def test_a_change_that_others_may_notice_needs_a_whole_check(text: str, old: str
     assert not edited(text, (old, new)).check_changes()
 
 
+@each_of("changes, expected", [
+    ([("Level < 200", "Levl < 200"), ("Level := 100", "Levl := 100")], [("S0201", 4), ("S0402", 9)]),
+    ([("Level := 100", "Levl := 100"), ("Level < 200", "Levl < 200")], [("S0201", 4), ("S0402", 9)]),
+    ([("Level < 200", "Levl < 200"), ("Levl < 200", "Level < 300")], []),
+    ([("Level < 200", "Levl < 200"), ("Level := 100", "Levl := 100"), ("Levl < 200", "Level < 300")], [("S0402", 9)]),
+])
+def test_keys_that_come_before_a_check_all_count(changes: list[tuple[str, str]], expected: list[tuple[str, int]]) -> None:
+    program = edited(TWO, *changes)
+    assert program.check_changes() and codes(program) == expected
+
+
 def test_a_file_that_is_new_needs_a_whole_check() -> None:
     program = edited(TWO)
     program.replace("other.st", "VAR_GLOBAL shared : INT; END_VAR\n")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET
-from fbvm.base.memory import STRUCTS, Memory, compare
+from fbvm.base.memory import STRUCTS, Memory, changes, compare
 from fbvm.code.image import Layout
 
 SIZE = SLOTS_OFFSET + 2 * PAGE_BYTES
@@ -182,3 +182,16 @@ def test_a_memory_costs_what_it_touches() -> None:
         memory.snapshot()
     assert len(memories) == 100
     assert resident_pages() - before < 100 * layout.size // PAGE_BYTES // 4
+
+
+@pytest.mark.parametrize("places", [
+    (0,), (1,), (0, 1, 2), (PAGE_BYTES - 1, PAGE_BYTES), (PAGE_BYTES, 2 * PAGE_BYTES - 1), (5, 7), (),
+])
+def test_changes_are_runs_of_bytes_with_what_is_there_now(places: tuple[int, ...]) -> None:
+    old, new = bytes(2 * PAGE_BYTES), bytearray(2 * PAGE_BYTES)
+    for place in places:
+        new[place] = 1 + place % 200
+    found = changes(old, bytes(new))
+    assert [at + number for at, data in found for number in range(len(data))] == list(places)
+    assert all(bytes(new[at:at + len(data)]) == data for at, data in found)
+    assert len(found) == sum(place - 1 not in places or place - 1 < 0 for place in places)
