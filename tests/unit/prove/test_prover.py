@@ -10,12 +10,14 @@ from fbvm.code.compiler import compile_files, compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.invariants import Invariants, Ordered
 from fbvm.prove.prover import Limits, Prover, prove
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, WITHIN, Names, Question, Verdict
 from fbvm.prove.runs import repeated, replayed, simulated
 from fbvm.prove.shortening import shortened
 from fbvm.prove.solver import UNKNOWN, UNSAT, Solver
 from fbvm.prove.unreached import unreached
+from fbvm.watch.names import Names as NamesAt
 from fbvm.watch.paths import UnknownPlace
 
 FEW = Limits(simulated_scans=200, scans=120)
@@ -434,3 +436,18 @@ def test_a_scan_with_too_many_ways_is_undecided_when_the_time_is_over() -> None:
     verdict = asked(program(CHECKSUM, "i : INT; sum : WORD; table : ARRAY[0..1023] OF WORD;"), NO_TRAP, limits=limits)
     assert (verdict.word, verdict.how, verdict.scans) == (
         "undecided", "the time is over: one scan has too many ways to follow all of them", 0)
+
+
+def test_a_timer_was_started_at_the_time_of_the_scan_at_the_latest() -> None:
+    """Of its times only the start is never later than the scan is; the times that it was given or has measured may be."""
+    image = image_of("PROGRAM Main VAR In AT %IX0.0 : BOOL; t : TON; END_VAR t(IN := In, PT := T#50ms); END_PROGRAM")
+    prover = Prover(image, Question(NEVER, "Main.t.ET > T#1h"), Limits(), lambda said: None)
+    state = list(prover.summary.next)
+    found = Invariants(prover.summary, state, prover.goal.stop, prover.goal.given, prover.clock, lambda: False)
+    kept = found.kept([Ordered(variable, None) for variable in state if variable.width == 64])
+    names = NamesAt.of(image, Plc(image).memory.areas)
+    assert kept is not None and len([variable for variable in state if variable.width == 64]) > 1
+    [ordered] = kept
+    assert isinstance(ordered, Ordered)
+    place = names.at(ordered.lesser.value[1].offset)
+    assert place is not None and place.name not in ("Main.t.PT", "Main.t.ET")
