@@ -203,6 +203,7 @@ def test_numbers_of_the_manuals() -> None:
     assert (CPU_UNIT, CPU_BUS_UNITS, ANY_ETHERNET_UNIT, LAST_NODE, EVERY_NODE, PORT) == (0x00, 0x10, 0xFE, 254, 0xFF, 9600)
     header = Header(Address(), Address())
     assert (header.service, header.icf, header.gateways, header.reserved) == (0, 0x80, 2, 0)
+    assert Response(header, 0x0101).end_code == EndCode.NORMAL and Message(Kind.CONFIRMATION).error == Error.NONE
 
 
 def test_the_bytes_of_a_frame() -> None:

@@ -320,6 +320,18 @@ def test_coils_and_inputs_are_tables_of_their_own() -> None:
     assert replies == ["01 01 02", "02 01 04", "03 02 00 03", "04 02 00 04"]
 
 
+def test_only_exceptions_are_counted_as_exceptions() -> None:
+    server = ModbusServer()
+    for code in (1, 2, 3, 4):
+        server.answer_pdu(modbus.read(code, 0, 1))
+    assert server.counts == {"messages": 4, "exceptions": 0}
+    server.answer_pdu(modbus.read(2, 0, 0))
+    assert server.counts == {"messages": 5, "exceptions": 1}
+    server.counts.update(messages=0xFFFF, exceptions=0xFFFF)
+    server.answer_pdu(modbus.read(2, 0, 0))
+    assert server.counts == {"messages": 0, "exceptions": 0}
+
+
 def test_an_exception_without_a_code_names_none() -> None:
     assert (decode_reply(b"\x83").exception, decode_reply(b"\x83\x00").fault) == (0, "wrong length")
     assert decode_reply(b"\x83\x00").function == 3
