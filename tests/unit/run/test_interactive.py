@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import pytest
 from test_run_loop import Clock, RealNetwork, real_plc
@@ -20,7 +21,7 @@ class Hands:
 
     def __init__(self, act: Callable[[int], None], turn_ns: int = 10_000_000) -> None:
         self.now_ns, self.turns, self._act, self._turn_ns = 0, 0, act, turn_ns
-        self.scanned = 0
+        self.scanned = self.begun = 0
 
     def monotonic_ns(self) -> int:
         return self.now_ns
@@ -32,7 +33,8 @@ class Hands:
         return False
 
     def before_scan(self, number: int, now_ns: int) -> None:
-        """Nothing to do."""
+        self.begun += 1
+        assert self.begun == self.scanned + 1, "one scan after the other"
 
     def after_scan(self, number: int, now_ns: int) -> None:
         self.scanned += 1
@@ -137,7 +139,7 @@ def test_as_fast_as_possible_many_scans_follow_one_another_and_each_plc_has_its_
     run_interactive(runs, control, hands, monotonic_ns=hands.monotonic_ns)
     assert [(run.plc.scans, run.reason) for run in runs] == [(300, "scans"), (50, "scans")]
     assert order[:8] == ["fast", "slow", "fast", "fast", "fast", "slow", "fast", "fast"]
-    assert hands.scanned == 350
+    assert hands.scanned == hands.begun == 350
 
 
 def test_a_slice_ends_so_that_who_looks_on_is_heard() -> None:
@@ -176,6 +178,30 @@ def test_the_loop_is_left_for_somebody_else_and_goes_on() -> None:
     scans = plc.scans
     run_interactive([run], control, hands, until=lambda: False, monotonic_ns=hands.monotonic_ns)
     assert run.reason == "stopped" and plc.scans > scans >= 9
+
+
+def test_scans_that_somebody_else_has_executed_are_not_made_up_for() -> None:
+    [plc] = plcs(10)
+    run, control, hands = Running(plc, scans=1 << 62), Control(), Hands(lambda turn: control.end() if turn == 20 else None)
+    run_interactive([run], control, hands, until=lambda: hands.turns == 5, monotonic_ns=hands.monotonic_ns)
+    plc.run(scans=30)
+    run.resume()
+    times: list[int] = [plc.now_ns]
+    plc.watchers.append(lambda plc: times.append(plc.now_ns))
+    run_interactive([run], control, hands, monotonic_ns=hands.monotonic_ns)
+    assert len(times) > 10 and {later - earlier for earlier, later in pairwise(times)} == {10_000_000}
+
+
+def test_how_a_run_goes_on() -> None:
+    control = Control()
+    control.step()
+    assert (control.is_paused, control.steps, control.stands) == (True, 1, False)
+    control.step(3)
+    assert control.steps == 4
+    control.go_on()
+    assert (control.is_paused, control.steps, control.stands) == (False, 0, False)
+    control.pause()
+    assert control.stands
 
 
 def test_ctrl_c_ends_the_run() -> None:

@@ -8,6 +8,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.engine.choice.tiers import choice_of
 from fbvm.engine.native import engine as native
 from fbvm.net.faults import KINDS, Fault
 from fbvm.net.loop import LoopNetwork
@@ -276,6 +277,14 @@ address = "10.0.0.250"
     assert {type(plc.engine).__name__ for plc in plcs} == {"NativeEngine" if native.available() else "PythonEngine"}
     plcs[3].write("Main.n", 77)
     assert [plc.read("Main.n") for plc in plcs[2:5]] == [3, 77, 3]
+
+
+@each_of(("count", "engine", "chosen"), [(MANY - 1, "auto", "auto"), (MANY, "auto", "native"), (MANY, "python", "python")])
+@pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
+def test_machine_code_from_the_first_scan_on_is_for_many_plcs_that_leave_it_open(folder: Path, count: int, engine: str,
+                                                                                chosen: str) -> None:  # fmt: skip
+    built = plant(folder, f'[plc.pump]\nsources = ["counter.st"]\ncount = {count}\nengine = "{engine}"\n')
+    assert {choice_of(run.plc.engine) for run in built.runs} == {chosen}
 
 
 PAIR = """

@@ -131,16 +131,16 @@ LISTED = """
 26: 01 02 04 05 06 07 08 09 0A 0B, 30: 01, 40: 01
 """
 GIVEN = {
-    EndCode.NORMAL: "normal end", EndCode.NOT_IN_NETWORK: "local node", EndCode.NO_UNIT: "no unit", EndCode.BUSY: "busy",
-    EndCode.TIMED_OUT: "time-out", EndCode.UNDEFINED: "undefined command", EndCode.NOT_SUPPORTED: "not supported",
-    EndCode.NO_ROUTE: "no routing tables", EndCode.TOO_LONG: "too long", EndCode.TOO_SHORT: "too short",
-    EndCode.COUNT: "number of elements", EndCode.HEADER: "header", EndCode.PARAMETER: "parameter",
-    EndCode.NO_AREA: "no such area", EndCode.FIRST_ADDRESS: "first address",
-    EndCode.ADDRESS_RANGE: "address range", EndCode.NO_PROGRAM: "no such program",
-    EndCode.RESPONSE_TOO_LONG: "response too long", EndCode.OTHER_PARAMETER: "parameter", EndCode.READ_ONLY: "read only",
-    EndCode.PROTECTED: "protected", EndCode.CANNOT_CHANGE: "cannot be changed", EndCode.IN_PROGRAM: "PROGRAM mode",
-    EndCode.IN_RUN: "RUN mode", EndCode.CONNECTION_EXISTS: "connection exists", EndCode.NOT_A_CLIENT: "not a client",
-    EndCode.ACCESS_RIGHT: "access right",
+    "NORMAL": "normal end", "NOT_IN_NETWORK": "local node", "NO_UNIT": "no unit", "BUSY": "busy",
+    "TIMED_OUT": "time-out", "UNDEFINED": "undefined command", "NOT_SUPPORTED": "not supported",
+    "NO_ROUTE": "no routing tables", "TOO_LONG": "too long", "TOO_SHORT": "too short",
+    "COUNT": "number of elements", "HEADER": "header", "PARAMETER": "parameter",
+    "NO_AREA": "no such area", "FIRST_ADDRESS": "first address",
+    "ADDRESS_RANGE": "address range", "NO_PROGRAM": "no such program",
+    "RESPONSE_TOO_LONG": "response too long", "OTHER_PARAMETER": "parameter", "READ_ONLY": "read only",
+    "PROTECTED": "protected", "CANNOT_CHANGE": "cannot be changed", "IN_PROGRAM": "PROGRAM mode",
+    "IN_RUN": "RUN mode", "CONNECTION_EXISTS": "connection exists", "NOT_A_CLIENT": "not a client",
+    "ACCESS_RIGHT": "access right",
 }  # fmt: skip
 
 
@@ -152,7 +152,8 @@ def test_the_end_codes_are_those_of_the_lists_and_no_others() -> None:
 
 
 def test_each_end_code_that_is_given_has_its_words() -> None:
-    assert {code: code for code in EndCode if GIVEN[code] not in END_CODES[code.value]} == {}
+    assert set(EndCode.__members__) == set(GIVEN)
+    assert {name: code for name, code in EndCode.__members__.items() if GIVEN[name] not in END_CODES[code.value]} == {}
     assert meaning_of(0x8205) == "response time-out, on the way"
     assert meaning_of(0x00C0).startswith("normal end, with a fatal")
     assert meaning_of(0x7F00) == "end code 7F00"
