@@ -280,6 +280,7 @@ address = "10.0.0.250"
 
 
 @each_of(("count", "engine", "chosen"), [(MANY - 1, "auto", "auto"), (MANY, "auto", "native"), (MANY, "python", "python")])
+@pytest.mark.slow
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
 def test_machine_code_from_the_first_scan_on_is_for_many_plcs_that_leave_it_open(folder: Path, count: int, engine: str,
                                                                                 chosen: str) -> None:  # fmt: skip
