@@ -91,6 +91,7 @@ class Dialect:
     bits_of_words: bool = False
     whole_characters: bool = False
     short_references: bool = False
+    doubled_quotes: bool = False
     steps_apart: bool = False
     times_are_numbers: bool = False
     short_addresses: bool = False
@@ -248,6 +249,7 @@ QUESTIONS = {
     "short_references": ("REF(x), where x is a variable of a FUNCTION or METHOD, or an in-out",
                          "an error (S0407): x ends with the call; ADR(x) and REF= are taken, and stop the program (R0110) if "
                          "they are followed later", "taken as ADR(x) is"),
+    "doubled_quotes": ("'it''s': a quote that is doubled", "an error: $' is one", "one quote of the text"),
     "negative_is_zero": ("REAL_TO_UINT(-1.0), REAL_TO_WORD(-1.0)", "stops the program (R0105), or 65535 where the result wraps",
                          "0"),
     "wrong_bcd_is_zero": ("BCD_TO_UINT(16#9A): a digit above 9", "stops the program (R0105)", "0"),
@@ -302,7 +304,7 @@ _ROWS = (
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
             constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True,
-            short_references=True),
+            short_references=True, doubled_quotes=True),
     Dialect("rusty", "programs for RuSTy", ("rusty",), reals_of_other_widths=True, loop_ends_each_pass=True,
             loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,

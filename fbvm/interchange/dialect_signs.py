@@ -71,8 +71,13 @@ def guessed(families: Iterable[tuple[str, str]], sources: Iterable[Source]) -> G
     own = [sign for sign in signs if chosen in sign.dialects]
     first = min(own, key=lambda sign: len(sign.dialects))
     others = [sign for sign in signs if chosen not in sign.dialects]
-    against = f"; but {others[0].words} is of {' or '.join(n for n in PREFERRED if n in others[0].dialects)}" if others else ""
+    against = f"; but {others[0].words} is of {_named(others[0])}" if others else ""
     return Guess(chosen, f"there is {first.words}{against}")
+
+
+def _named(sign: Sign) -> str:
+    *names, last = (name for name in PREFERRED if name in sign.dialects)
+    return f"{', '.join(names)} or {last}" if names else last
 
 
 def _signs(source: Source) -> Iterator[Sign]:

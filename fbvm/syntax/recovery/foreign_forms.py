@@ -75,16 +75,6 @@ def bare_point(automaton: Automaton, token: Token, following: list[Token]) -> Re
                   f"a number has digits behind it: {before.text}.0", lossless=True)
 
 
-def doubled_quote(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
-    """`'it''s'`"""
-    before = automaton.before
-    if token.type != "STRING_LITERAL" or before.type != "STRING_LITERAL" or before.end != token.start:
-        return None
-    quote = token.text[0]
-    return Repair([], before.start, token.end, f"a text with two {quote} inside", f"inside a text {quote} is written ${quote}",
-                  lossless=True)
-
-
 def bare_function(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`abs i`, `(INT) x`"""
     before, behind = automaton.before, token.text if token.type in ("NAME", "NUMBER") else "x"

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from fbvm.base.dialects import takers
 from fbvm.syntax.st.comments import CLOSERS, comment_end
+from fbvm.syntax.st.foreign import LITERALS, OPERATORS, SIGNS
 from fbvm.syntax.st.pragmas import GENERATOR, NO_EFFECT, attribute_name, dialectal, harmless
 from fbvm.syntax.st.tables import Terminal, tables
 from fbvm.syntax.tree import Form, Pragma
@@ -69,7 +70,8 @@ _FORMAL_CALL = re.compile(r"""(?isx) [ \t]* \( [ \t]* \r?\n [^()]* \n [ \t]* \) 
 operator on the line behind them."""
 _PLACES = frozenset(("AT", "END_VAR"))
 """Terminals behind which a name may begin something that is none."""
-_READ_AGAIN = frozenset(("FOREIGN", "TYPED_LITERAL"))
+_READ_AGAIN = frozenset(("FOREIGN", "TYPED_LITERAL", "STRING_LITERAL"))
+_QUOTED = re.compile(r"""'(?:\$.|[^'$\r\n])*'|"(?:\$.|[^"$\r\n])*\"""")
 _END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")
 
 
@@ -81,37 +83,6 @@ def meant(text: str) -> str:
     return MISSPELT.get(word, "VAR")
 
 
-_FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write `<>`"),
-            "&&": ("AND", "AND", "write AND"), "||": ("OR", "OR", "write OR"), "|": ("OR", "OR", "write OR"),
-            "!": ("NOT", "NOT", "write NOT, or `<>` for unequal"), "~": ("NOT", "NOT", "write NOT"),
-            "=:": ("ASSIGN", ":=", "write `:=`"), "=<": ("LESS_EQUAL", "<=", "write `<=`"),
-            "><": ("UNEQUAL", "<>", "write `<>`"), ":==": ("ASSIGN", ":=", "write `:=`"),
-            "> =": ("GREATER_EQUAL", ">=", "`>=` is one sign, without a space inside"),
-            "< =": ("LESS_EQUAL", "<=", "`<=` is one sign, without a space inside"),
-            "< >": ("UNEQUAL", "<>", "`<>` is one sign, without a space inside"),
-            "->": ("DOT", ".", "write `^.` behind a reference"),
-            "<<": ("STAR", "*", "write SHL(value, count)"), ">>": ("STAR", "*", "write SHR(value, count)"),
-            "++": ("", "", "write `x := x + 1`"), "--": ("", "", "write `x := x - 1`"),
-            "%": ("MOD", "MOD", "write MOD for the remainder; an address has letters and digits behind `%`")}
-"""Operators of other languages -> our terminal, its text, and advice."""
-
-_SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
-    (r"\?", "write SEL(condition, if_false, if_true)"),
-    (r"#[ \t]*(?:include|define|if|ifdef|ifndef|pragma)\b", "there is no preprocessor: declare constants in VAR CONSTANT"),
-    (r"(?<!\.)%[A-Za-z]", "an address has a number behind its letters: %QX0.0, %MW10"),
-    (r"(?<=\w)\$", "a name has letters, digits and `_`"),
-    (r"#[A-Za-z_]", "`#` in front of a name is Siemens SCL: leave it out"),
-    (r"(?i)@EXTERNAL\b", "RuSTy now writes the pragma {external}, in front of a POU whose body is in another language"),
-    (r"#", "a type stands in front of `#`, and no space"),
-    (r"\\", "the escape in a string is `$`")))
-"""Characters with which no token begins, and a hint."""
-_WRITTEN = tuple((re.compile(row[0]), *row[1:]) for row in (
-    (r"#([0-9.]+(?:[mun]s|[dhms]))\b", "TYPED_LITERAL", r"T#\1", r"`\g<0>` is no duration", r"a duration is written T#\1"),
-    (r"(?<!\w)[#$]([0-9A-Fa-f]+)\b", "NUMBER", r"16#\1", r"`\g<0>` is no number", r"hexadecimal digits are written 16#\1"),
-    (r"[\u2018-\u201f`\u00b4]([^'\u2018-\u201f`\u00b4\r\n]*)[\u2018-\u201f`\u00b4]", "STRING_LITERAL", r"'\1'",
-     "the quotes are not straight", r"a text is written '\1'"),
-    (r"#[ \t]+[A-Za-z][^\r\n]*", "", "", "`#` begins no comment", "a comment begins with // or stands in (* *)")))
-"""Forms of other languages: pattern, our terminal and its text, message, hint."""
 _DRAWN = re.compile(r"(?:[ \t]*[│├┃┣][^\n]*\n)+")
 """Lines that begin with the left rail of a rung."""
 END_OF_FILE = "\x1a\0"
@@ -282,6 +253,8 @@ class Lexer:
         literal; of a duration the pattern of literals takes only the beginning in `T# 30s` and `T#1.0s500.0ms`."""
         if kind == "FOREIGN":
             return *self._foreign(word, start, end), end
+        if kind == "STRING_LITERAL":
+            return kind, *self._quoted(word, start, end)
         found = _BEHIND_DURATION.match(self.text, start)
         if found is None:
             return kind, word, end
@@ -291,6 +264,17 @@ class Lexer:
                 "S0105", "a blank stands behind `#`", f"a duration is written {word}"),
                 ("S0193", "a blank stands behind `#`", f"write {word}")))
         return kind, word, found.end()
+
+    def _quoted(self, word: str, start: int, end: int) -> tuple[str, int]:
+        """The text of a string literal and its end: a quote that is doubled, `'it''s'`, is one of the text."""
+        quote, pieces = word[0], [word[1:-1]]
+        while self.text.startswith(quote, end) and (found := _QUOTED.match(self.text, end)):
+            pieces.append(found[0][1:-1])
+            end = found.end()
+        if len(pieces) > 1:
+            self.forms.append(Form("doubled_quotes", start, end, (
+                "S0101", f"a text with two {quote} inside", f"inside a text {quote} is written ${quote}")))
+        return f"{quote}{f'${quote}'.join(pieces)}{quote}", end
 
     def _special(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
         """The terminal of a token and its end: LOCATION behind AT, behind END_VAR an instruction list that begins with a formal
@@ -329,11 +313,11 @@ class Lexer:
             return None, drawn.end()
         if word := lex.foreign_word.match(text, at):
             return Token("NAME", word[0], at, word.end()), word.end()
-        if written := next((row for row in _WRITTEN if row[0].match(text, at)), None):
+        if written := next((row for row in LITERALS if row[0].match(text, at)), None):
             return self._meant(at, *written)
         run = lex.unknown.match(text, at + 1)
         end = run.end() if run else at + 1
-        advice = next((match.expand(words) for shape, words in _SIGNS if (match := shape.match(text, at))), "")
+        advice = next((match.expand(words) for shape, words in SIGNS if (match := shape.match(text, at))), "")
         self.report("S0102", at, end, f"unexpected {_characters(text[at:end])}", advice)
         return None, end
 
@@ -354,7 +338,7 @@ class Lexer:
 
     def _foreign(self, word: str, start: int, end: int) -> tuple[str, str]:
         """Our operator for one of other languages: terminal and text, which are empty if we have none."""
-        kind, ours, advice = _FOREIGN.get(re.sub(r"[ \t]+", " ", word), ("ASSIGN", ":=", f"write out `x := x {word[0]} ..`"))
+        kind, ours, advice = OPERATORS.get(re.sub(r"[ \t]+", " ", word), ("ASSIGN", ":=", f"write out `x := x {word[0]} ..`"))
         if word[:1] == ":" and word != ":==":
             advice = "`:=` is one sign, without a space inside"
         self.report("S0101", start, end, f"`{word}` is no operator of Structured Text", advice, word not in NO_VALUE)

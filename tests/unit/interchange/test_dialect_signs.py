@@ -53,7 +53,7 @@ def test_the_tool_that_wrote_a_document_counts_more_than_constructs() -> None:
 
 
 @pytest.mark.slow
-@each_of(("name", "dialect", "reason"), [("beremiz.xml", "matiec", "there is `CONFIGURATION Config0`"),
+@each_of(("name", "dialect", "reason"), [("beremiz.xml", "matiec", "it has a Config0 with a Res0"),
                                          ("codesys.xml", "codesys", "the header names CODESYS")])
 def test_a_document_is_checked_in_the_dialect_of_its_tool_which_is_said(name: str, dialect: str, reason: str) -> None:
     done = CliRunner().invoke(main, ["check", str(DOCUMENTS / name), "--dialect", "auto", "--json", "--no-warn", "all"])
