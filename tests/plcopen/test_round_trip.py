@@ -441,6 +441,27 @@ def test_blocks_that_one_call_reads_are_all_wired_to_it() -> None:
     assert 'typeName="ADD"' in text
 
 
+def test_functions_of_typed_literals_are_blocks() -> None:
+    """Beremiz takes what stands in front of a `#` for the type of a value."""
+    text = ("PROGRAM Main\nVAR a : BOOL; t : TIME; n : INT; END_VAR\nt := SUB_TIME(T#500ms, T#350ms);\n"
+            "IF a THEN n := MUX(n, INT#1, 2, LIMIT(MN := INT#0, IN := n, MX := 9)); END_IF\n"
+            "LADDER\nRUNG 1\n    LD a\n    OUT a\nEND_LADDER\nEND_PROGRAM\n")
+    made = export_xml([Source("Main.st", text)])
+    walked = list(document(made).walk())
+    assert [one.get("typeName") for one in walked if one.name == "block"] == ["SUB_TIME", "LIMIT", "MUX", "MOVE"]
+    assert [pin.get("formalParameter") for one in walked if one.get("typeName") == "MUX" for pin in one.walk()
+            if pin.name == "variable" and pin.one("connectionPointIn")] == ["K", "IN0", "IN1", "IN2"]
+    assert all("(" not in one.text for one in walked if one.name == "expression")
+
+
+def test_outputs_of_counters_of_all_widths_are_wires() -> None:
+    """A value that names `c.CV` would be read in front of the call by tools that begin with the outputs of a diagram."""
+    text = ("PROGRAM Main\nVAR a : BOOL; c : CTU_ULINT; n : ULINT; END_VAR\nc(CU := a, PV := 5);\nn := c.CV;\n"
+            "LADDER\nRUNG 1\n    LD a\n    OUT a\nEND_LADDER\nEND_PROGRAM\n")
+    made = export_xml([Source("Main.st", text)])
+    assert "c.CV" not in [one.text.strip() for one in document(made).walk() if one.name == "expression"]
+
+
 def test_a_call_behind_something_else_begins_a_network_of_its_own() -> None:
     """What stands behind it and names a block of before has a name there, no wire; calls in a row share a network."""
     text = ("PROGRAM Main\nVAR a, b, x, y : BOOL; t, u : TON; END_VAR\n{}\nLADDER\nRUNG 1\n    LD a\n    OUT b\nEND_LADDER\n"

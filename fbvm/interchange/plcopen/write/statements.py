@@ -7,6 +7,7 @@ then.
 
 from __future__ import annotations
 
+from fbvm.check.calls.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion
 from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.schema import SIGNS
 from fbvm.interchange.plcopen.write.layout import Drawing, Ends
@@ -18,6 +19,34 @@ FUNCTIONS = {sign: name for name, sign in SIGNS.items()}
 """By operator, the function that is drawn for it."""
 COLUMN = 3
 """Where blocks stand, so that their values fit in front of them."""
+
+
+def _standard_call(call: tree.Call) -> tuple[str, list[tuple[str, tree.Expr]]] | None:
+    """The name of a standard function and its operands by pin; None for another call, and for one that is not written plainly."""
+    if not isinstance(call.callee, tree.NameRef) or any(
+            argument.kind == "=>" or argument.negated or argument.value is None for argument in call.arguments):
+        return None
+    name = call.callee.text.upper()
+    pins = _pins(name, len(call.arguments))
+    if len(pins) != len(call.arguments):
+        return None
+    return name, [(argument.name.text if argument.name else pin, argument.value)
+                  for pin, argument in zip(pins, call.arguments, strict=True) if argument.value is not None]
+
+
+def _pins(name: str, count: int) -> list[str]:
+    """The inputs of a standard function that takes so many operands; none if it takes no such number, or is none."""
+    row = SIGNATURES.get(name)
+    if name in OPERATORS or name in TIME_OPERATORS:
+        return [f"IN{at}" for at in range(1, count + 1)]
+    if conversion(name) is not None:
+        return ["IN"]
+    if row is None:
+        return []
+    pins = [pin for pin, _ in row.parameters]
+    while row.repeats and len(pins) < count:
+        pins.append(f"IN{int(pins[-1].removeprefix('IN')) + 1}")
+    return pins
 
 
 class StatementWriter:
@@ -57,8 +86,8 @@ class StatementWriter:
         """A value as a wire if it is an output of a block at work or made of one by operators, which are blocks then; else as its
         text.
 
-        Operators on a literal that names its type are blocks, too: of `n + INT#1` written at a pin, Beremiz takes all in front
-        of the `#` for the type of the value."""
+        Operators and standard functions of a literal that names its type are blocks, too: of `n + INT#1` written at a pin,
+        Beremiz takes all in front of the `#` for the type of the value."""
         if not any(self._block_of(part) is not None for part in walk(expr)) and "#" not in self.types.text(expr):
             return self.types.text(expr)
         if isinstance(expr, tree.Member) and (block := self._block_of(expr)) is not None:
@@ -68,6 +97,8 @@ class StatementWriter:
             return self._function("NOT", [("IN", expr.operand)])
         if isinstance(expr, tree.Binary) and expr.op in FUNCTIONS:
             return self._function(FUNCTIONS[expr.op], [("IN1", expr.left), ("IN2", expr.right)])
+        if isinstance(expr, tree.Call) and (called := _standard_call(expr)) is not None:
+            return self._function(*called)
         return self.types.text(expr)
 
     def _function(self, name: str, operands: list[tuple[str, tree.Expr]]) -> Ends:

@@ -14,12 +14,18 @@ from fbvm.syntax import tree
 
 LONG = {"DATE_AND_TIME": "DT", "TIME_OF_DAY": "TOD"}
 UNSIGNED = {"USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD"}
+COUNTED = ("", "_INT", "_DINT", "_LINT", "_UDINT", "_ULINT")
 OUTPUTS = {
-    **dict.fromkeys(("TON", "TOF", "TP"), frozenset(("Q", "ET"))), **dict.fromkeys(("CTU", "CTD"), frozenset(("Q", "CV"))),
+    **dict.fromkeys(("TON", "TOF", "TP"), frozenset(("Q", "ET"))),
+    **dict.fromkeys((f"{name}{kind}" for name in ("CTU", "CTD") for kind in COUNTED), frozenset(("Q", "CV"))),
+    **dict.fromkeys((f"CTUD{kind}" for kind in COUNTED), frozenset(("QU", "QD", "CV"))),
     **dict.fromkeys(("R_TRIG", "F_TRIG"), frozenset("Q")), **dict.fromkeys(("SR", "RS"), frozenset(("Q1",))),
-    "CTUD": frozenset(("QU", "QD", "CV")),
+    **dict.fromkeys(("PID", "DERIVATIVE"), frozenset(("XOUT",))), "INTEGRAL": frozenset(("Q", "XOUT")),
+    "RAMP": frozenset(("BUSY", "XOUT")), "HYSTERESIS": frozenset("Q"), "RTC": frozenset(("Q", "CDT")),
+    "SEMA": frozenset(("BUSY",)),
+    **dict.fromkeys(("PYTHON_EVAL", "PYTHON_POLL", "PYTHON_GEAR"), frozenset(("ACK", "RESULT"))),
 }
-"""The outputs of the standard's blocks."""
+"""The outputs of the blocks of the standard, and of those that Beremiz and OpenPLC Editor add."""
 LISTS = {word: name for name, word in SECTIONS.items()}
 WORDS = {word: name for name, word in QUALIFIERS.items()}
 _TEXTS = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\"|\(\*.*?\*\)|//[^\n]*"""
