@@ -132,6 +132,13 @@ def test_scans_at_any_times(longest_ns: int) -> None:
     compare_scans(image, CYCLE_NS, 60, BUDGET, times_ns=times_ns)
 
 
+def test_clock_pulses_behind_pauses_of_many_periods() -> None:
+    image = compile_text("PROGRAM Main VAR q : BOOL; END_VAR\nLADDER\nLD P_0_02s\nOUT q\nEND_LADDER\nEND_PROGRAM").image
+    assert image is not None
+    times_ns = [0, *accumulate([3_000_000, 75_000_000, 1_234_567_000, 11_000_000])]
+    compare_scans(image, CYCLE_NS, 5, BUDGET, times_ns=times_ns)
+
+
 def test_every_operation_has_its_row() -> None:
     assert set(EXPRESSION_ROWS) == set(EXPRESSIONS)
     made_for_others = {"count", "mark"}  # by engines, of an image that has none
