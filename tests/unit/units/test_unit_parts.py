@@ -308,6 +308,21 @@ def test_faults_are_a_list_of_codes_with_what_they_fit() -> None:
         faults.append(first)
 
 
+def test_what_may_be_set_on_a_unit_is_plain_and_makes_another_one_alike() -> None:
+    unit, other = Etn21(0), Etn21(0)
+    assert (unit.link_up, unit.error_status, unit.settings["faults"]) == (True, 0, [])
+    before = unit.times_set
+    unit.link_up, unit.error_status = False, 0x8000
+    unit.faults = [Fault(3, Switch.SEND, 2), Fault(4)]
+    assert unit.times_set == before + 3
+    other.settings = unit.settings
+    assert other.settings == unit.settings == {
+        "faults": [[3, Switch.SEND, 2], [4, None, None]], "link_up": False, "error_status": 0x8000}
+    assert list(other.faults) == list(unit.faults) and Etn21(**unit.configuration).configuration == unit.configuration
+    other.link_up = True
+    assert other.link_up and not unit.link_up
+
+
 class Areas:
     """Memory areas with so many words."""
 
