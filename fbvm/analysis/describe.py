@@ -49,9 +49,8 @@ def head(pou: Pou) -> str:
 
 def _type(declared: Declared) -> str:
     entry = declared.type
-    kind = entry.resolved[0] if entry is not None and entry.resolved is not None else None
-    if entry is None:
-        return declared.name
+    assert entry is not None, "what is no variable and no POU is a type, or a member of one"
+    kind = entry.resolved[0] if entry.resolved is not None else None
     if declared.key[0] == "member" and isinstance(kind, EnumType):
         return f"{entry.tree.name.text}#{declared.name} = {kind.members.get(declared.key[3], '')}"
     if declared.key[0] == "member" and isinstance(kind, StructType):

@@ -14,6 +14,7 @@ from fbvm.base.areas import (
     SLOTS_OFFSET,
     AddressError,
     Mailbox,
+    e_bank,
     parse_address,
     refusal,
 )
@@ -91,3 +92,6 @@ def test_what_is_kept_over_a_start_and_what_a_program_must_not_write() -> None:
     assert {area.name for area in AREAS.values() if area.retained} == {"H", "A", "CNF", "C", "D"}
     assert {area.name: area.read_only for area in AREAS.values() if area.read_only} == {"CF": 128, "A": 448}
     assert (E_BANKS, E_WORDS) == (13, 32768)
+    box, bank = MAILBOX.at(SLOTS_OFFSET), e_bank("E3", SLOTS_OFFSET)
+    assert [(area.read_only, area.retained, area.count, area.size_bytes) for area in (box, bank)] == [
+        (0, False, 64, 128), (0, True, 32768, 65536)]

@@ -22,6 +22,7 @@ from rows import each_of
 
 from fbvm import Plc, compile_text
 from fbvm.base import host
+from fbvm.base.data import cache_folder
 from fbvm.cli.main import main
 from fbvm.cli.running.serve import Signals
 from fbvm.net.tcp import TcpNetwork
@@ -256,6 +257,11 @@ def test_folders_of_caches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(host, "sys", SimpleNamespace(platform="win32"))
     monkeypatch.setenv("LOCALAPPDATA", "/data")
     assert host.cache_home().as_posix() == "/data/fbvm/cache"
+    monkeypatch.setenv("FBVM_CACHE", "/elsewhere")
+    assert cache_folder().as_posix() == "/elsewhere"
+    for unset in (lambda: monkeypatch.setenv("FBVM_CACHE", ""), lambda: monkeypatch.delenv("FBVM_CACHE")):
+        unset()
+        assert cache_folder().as_posix() == "/data/fbvm/cache"
 
 
 def test_memory_without_private_mappings(windows: None, monkeypatch: pytest.MonkeyPatch) -> None:
