@@ -261,7 +261,7 @@ QUESTIONS = {
                   "REAL_TO_STRING(100.0), TIME_TO_STRING(T#1s); functions beyond the standard",
                   "as the standard's bodies compute it; '100.0', 'T#1s'; none",
                   "blocks and functions of its own; under matiec '100', 'T#0d0h0m1s'; LEFT_EXT and its like and ROUND "
-                  "under rusty, TIME_TO_US under strucpp"),
+                  "under rusty, TIME_TO_US, TIME_TO_S ... under strucpp"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type, CLASS, INTERFACE, METHOD, PROPERTY, "
                 "EXTENDS, IMPLEMENTS", "taken", "refused (S0903)"),
     "warned": ("POINTER TO, REFERENCE TO, CLASS, INTERFACE, METHOD, PROPERTY, EXTENDS, IMPLEMENTS", "taken",

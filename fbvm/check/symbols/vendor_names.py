@@ -43,7 +43,7 @@ _BY_DIALECT = (
      r"csv_reload", "a block of Beremiz and OpenPLC: --dialect matiec brings it"),
     (r"(?:LEFT|RIGHT|MID|INSERT|DELETE|REPLACE|CONCAT)_EXT", "a function of RuSTy: --dialect rusty brings it"),
     (r"ROUND", "a function of RuSTy, which --dialect rusty brings; a conversion rounds, too: REAL_TO_DINT(x)"),
-    (r"TIME_TO_US", "a function of STruC++: --dialect strucpp brings it"),
+    (r"TIME_TO_(?:[NUM]?S|[MHD])", "a function of STruC++: --dialect strucpp brings it"),
 )
 """Patterns of the names of types, blocks and functions that only a dialect brings, and what they are."""
 _LIBRARIES = (
