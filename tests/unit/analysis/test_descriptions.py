@@ -194,3 +194,10 @@ def test_fixes_are_those_of_the_place_that_is_asked_about() -> None:
     for start, end in ((first, first), (first + 1, first + 1), (first + 2, first + 2), (0, first)):
         assert len(asked(start, end)) == 1, (start, end)
     assert asked(0, first - 1) == [] == asked(first + 3, second - 1) and len(asked(0, len(text))) == 2
+
+
+def test_a_variable_that_is_called_like_a_list_of_globals_has_no_names_of_it() -> None:
+    for declared, expected in (("n", True), ("pump", False)):
+        program, offset = at_mark("VAR_GLOBAL Total : INT; END_VAR\n"
+                                  f"PROGRAM Main\nVAR {declared} : INT; END_VAR\n    pump.{MARK}\nEND_PROGRAM\n", "codesys")
+        assert ("Total" in [item.label for item in complete(program, "pump.st", offset)]) is expected
