@@ -43,6 +43,7 @@ _BY_DIALECT = (
      r"csv_reload", "a block of Beremiz and OpenPLC: --dialect matiec brings it"),
     (r"(?:LEFT|RIGHT|MID|INSERT|DELETE|REPLACE|CONCAT)_EXT", "a function of RuSTy: --dialect rusty brings it"),
     (r"ROUND", "a function of RuSTy, which --dialect rusty brings; a conversion rounds, too: REAL_TO_DINT(x)"),
+    (r"FRAC|LTRUNC|LMOD|MODABS|MODTURNS|(?:GET|SET|CSET|CLEAR)BIT32", "a function of TwinCAT: --dialect twincat brings it"),
     (r"TIME_TO_(?:[NUM]?S|[MHD])", "a function of STruC++: --dialect strucpp brings it"),
 )
 """Patterns of the names of types, blocks and functions that only a dialect brings, and what they are."""
@@ -53,7 +54,13 @@ _LIBRARIES = (
      r"F_GetSystemTime", "TwinCAT's Tc2_System"),
     (r"FB_(?:FormatString|LocalSystemTime|GetTimeZone\w*|TzSpecific\w*|HashTable\w*|CTRL_\w+)|NT_\w+|T_Arg|F_"
      r"(?:SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|BYTE|WORD|DWORD|LWORD|BOOL|REAL|LREAL|STRING)|SYSTEMTIME_TO_\w+|"
-     r"(?:BYTE|WORD|DWORD|LWORD)_TO_(?:BIN|OCT|DEC)STR|TIMESTRUCT", "TwinCAT's Tc2_Utilities"),
+     r"(?:BYTE|WORD|DWORD|LWORD)_TO_(?:BIN|OCT|DEC)STR|TIMESTRUCT|LREAL_TO_FMTSTR|DINT_TO_DECSTR|FindAnd(?:Delete|Replace|Split)|"
+     r"T_FILETIME|FILETIME_TO_\w+", "TwinCAT's Tc2_Utilities"),
+    (r"DCTIME\w*_TO_\w+|T_DCTIME\w*|DCTIMESTRUCT|F_GetCurDc\w+|F_GetActualDcTime\w*", "TwinCAT's Tc2_EtherCAT"),
+    (r"FB_Socket\w+|T_HSOCKET|TCPADS_\w+", "TwinCAT's Tc2_TcpIp"),
+    (r"FB_SQL\w+|FB_PLCDB\w+", "TwinCAT's Tc3_Database"),
+    (r"FB_MB(?:Read|Write|Diagnose)\w*", "TwinCAT's Tc2_ModbusSrv"),
+    (r"Button|Led|TextCtrl|GetBoolString", "the svgui of older versions of Beremiz"),
     (r"FB_(?:EcSoE|EcCoE|EcGet|EcSet|EcMaster)\w*|ST_Ec\w+|Tc2_EtherCAT", "TwinCAT's Tc2_EtherCAT"),
     (r"FB_Json\w+|SJsonValue|SJsonAIterator", "TwinCAT's Tc3_JsonXml"),
     (r"FB_TcMessage|FB_TcAlarm|FB_TcEvent|TcEventSeverity|TcEventEntry|I_TcMessage|I_TcSourceInfo", "TwinCAT's Tc3_EventLogger"),
