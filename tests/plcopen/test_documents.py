@@ -188,3 +188,20 @@ def test_double_quotes_of_a_string_are_characters_where_its_tool_has_them_so(fam
 def test_a_document_is_run_as_it_is() -> None:
     done = CliRunner().invoke(main, ["run", str(DOCUMENTS / "beremiz.xml"), "--scans", "3", "--show", "Instance0.n"])
     assert (done.exit_code, done.stdout) == (0, "Instance0.n = 17\n")
+
+
+def test_a_project_of_e_cockpit_runs_with_what_only_its_texts_declare() -> None:
+    """Its application stands in addData, its task has an interval of another form, and LTIME is a type that the format lacks."""
+    made = import_xml(DOCUMENTS / "ecockpit.xml")
+    assert made.errors == [] and made.family == "codesys"
+    said = [one.message for one in made.diagnostics if one.code == "X0292"]
+    assert said == ["POU Step: since: only the plain text of the declaration has this, and it is taken from there"]
+    compiled = compile_sources(made.sources, runnable=True, dialect="codesys")
+    assert compiled.image is not None, [d.render() for d in compiled.errors]
+    plc = Plc(compiled.image, 20_000_000)
+    seen = []
+    for go in (False, True, True, False, True, True):
+        plc.write("PLC_PRG.x", go)
+        plc.scan()
+        seen.append((plc.read("PLC_PRG.m"), plc.read("PLC_PRG.s.since") // 1_000_000))
+    assert seen == [(0, 20), (1, 40), (2, 60), (2, 80), (3, 100), (3, 120)]

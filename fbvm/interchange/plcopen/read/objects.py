@@ -13,13 +13,19 @@ Source: exports of CODESYS V3; that of properties is assumed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 
+from fbvm.base.diagnostics import Source
 from fbvm.interchange.markup import Element
-from fbvm.interchange.plcopen.read.document import Head
+from fbvm.interchange.plcopen.read.document import Head, Variable, VarList
+from fbvm.interchange.plcopen.schema import SECTIONS
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
 
 INTERFACE, METHOD, PROPERTY = "Interface", "Method", "Property"
 ACCESSORS = {"GetAccessor": "GET", "SetAccessor": "SET", "Get": "GET", "Set": "SET"}
+_KIND = re.compile(r"(?im)^[ \t]*(FUNCTION_BLOCK|FUNCTION|PROGRAM)\b")
 _WORDS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "ABSTRACT", "FINAL")
 
 
@@ -86,6 +92,30 @@ def arguments(element: Element) -> str:
     given = [f"{name.text.strip()} := {value.text.strip()}" if name is not None else value.text.strip()
              for name, value in rows if value is not None]
     return f"({', '.join(given)})" if given else ""
+
+
+def left_out(interface: Element | None, lists: Iterable[VarList]) -> tuple[VarList, ...]:
+    """What the declaration of a POU as plain text has beyond its lists, such as variables of types that the format cannot say."""
+    known = {variable.name.upper() for listed in lists for variable in listed.variables}
+    texts = (data.text.strip() for data in added(interface) if last_word(data) == "interfaceasplaintext")
+    found: list[VarList] = []
+    for text in texts:
+        kind = _KIND.search(text)
+        source = Source("", f"{text}\nEND_{kind[1].upper() if kind else ''}\n")
+        for pou in (one for one in parse(source)[0].everything() if isinstance(one, tree.Pou)):
+            for section in pou.sections:
+                missing = tuple(_as_written(source, variable, name) for variable in section.variables for name in variable.names
+                                if name.text.upper() not in known)
+                if missing and section.kind in SECTIONS.values():
+                    found.append(VarList(section.kind, tuple(word.text.upper() for word in section.qualifiers), missing))
+    return tuple(found)
+
+
+def _as_written(source: Source, declared: tree.VarDecl, name: tree.Name) -> Variable:
+    """A variable with the texts of its type, first value and address."""
+    kind, first, place = ("" if node is None else source.text[node.start:node.end]
+                          for node in (declared.spec, declared.initial, declared.location))
+    return Variable(name.text, kind, first, place)
 
 
 def _access(element: Element) -> list[str]:

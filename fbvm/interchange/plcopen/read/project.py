@@ -23,7 +23,16 @@ from fbvm.interchange.plcopen.read.document import (
     Variable,
     VarList,
 )
-from fbvm.interchange.plcopen.read.objects import INTERFACE, METHOD, accessors, arguments, head, members, property_type
+from fbvm.interchange.plcopen.read.objects import (
+    INTERFACE,
+    METHOD,
+    accessors,
+    arguments,
+    head,
+    left_out,
+    members,
+    property_type,
+)
 from fbvm.interchange.plcopen.read.types import duration, location, note, type_text, value_text
 from fbvm.interchange.plcopen.schema import KINDS, LOCATION, MNEMONIC, QUALIFIERS, SECTIONS
 
@@ -136,6 +145,10 @@ def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
     reading.where = name
     interface = element.one("interface")
     lists = _lists(reading, interface)
+    if more := left_out(interface, lists):
+        names = ", ".join(variable.name for listed in more for variable in listed.variables)
+        reading.report("X0292", element, f"{names}: only the plain text of the declaration has this, and it is taken from there")
+        lists += more
     returned = interface.one("returnType") if interface else None
     result = type_text(reading, returned, element) if returned and kind == "FUNCTION" else ""
     bodies = element.all("body")
