@@ -114,7 +114,8 @@ def test_the_values_in_some_bytes_are_named_once_each(plc: Plc, names: Names) ->
 
 
 @each_of(("name", "address"), [
-    ("Main.one", "CIO 31"), ("Main.bit", "CIO 31.04"), ("Main.b", "%MX5.3"), ("Main.wide[2]", "CIO 32"), ("Main.flag", ""),
+    ("Main.one", "CIO 31"), ("CIO 0", "CIO 0"), ("D0", "D0"), ("%MB0", "%MB0"),
+    ("Main.bit", "CIO 31.04"), ("Main.b", "%MX5.3"), ("Main.wide[2]", "CIO 32"), ("Main.flag", ""),
     ("Main.m", "%MB4"), ("Main.pumps[2, 0].level", "D50"),
 ])  # fmt: skip
 def test_the_address_of_a_located_variable(plc: Plc, names: Names, name: str, address: str) -> None:
