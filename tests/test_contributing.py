@@ -220,14 +220,14 @@ def test_a_ladder_instruction(copy: Copy) -> None:
 def test_a_diagnostic(copy: Copy) -> None:
     copy.follow("A diagnostic")
     copy.corpus("A diagnostic")
-    shown = copy.fbvm("explain", "S0392")
-    assert shown.startswith("# S0392 NOT of a NOT")
+    shown = copy.fbvm("explain", "S0393")
+    assert shown.startswith("# S0393 NOT of a NOT")
     wrong, right = re.findall(r"^```st\n(.*?)^```", shown, re.M | re.S)
     (copy.folder / "main.st").write_text(wrong, encoding="utf-8")
-    assert "S0392" in copy.python("-m", "fbvm", "check", "main.st").stderr
+    assert "S0393" in copy.python("-m", "fbvm", "check", "main.st").stderr
     (copy.folder / "main.st").write_text(right, encoding="utf-8")
     assert copy.fbvm("check", "main.st") == ""
-    result = copy.house("fbvm/base/pages/S0392.md")
+    result = copy.house("fbvm/base/pages/S0393.md")
     assert result.stdout == "all rules are kept\n", result.stderr
     assert result.returncode != 0
     assert "test_every_code_has_a_page_and_every_page_a_code" in result.stderr
