@@ -168,6 +168,17 @@ def test_clock_pulses_are_off_first_assumed(plc: Plc) -> None:
     assert [plc.read(f"CF{number}") for number in (113, 114)] == [True, False]
 
 
+@each_of("number, period_ms", [(103, 20), (100, 100), (101, 200), (102, 1_000), (104, 60_000)])
+def test_each_clock_pulse_has_its_period(number: int, period_ms: int) -> None:
+    """W394, condition flags: 0.02 s, 0.1 s, 0.2 s, 1 s and 1 min; half of it OFF, half of it ON."""
+    plc, half = Plc(counter_image()), period_ms // 2
+    levels = []
+    for now_ms in (0, half - 1, half, period_ms - 1, period_ms, period_ms + half, 3 * period_ms - 1, 3 * period_ms):
+        plc.scan(now_ms * MS)
+        levels.append(plc.read(f"CF{number}"))
+    assert levels == [False, False, True, True, False, True, True, False]
+
+
 def test_free_running_counters_assumed(plc: Plc) -> None:
     plc.scan(655_370 * MS)
     assert plc.read("A0..A1") == [1, 6553]
@@ -519,3 +530,20 @@ def test_a_snapshot_keeps_when_tasks_are_next() -> None:
         plc.restore(state)
     assert counted[0] == counted[1]
     assert counted[0][-1] == (4, 7)
+
+
+@each_of("time_ns, is_taken", [
+    (10 * MS, True), (10 * MS - 1, False), (1_000 * MS, True), (40_000 * MS, True), (40_000 * MS + 1, False), (0, False),
+    (-MS, False),
+])
+def test_a_watch_cycle_time_is_10_ms_to_40_s_and_1_s_unless_somebody_says(time_ns: int, is_taken: bool) -> None:
+    """W394, PLC Setup: the watch cycle time."""
+    watch = Plc(counter_image()).watch_cycle
+    assert watch.time_ns == 1_000 * MS
+    if is_taken:
+        watch.time_ns = time_ns
+        assert watch.time_ns == time_ns
+    else:
+        with pytest.raises(ValueError, match="a watch cycle time is 10 ms to 40 s"):
+            watch.time_ns = time_ns
+        assert watch.time_ns == 1_000 * MS
