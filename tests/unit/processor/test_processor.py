@@ -10,7 +10,7 @@ import pytest
 from fbvm.base.areas import AREAS
 from fbvm.engine.native import engine as native
 from fbvm.processor import processor as processor_module
-from fbvm.processor.processor import OwnProcessor, contract, processor
+from fbvm.processor.processor import OwnProcessor, contract, prepare, processor
 from fbvm.units.contract import Processor
 from fbvm.watch.paths import UnknownPlace
 
@@ -86,6 +86,14 @@ def test_a_program_is_compiled_once_and_then_read_from_the_cache(tmp_path: Path,
     contract.cache_clear()
     again = contract(TEXT)
     assert again is not made and again.image.initial == made.image.initial and again.offset("Runs") == made.offset("Runs")
+
+
+@pytest.mark.slow
+def test_what_was_prepared_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = f"{TEXT}// prepared\n"
+    prepare(text)
+    monkeypatch.setattr(processor_module, "_compiled", None)
+    assert list(processor(text).view("Out")) == [7, 0, 0, 0]
 
 
 @pytest.mark.parametrize(("text", "said"), [
