@@ -85,6 +85,8 @@ def test_bounds_are_taken(page: Page) -> None:
     assert [act.text for act in page.bench.acts] == ["fault lossy", "fault doubled at 255.255.255.255:65535"]
     assert [(row.lose_percent, row.duplicate_percent) for row in page.network.faults] == [(100, 0), (0, 7)]
     assert page.network.faults[1].peer == Peer("255.255.255.255", 65535)
+    page.done("fault", kind="lossy", percent=0)
+    assert page.network.faults[2].lose_percent == 0
     assert page.done("search", plc="pump", text="x" * MOST_TEXT)["found"] == []
     assert len(page.done("look", plc="pump", names=["D0"] * MOST_NAMES)["rows"]) == 1
     assert page.done("write", plc="pump", name="D10..D12", value="1,2,3")["value"] == "1, 2, 3"
