@@ -141,6 +141,19 @@ def test_the_present_is_gone_on_with_from_the_past(page: Page) -> None:
     assert page.update()["state"] == "run" and page.control.steps == 1
 
 
+def test_the_instances_of_a_program_are_listed_from_outside_inwards() -> None:
+    page = opened("""FUNCTION_BLOCK In VAR n : INT; END_VAR n := n + 1; END_FUNCTION_BLOCK
+FUNCTION_BLOCK Out VAR_IN_OUT x : In; END_VAR VAR a : In; b : ARRAY[1..2] OF In; t : TON; w : ARRAY[0..300] OF In; END_VAR a();
+END_FUNCTION_BLOCK
+PROGRAM Main VAR o : Out; i : In; grid : ARRAY[1..2, 1..2] OF In; k : INT; END_VAR k := 1; o(x := i); END_PROGRAM""")
+    found = page.done("program", plc="pump")["instances"]
+    assert [(row["path"], row["pou"]) for row in found[:7]] == [
+        ("Main", "Main"), ("Main.o", "Out"), ("Main.i", "In"), ("Main.o.a", "In"), ("Main.o.t", "TON"), ("Main.o.b[1]", "In"),
+        ("Main.o.b[2]", "In")]  # fmt: skip
+    assert [row["path"] for row in found[7:]] == [f"Main.o.w[{number}]" for number in range(100)], "of an array the first hundred"
+    assert found == page.done("hello", version=1)["plcs"][0]["instances"]
+
+
 # --- what an update has -----------------------------------------------------------------------------------------------
 
 
