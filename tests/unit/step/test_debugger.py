@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fbvm.code.compiler import compile_text
+from fbvm.engine.observation import NO_SITE
 from fbvm.machine.breakpoints import Breakpoint
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.recording import recording as recording_module
@@ -155,6 +156,29 @@ def test_reverse_goes_over_to_the_plc_whose_breakpoint_was_reached_last() -> Non
     assert reached and (reached.plc, found.focus, where(found)) == ("b", "b", (2, 14))
     reached = done(found.reverse())
     assert reached and (reached.plc, found.focus, where(found)) == ("a", "a", (1, 14))
+
+
+class FifthScan:
+    """Stops a run behind the fifth scan."""
+
+    found, kind = "five scans", "five"
+
+    def attached(self, plc: Plc) -> None:
+        """Another PLC executes the scans."""
+
+    def checked(self, plc: Plc) -> bool:
+        return plc.scans == 5
+
+
+@pytest.mark.slow
+def test_what_stops_a_run_between_two_scans_is_stood_at_on_its_plc() -> None:
+    found = debugger(names=("a", "b"))
+    found.checks = {"b": FifthScan()}
+    reached = done(found.resume(20))
+    assert reached == Reached("b", Position(5), NO_SITE, (), ("five scans",), "five")
+    assert found.focus == "b" and {plc.session.here for plc in found.plcs.values()} == {Position(5)}
+    assert done(found.resume(20)) is None and found.session.here == Position(20)
+    assert done(found.reverse()) == reached and found.focus == "b"
 
 
 @pytest.mark.slow
