@@ -158,6 +158,23 @@ def test_reverse_goes_over_to_the_plc_whose_breakpoint_was_reached_last() -> Non
     assert reached and (reached.plc, found.focus, where(found)) == ("a", "a", (1, 14))
 
 
+@pytest.mark.slow
+def test_a_recording_that_ended_in_a_trap_has_it_at_its_end_only() -> None:
+    image = compile_text(TEXT).image
+    assert image is not None
+    plc = Plc(image)
+    recorded = Recording().add("plc", plc)
+    plc.write("CIO 0.00", True)
+    assert plc.run(scans=20) == "trap"
+    session = PastSession(RecordedScans(recorded, {}), "plc")
+    assert session.here.scan == 4 and session.trap == plc.trap and session.trap is not None and session.trap.code == "R0101"
+    session.goto(3)
+    assert session.trap is None and session.read("Main.N") == 3
+    found = Debugger({"plc": session})
+    reached = done(found.resume())
+    assert reached and (reached.kind, reached.position.scan) == ("trap", 4)
+
+
 class FifthScan:
     """Stops a run behind the fifth scan."""
 
