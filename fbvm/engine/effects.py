@@ -8,7 +8,7 @@ from typing import NamedTuple
 from fbvm.code.image import Image
 from fbvm.code.operations import CALLS, SIZES, TEXT_UNITS, Address, Node
 from fbvm.code.shapes import statements
-from fbvm.engine.ranges import Range, RangeOf, value_range
+from fbvm.engine.ranges import Range, RangeOf, value_range, with_temporaries
 
 STORES: dict[str, Callable[[Node], tuple[Address, int]]] = {
     "store": lambda node: (node[2], SIZES[node[1]]), "store_raw": lambda node: (node[2], SIZES[node[1]]),
@@ -87,8 +87,10 @@ class Effects:
         """Where a body stores with all that it calls; the span of its own instance stands for any place in it."""
         if number not in self._bodies:
             found: set[Span] = set()
-            for node in statements(self._image.bodies[number].code):
-                spans = self.of(node)
+            code = self._image.bodies[number].code
+            range_of = with_temporaries(code)
+            for node in statements(code):
+                spans = self.of(node, None, range_of)
                 if spans is None:
                     self._bodies[number] = None
                     return None

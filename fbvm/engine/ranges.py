@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.arithmetic import limits, quotient, width, wrap
-from fbvm.code.operations import EXPRESSIONS, INTEGERS, Node
-from fbvm.code.shapes import is_address, is_expression
+from fbvm.code.operations import EXPRESSIONS, INTEGERS, Block, Node
+from fbvm.code.shapes import is_address, is_expression, statements
 
 Range = tuple[int, int]
 RangeOf = Callable[[Node], Range]
@@ -78,6 +78,33 @@ def value_range(node: Node, of: RangeOf | None = None) -> Range:
     """
     whole, range_ = limits(node[1]), unwrapped_range(node, of)
     return range_ if _within(range_, whole) else whole
+
+
+def with_temporaries(code: Block) -> RangeOf:
+    """`value_range` for a body with this code, which knows of temporaries what their `let`s say.
+
+    >>> index = ("check", "i64", ("load", "i64", ("abs", 4096, ())), 0, 9, "R0102", 1)
+    >>> with_temporaries((("let", 1, "i64", index),))(("tmp", "i64", 1))
+    (0, 9)
+    """
+    lets: dict[int, list[Node]] = {}
+    for node in statements(code):
+        if node[0] == "let" and node[2] in INTEGERS:
+            lets.setdefault(node[1], []).append(node[3])
+    known: dict[int, Range] = {}
+
+    def of(node: Node) -> Range:
+        if node[0] != "tmp" or node[2] not in lets:
+            return value_range(node, of)
+        number = node[2]
+        if number not in known:
+            known[number] = limits(node[1])  # if it is made of itself
+            known[number] = _union(of, *lets[number])
+        return known[number]
+
+    for number in sorted(lets):  # those that others are made of come first
+        of(("tmp", lets[number][0][1], number))
+    return of
 
 
 def _within(inner: Range, outer: Range) -> bool:

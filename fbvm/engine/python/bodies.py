@@ -19,7 +19,7 @@ from fbvm.engine.observation import NO_SITE
 from fbvm.engine.python.expressions import ROWS
 from fbvm.engine.python.held import Held, full_range, uses
 from fbvm.engine.python.writer import Expressions, bare, view
-from fbvm.engine.ranges import Range, may_trap
+from fbvm.engine.ranges import Range, may_trap, with_temporaries
 
 MOST_INDENTS = 60
 """Levels of indentation in one function of Python, which takes 100."""
@@ -79,7 +79,7 @@ class BodyWriter(Expressions):
         places = (low, high + body.instance_size) if high >= 0 else None
         code = self.inlining.code(number) if self.inlining else body.code
         loads, references = uses(code) if self.may_hold else ([], True)
-        self.held = Held(loads, self.effects, self.base, places)
+        self.held = Held(loads, self.effects, self.base, places, with_temporaries(code))
         if not self.may_hold:
             self.held.state = None
         elif not references:

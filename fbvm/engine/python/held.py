@@ -39,13 +39,15 @@ class Held:
 
     `loads` are those of the body.  `state` is None where nothing is to be held, as behind a RETURN.  `instance` is the byte at
     which the body's only instance begins, if it is known, and `instances` are the bytes between which all lie, None if that is
-    unknown.  `must` are the values that a loop around holds, which every store has to keep up to date."""
+    unknown.  `range_of` says what is known anywhere in the body.  `must` are the values that a loop around holds, which every
+    store has to keep up to date."""
 
-    def __init__(self, loads: Iterable[Node], effects: Effects, instance: int | None, instances: Range | None) -> None:
+    def __init__(self, loads: Iterable[Node], effects: Effects, instance: int | None, instances: Range | None,
+                 range_of: RangeOf) -> None:  # fmt: skip
         self.state: State | None = {}
         self.must: frozenset[Key] = frozenset()
         self.exits: list[list[State | None]] = []
-        self._effects, self._instance, self._instances = effects, instance, instances
+        self._effects, self._instance, self._instances, self._range_of = effects, instance, instances, range_of
         self._loads = Counter(self.key(machine, address) for _, machine, address in loads)
         self._names: dict[Key, str] = {}
         self._slots: defaultdict[tuple[str, int], list[Key]] = defaultdict(list)
@@ -133,7 +135,7 @@ class Held:
                 state.pop(("tmp", "", node[1]), None)
                 continue
             key = self.key(node[1], node[2]) if node[0] == "store" else None
-            self._drop(state, self._effects.of(node, self._instance), key)
+            self._drop(state, self._effects.of(node, self._instance, self._range_of), key)
             if key and key in state:
                 state[key] = full_range(key[0])
 

@@ -9,6 +9,7 @@ from itertools import combinations
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.code.operations import Address
 from fbvm.engine.native.emit.alias_scopes import FIRST_NUMBER, AliasScopes, resolved
+from fbvm.engine.ranges import with_temporaries
 
 AREA, INSTANCES = PAGE_BYTES + 100, PAGE_BYTES + 400
 BYTE = ("load", "u8", ("abs", AREA, ()))
@@ -109,3 +110,14 @@ def test_marks_in_a_text_are_numbered_from_body_to_body() -> None:
     assert made[2].startswith("load c, !alias.scope !1") and made[3].startswith("load d, !alias.scope !1")
     assert made[2].removeprefix("load c") != made[3].removeprefix("load d")
     assert all(re.match(r"!\d+ = ", line) for line in made[4:]) and len(made) == 11
+
+
+def test_a_checked_subscript_that_was_worked_out_before_stays_within_its_bounds() -> None:
+    index = ("check", "i64", ("convert", "i64", "u8", BYTE), 0, 9, "R0102", 1)
+    element = ("abs", AREA, ((2, ("tmp", "i64", 1)),)), 2
+    behind = ("abs", AREA + 20, ()), 2
+    for code, wanted in (((("let", 1, "i64", index),), {(0, 1), (1, 0)}), ((), set())):
+        scopes = AliasScopes((INSTANCES, INSTANCES + 1), INSTANCES, 0, with_temporaries(code))
+        for access in (element, behind):
+            scopes.mark(*access)
+        assert claims(scopes) == wanted

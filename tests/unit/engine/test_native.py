@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -215,6 +216,26 @@ def test_instances_of_one_body_do_not_mix(level: int) -> None:
     e.run(0)
     e.run(0)
     assert [slot(e, "i16", 64 * n + 2) for n in range(4)] == [2, 4, 6, 8]
+
+
+def test_a_call_at_the_end_of_a_program_leaves_the_registers_of_the_host_alone() -> None:
+    """The called body is too long to be written in place of its calls, and keeps no registers for who calls it."""
+    steps = [load("i32", 4 * number) for number in range(12)]
+    sums = [store("i32", 4 * n, ("add", "i32", ("mul", "i32", step, steps[n - 1]), steps[(n + 5) % 12]))
+            for n, step in enumerate(steps)]  # fmt: skip
+    count = ("store", "i16", own(0), ("add", "i16", ("load", "i16", own(0)), ONE))
+    again = ("if", ((("lt", "b", "i16", ("load", "i16", own(0)), const("i16", 999)), (*sums, count)),), ())
+    called = (("charge", 1, 1), *sums, again, *sums)
+    program = image(tuple(("call", 1, own(8 * number)) for number in range(8)), called)
+    task = program.tasks[0]
+    program = replace(program, tasks=(replace(task, programs=task.programs * 2),))
+    assert re.search(r"define internal fastcc i64 @b1\(.*#6 ", code_of(program).translation.text)
+    ends = []
+    for level in LEVELS:
+        e = NativeEngine(program, power_on(program, {0: bytes(range(48))}), level)
+        assert e.run_many([ScheduledTask(0)], 50, 1_000) == (50, None)
+        ends.append(bytes(e.memory.u8[SLOTS_OFFSET:]))
+    assert ends[0] == ends[1] and ends[0][4096] == 100
 
 
 def test_a_text_that_grows_without_bound_is_not_supported() -> None:

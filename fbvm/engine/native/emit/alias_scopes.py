@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.code.operations import Address
 from fbvm.engine.native.emit.call_graph import Range, reached
+from fbvm.engine.ranges import RangeOf, value_range
 
 Access = tuple[bool, int, int, bool]
 """Whether its address counts from the instance (else from the start of memory), first byte, the byte behind the last, whether
@@ -41,11 +42,13 @@ class AliasScopes:
     """The accesses of one body.
 
     `instances` is the range of bytes of the memory in which its instances begin; `base` is where its only instance begins, None
-    if there are several; `next` is the number of the next mark (numbers go on from body to body)."""
+    if there are several; `next` is the number of the next mark (numbers go on from body to body); `range_of` says what
+    subscripts can be."""
 
     instances: Range
     base: int | None
     next: int
+    range_of: RangeOf = value_range
     marked: list[tuple[Address, int]] = field(default_factory=list)
     accesses: dict[Access, int] = field(default_factory=dict)
 
@@ -61,7 +64,7 @@ class AliasScopes:
 
     def _access(self, address: Address, count: int) -> Access | None:
         """What an access can touch; None if that could be words of the system page."""
-        low, high = reached(address, count)
+        low, high = reached(address, count, self.range_of)
         from_instance = address[0] == "self"
         if from_instance and self.base is not None:
             from_instance, low, high = False, low + self.base, high + self.base

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from fbvm.code.image import Image
 from fbvm.code.operations import CALLS, Address
 from fbvm.code.shapes import statements
-from fbvm.engine.ranges import value_range
+from fbvm.engine.ranges import RangeOf, value_range
 
 Range = tuple[int, int]
 """First byte, and the byte behind the last."""
@@ -70,13 +70,13 @@ def _called_at(address: Address | None, caller: Range) -> Range:
     return (low + caller[0], high + caller[1] - 1) if address[0] == "self" else (low, high)
 
 
-def reached(address: Address, count: int) -> Range:
+def reached(address: Address, count: int, of: RangeOf = value_range) -> Range:
     """The range of bytes that an access of `count` bytes can touch, counted from the address's own base (memory or instance).
 
-    The address has no reference in it."""
+    The address has no reference in it.  `of` says what its subscripts can be."""
     _, low, terms = address
     high = low + count
     for stride, term in terms:
-        edges = [stride * edge for edge in value_range(term)]
+        edges = [stride * edge for edge in of(term)]
         low, high = low + min(edges), high + max(edges)
     return low, high

@@ -12,7 +12,7 @@ from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
 from fbvm.engine.native.emit.conversions import bits, convert, nearest, truncate
 from fbvm.engine.native.emit.writer import NAN_BITS, Text, Writer, ir, literal, signed, stored
-from fbvm.engine.ranges import is_float, may_trap, value_range
+from fbvm.engine.ranges import is_float, may_trap
 
 Row = Callable[..., str]
 
@@ -123,7 +123,7 @@ def _quotient(w: Writer, what: str, machine: str, a: Node, b: Node, site: int) -
 
 def _floor_divide(w: Writer, machine: str, a: Node, b: Node) -> str:
     left, right = w.value(a), w.value(b)
-    if value_range(a)[0] >= 0:
+    if w.range_of(a)[0] >= 0:
         return w.new(f"udiv i64 {left}, {right}")
     below = w.new(f"icmp slt i64 {w.new(f'srem i64 {left}, {right}')}, 0")
     return w.new(f"add i64 {w.new(f'sdiv i64 {left}, {right}')}, {w.new(f'sext i1 {below} to i64')}")
@@ -304,7 +304,7 @@ def chooser(w: Writer, number: str, count: int, site: int) -> Callable[[str, lis
 
 
 def _check(w: Writer, machine: str, a: Node, low: int, high: int, code: str, site: int) -> str:
-    value, (least, greatest), kind = w.value(a), value_range(a), ir(machine)
+    value, (least, greatest), kind = w.value(a), w.range_of(a), ir(machine)
     sign = "s" if signed(machine) else "u"
     tests = []
     if least < low:

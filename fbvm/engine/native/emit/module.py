@@ -51,6 +51,8 @@ declare float @llvm.fabs.f32(float)
 declare double @llvm.fabs.f64(double)
 """
 _WIDTHS = ("i1", "i8", "i16", "i32", "i64")
+# A body that others call keeps no registers for them (#6): to save and restore six takes longer than most calls.  LLVM knows that of a
+# call, not of a jump at the end of a function that has to keep them, which `notail` forbids.
 ATTRIBUTES = """\
 attributes #0 = { nounwind }
 attributes #1 = { nounwind noinline }
@@ -58,6 +60,7 @@ attributes #2 = { nounwind willreturn memory(none) }
 attributes #3 = { nounwind alwaysinline }
 attributes #4 = { nounwind noinline }
 attributes #5 = { nounwind willreturn memory(read) }
+attributes #6 = { nounwind "no_callee_saved_registers" }
 """
 
 
@@ -151,7 +154,8 @@ def _body(module: Module, number: int) -> str:
         lines.append("%s = getelementptr inbounds i8, ptr %m, i64 %self")
     lines += w.lines + w.cold
     apart = len(lines) >= LARGE or module.heights[number] % DEEP == DEEP - 1
-    inline = "#4" if apart else "#3" if not module.heights[number] and len(lines) <= SMALL else "#0"
+    starts = any(run.body == number for task in module.image.tasks for run in task.programs)
+    inline = "#4" if apart else "#3" if not module.heights[number] and len(lines) <= SMALL else "#0" if starts else "#6"
     shown = w.body.name.encode("unicode_escape").decode()
     return "\n".join([
         f"; {shown}", f"define internal fastcc i64 @b{number}(ptr noalias %m, ptr noalias %c, i64 %self, i64 %left) "

@@ -198,7 +198,7 @@ def _call(w: Writer, pou: int, address: Address | None) -> None:
     size = w.module.image.bodies[pou].instance_size
     place = w.offset(address, max(1, size)) if address else "0"
     left = w.new("load i64, ptr %budget")
-    result = w.new(f"call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
+    result = w.new(f"notail call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
     good = w.label()
     w.emit(f"store i64 {result}, ptr %budget")
     w.unlikely(w.new(f"icmp slt i64 {result}, {TRAPPED}"), w.passing_on(), good)
@@ -209,7 +209,7 @@ def _attempt(w: Writer, pou: int, address: Address | None, number: int, traps: b
     place = w.offset(address, max(1, w.module.image.bodies[pou].instance_size)) if address else "0"
     w.module.attempts = True
     left, slot = w.new("load i64, ptr %budget"), w.temporary(number, "u32")
-    result = w.new(f"call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
+    result = w.new(f"notail call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
     stopped, good, after = w.label("x"), w.label(), w.label()
     w.emit(f"store i64 {result}, ptr %budget")
     w.unlikely(w.new(f"icmp slt i64 {result}, {TRAPPED}"), stopped, good)

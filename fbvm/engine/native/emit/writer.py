@@ -21,7 +21,7 @@ from fbvm.engine.native.emit.alias_scopes import SYSTEM, AliasScopes
 from fbvm.engine.native.emit.call_graph import Range
 from fbvm.engine.native.emit.context import FIELDS, INSTANCE, SCRATCH, Point, Shown
 from fbvm.engine.native.emit.counting import BodyCounting, Counting
-from fbvm.engine.ranges import is_float, value_range
+from fbvm.engine.ranges import is_float, with_temporaries
 from fbvm.engine.trap import NO_INSTANCE
 
 NAN_BITS = {"f32": "0x7FF8000000000000", "f64": "0x7FF8000000000000"}
@@ -140,7 +140,9 @@ class Writer:
     def __init__(self, module: Module, number: int) -> None:
         self.module, self.body = module, module.image.bodies[number]
         self.base = module.bases.get(number)
-        self.regions = AliasScopes(module.instances[number], self.base, module.regions[-1].next if module.regions else 0)
+        self.range_of = with_temporaries(self.body.code)
+        first = module.regions[-1].next if module.regions else 0
+        self.regions = AliasScopes(module.instances[number], self.base, first, self.range_of)
         module.regions.append(self.regions)
         self.lines: list[str] = []
         self.counting = BodyCounting(module.counting, self) if module.counting else None
@@ -404,7 +406,7 @@ class Writer:
         names (R0110).  Returns the name of the number."""
         (_, pointer, site), offset, terms = address
         reference = self.value(pointer)
-        form = "i128" if any(abs(stride * edge) >> 56 for stride, term in terms for edge in value_range(term)) else "i64"
+        form = "i128" if any(abs(stride * edge) >> 56 for stride, term in terms for edge in self.range_of(term)) else "i64"
         delta = str(offset)
         for stride, term in terms:
             number = self.value(term)
