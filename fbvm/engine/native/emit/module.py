@@ -51,8 +51,8 @@ declare float @llvm.fabs.f32(float)
 declare double @llvm.fabs.f64(double)
 """
 _WIDTHS = ("i1", "i8", "i16", "i32", "i64")
-# A body that others call keeps no registers for them (#6): to save and restore six takes longer than most calls.  LLVM knows that of a
-# call, not of a jump at the end of a function that has to keep them, which `notail` forbids.
+# A body that others call keeps no registers for them (#6): to save and restore six takes longer than most calls.  LLVM knows
+# that of a call, not of a jump at the end of a function that has to keep them, which `notail` forbids.
 ATTRIBUTES = """\
 attributes #0 = { nounwind }
 attributes #1 = { nounwind noinline }
