@@ -19,7 +19,7 @@ from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.events import Event, Statement
 from fbvm.record.trace.scan_source import Moment
 from fbvm.run.running import TimedWrite
-from fbvm.step.debugger import Debugger, Move
+from fbvm.step.debugger import BEFORE, Debugger, Move
 from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position, Reached, Said
 from fbvm.step.session import Session
@@ -173,6 +173,15 @@ def test_a_recording_that_ended_in_a_trap_has_it_at_its_end_only() -> None:
     found = Debugger({"plc": session})
     reached = done(found.resume())
     assert reached and (reached.kind, reached.position.scan) == ("trap", 4)
+
+
+def test_passes_before_a_scan_are_those_of_the_scans_before() -> None:
+    found = debugger()
+    row = line("text.st:13", hits="> 100")
+    found.here.put([row])
+    done(found.scan(4))
+    assert found.here.passes(Position(3, BEFORE)) == {row: 2}, "behind the statement at which it was set"
+    assert found.here.passes(Position(3, 0)) == {row: 3}
 
 
 class FifthScan:

@@ -152,6 +152,16 @@ def test_what_is_written_in_the_past_takes_back_what_was_written_later() -> None
     assert (commands.session.read("Main.N"), commands.session.read("Main.R")) == (43, 0)
 
 
+def test_back_scan_goes_to_the_beginning_of_this_scan_and_then_of_the_one_before() -> None:
+    commands = made()
+    said(commands, "goto 5", "step", "step", "back scan")
+    assert commands.session.here == Position(5)
+    said(commands, "back scan")
+    assert commands.session.here == Position(4)
+    commands.session.back_scan(3)
+    assert commands.session.here == Position(1)
+
+
 def test_a_write_in_mid_scan_stays_when_the_scan_is_done_again() -> None:
     commands = made()
     said(commands, "run 5", "Main.T.Q = 7", "step")
@@ -376,6 +386,8 @@ def test_where_power_flows_in_rungs() -> None:
     with pytest.raises(CommandError, match="no rung 9"):
         said(commands, "rung 9")
     said(commands, "run 12")
+    assert [row.split()[1] for row in said(commands, "rung").splitlines() if row.startswith("RUNG")] == ["1", "2"]
+    assert [row.split()[1] for row in said(commands, "goto 1", "rung").splitlines() if row.startswith("RUNG")] == ["1"]
     assert not [row for row in said(commands, "goto 1", "list 10").splitlines() if row.endswith(("ON", "off"))]
 
 
