@@ -380,7 +380,12 @@ class Maker:
         called = self.random.randrange(self.body + 1, self.bodies)
         place = self.pick((None, at(2048 + INSTANCE_BYTES * self.random.randrange(3)), at(2048, (64, (
             "check", "i64", self.small_number(7, 1), 0, 8, "R0102", self.site()))), ("self", 0, ())))
-        return "call", called, place if place is not None else at(2048)
+        address = place if place is not None else at(2048)
+        if self.random.randrange(2):
+            return "call", called, address
+        self.count += 1
+        self.temporaries.append((self.count, "u32"))
+        return "attempt", called, address, self.count, self.pick((False, True))
 
 
 def before(random: Random) -> dict[int, bytes]:
