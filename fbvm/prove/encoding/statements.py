@@ -326,6 +326,7 @@ def _attempt(x: Execution, state: State, pou: int, address: Address | None, numb
         end = call(x, inner, x.image.bodies[pou], x.base if address else 0)
     except Trapped:
         if not attempt.is_certain:
+            state.join([inner], [x.terms.true])  # the memory as the trap has found it
             raise
         x.base, x.site, x.callers, x.calls = outer
     finally:
