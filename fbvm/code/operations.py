@@ -21,8 +21,9 @@ extents each; those from LEASED on are leases, for what may end while pointers t
 place in the source (Image.sites), for traps.
 Operands are evaluated from left to right, an address where it stands.  `let` temporaries belong to one execution of one
 body.  `math`, `pow` and `atan2` of f32 are worked out in 64 bits and rounded once.
-An `attempt` gives 0 for a body that has come to its end, else the number in CAUGHT of the code with which it has stopped: that of
-a way out (WAYS_OUT), or, if `traps` is True, that of a trap.  What it does not catch stops its own body as well.
+An `attempt` executes a part of its body, for the same instance.  It gives 0 if that has come to its end, else the number in
+CAUGHT of the code with which it has stopped: that of a way out (WAYS_OUT), or, if `traps` is True, that of a trap.  What it does
+not catch stops its own body as well.
 Meaning: IEC 61131-3 ed. 3 with the decisions on edges that are stated beside each row.
 """
 

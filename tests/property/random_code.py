@@ -385,7 +385,7 @@ class Maker:
             return "call", called, address
         self.count += 1
         self.temporaries.append((self.count, "u32"))
-        return "attempt", called, address, self.count, self.pick((False, True))
+        return "attempt", called, ("self", 0, ()), self.count, self.pick((False, True))
 
 
 def before(random: Random) -> dict[int, bytes]:

@@ -92,8 +92,8 @@ def comments(text: str) -> list[str]:
     return ["\n".join(line.strip() for line in comment.text.split("\n")) for _, comment in ordered]
 
 
-SPELLINGS = ("spaced_durations", "bits_by_name")
-"""Forms that the canonical form does not have: `T# 5s` becomes `T#5s`, `w.%Xk` becomes `w.k`."""
+SPELLINGS = ("spaced_durations", "bits_by_name", "doubled_quotes")
+"""Forms that the canonical form does not have: `T# 5s` becomes `T#5s`, `w.%Xk` becomes `w.k`, '''' becomes '$''."""
 
 
 def meaning(value: Any) -> Any:
@@ -152,7 +152,8 @@ def image(text: str) -> object:
     """What would be executed, without lines and columns; names in charts without their case.  Most programs are canonical.
 
     Code is compared as text, because NAN is not equal to itself."""
-    made = compile_text(text).image
+    named = re.search(r"(?m)^// dialect (\w+)$", text)
+    made = compile_text(text, dialect=named[1] if named else "standard").image
     if made is None:
         return None
     sites = tuple(replace(site, line=0, column=0) for site in made.sites)
