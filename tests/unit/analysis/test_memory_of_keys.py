@@ -19,6 +19,8 @@ BODY = "".join(f"    Level := Level + {number};\n" for number in range(50))
 TEXT = f"PROGRAM Main\nVAR Level : DINT; END_VAR\n{BODY}    Level := 0;\nEND_PROGRAM\n"
 KEYS, MOST_BYTES = 40, 25_000
 """Keys that are typed, and the bytes that may be kept of them: less than half the text of each."""
+ROUNDS = 3
+"""Times that they are typed: what keys leave behind comes each time, what another thread allocates meanwhile does not."""
 
 
 def check_changes(program: Program) -> None:
@@ -56,7 +58,12 @@ def test_keys_leave_nothing_behind(way: Callable[[Program], None]) -> None:
     tracemalloc.start()
     try:
         before = typed(range(5))
-        assert typed(range(5, 5 + KEYS)) - before < MOST_BYTES
+        kept = []
+        for first in range(5, 5 + ROUNDS * KEYS, KEYS):
+            after = typed(range(first, first + KEYS))
+            kept.append(after - before)
+            before = after
+        assert min(kept) < MOST_BYTES, kept
     finally:
         tracemalloc.stop()
 
