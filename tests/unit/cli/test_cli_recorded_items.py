@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -52,7 +53,9 @@ def test_a_test_that_passes_and_one_that_fails(folder: Path) -> None:
     good = record_item("test_pump.py::test_good", folder)
     assert (good.failed, good.reason) == (False, "") and "1 passed" in good.output
     assert [len(recorded.scans) for recorded in good.recordings.values()] == [3, 2] and len(good.recordings) == 2
+    written = (folder / "helper.py").stat()
     (folder / "helper.py").write_text("THREE = 4\n", encoding="utf-8")
+    os.utime(folder / "helper.py", ns=(written.st_atime_ns, written.st_mtime_ns))  # as if in the same second
     assert record_item("test_pump.py::test_good", folder).failed, "what has changed is imported anew"
     bad = record_item("test_pump.py::test_bad", folder)
     assert bad.failed and bad.reason.startswith("counts too slowly") and "1 failed" in bad.output

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -37,7 +37,7 @@ def record_item(node: str, folder: Path) -> RecordedItem:
     kept = _Keeper()
     known = set(sys.modules)
     said = io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), contextlib.chdir(folder):
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), contextlib.chdir(folder), _without_byte_code():
         code = pytest.main([*OPTIONS, node], [kept])
     for name in set(sys.modules) - known:  # they are imported anew, with what is changed until then
         if (file := getattr(sys.modules[name], "__file__", None)) and Path(file).resolve().is_relative_to(folder.resolve()):
@@ -47,6 +47,14 @@ def record_item(node: str, folder: Path) -> RecordedItem:
         what = f"{kept.count} tests" if kept.count > 1 else "no test"
         raise LookupError(f"{node!r} is {what}: name one, such as tests/test_pump.py::test_it_stops\n{kept.item.output}")
     return kept.item
+
+
+@contextlib.contextmanager
+def _without_byte_code() -> Iterator[None]:
+    """Byte code of modules is not kept: Python takes it for that of a file with the same size and the same second of change."""
+    before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    yield
+    sys.dont_write_bytecode = before
 
 
 class _Keeper:
