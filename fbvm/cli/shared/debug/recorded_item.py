@@ -53,8 +53,10 @@ def record_item(node: str, folder: Path) -> RecordedItem:
 def _without_byte_code() -> Iterator[None]:
     """Byte code of modules is not kept: Python takes it for that of a file with the same size and the same second of change."""
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
-    yield
-    sys.dont_write_bytecode = before
+    try:
+        yield
+    finally:
+        sys.dont_write_bytecode = before
 
 
 class _Keeper:
