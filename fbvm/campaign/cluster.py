@@ -30,6 +30,8 @@ LOCAL = "local"
 """In place of an address: processes of this machine."""
 TASKS_A_WORKER = 4
 """Tasks that are with the scheduler at a time, for each thread of its workers: the next ones come with the results."""
+AGAIN = ("lost", "pending")
+"""States of a task that had ended: the result went with its worker before anybody had fetched it, and it is done again."""
 CONNECT_S = 10
 ASK_VERSION = "__import__('fbvm').__version__"
 
@@ -145,6 +147,9 @@ class Cluster(Generic[Task, Result]):
             return
         running: Any = as_completed(first, loop=self._client.loop)  # type: ignore[no-untyped-call]
         for future in running:
+            if future.status in AGAIN:
+                running.add(future)
+                continue
             task = waiting.pop(future.key)
             if future.status == "finished":
                 yield task, future.result()

@@ -6,6 +6,8 @@ import os
 import signal
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -54,6 +56,47 @@ def test_a_cluster_gives_the_same_results_though_a_worker_is_killed(bench: Bench
         monkeypatch.setattr(cluster, "VERSION", "0.0.1")
         with pytest.raises(Mismatch, match=r"has fbvm .*, not 0\.0\.1"), cluster.Cluster(bench, client.scheduler.address, 1):
             raise AssertionError("a worker of another version was accepted")
+
+
+class Ended:
+    """A task of Dask, which is in the next of some states each time when it is said to have ended."""
+
+    def __init__(self, key: str, *states: str) -> None:
+        self.key, self.states = key, iter(states)
+
+    @property
+    def status(self) -> str:
+        if not hasattr(self, "state"):
+            self.state = next(self.states)
+        return self.state
+
+    def result(self) -> str:
+        return f"result of {self.key}"
+
+
+class Completed(list[Ended]):
+    """Yields what has ended, also what is added meanwhile."""
+
+    def __init__(self, tasks: list[Ended], loop: None) -> None:
+        super().__init__(tasks)
+
+    def add(self, task: Ended) -> None:
+        task.state = next(task.states)
+        self.append(task)
+
+    update = list.extend
+
+
+@pytest.mark.parametrize("state", ["lost", "pending"])
+def test_a_result_that_goes_with_its_worker_is_waited_for(monkeypatch: pytest.MonkeyPatch, state: str) -> None:
+    """It had ended, and the worker is killed before anybody has fetched what came of it."""
+    from fbvm.campaign import cluster
+
+    made = iter([Ended("a", state, state, "finished"), Ended("b", "finished")])
+    executor: Any = cluster.Cluster(SimpleNamespace(mark="m"), cluster.LOCAL, 1)  # type: ignore[arg-type]
+    executor._client = SimpleNamespace(submit=lambda *_, **__: next(made), loop=None)
+    monkeypatch.setattr(cluster, "as_completed", Completed)
+    assert list(executor.results([1, 2], LIMIT_NS)) == [(2, "result of b"), (1, "result of a")]
 
 
 def test_a_scheduler_that_is_not_there_is_told_with_its_status(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
