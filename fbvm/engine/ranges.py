@@ -88,9 +88,14 @@ def with_temporaries(code: Block) -> RangeOf:
     (0, 9)
     """
     lets: dict[int, list[Node]] = {}
+    given: set[int] = set()
     for node in statements(code):
         if node[0] == "let" and node[2] in INTEGERS:
             lets.setdefault(node[1], []).append(node[3])
+        elif node[0] == "attempt":
+            given.add(node[3])
+    for number in given & lets.keys():
+        del lets[number]  # an attempt gives it any number
     known: dict[int, Range] = {}
 
     def of(node: Node) -> Range:

@@ -131,8 +131,9 @@ class Held:
 
     def _keep_through(self, state: State, loop: Node) -> None:
         for node in statements((loop,)):
+            if node[0] in ("let", "attempt"):
+                state.pop(("tmp", "", node[1 if node[0] == "let" else 3]), None)
             if node[0] == "let":
-                state.pop(("tmp", "", node[1]), None)
                 continue
             key = self.key(node[1], node[2]) if node[0] == "store" else None
             self._drop(state, self._effects.of(node, self._instance, self._range_of), key)

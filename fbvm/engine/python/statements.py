@@ -252,6 +252,7 @@ def _attempt(w: BodyWriter, pou: int, address: Address | None, number: int, trap
     w.suite(lambda: w.attempt_body(pou, place, f"t{number}"))
     w.line("except Stop as stopped:")
     w.suite(lambda: w.after_stop(f"t{number}", traps))
+    w.held.hold(("tmp", "", number), None)
 
 
 def _charge(w: BodyWriter, count: int, site: int) -> None:

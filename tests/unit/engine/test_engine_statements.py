@@ -12,6 +12,7 @@ from statement_rows import OBSERVED, PROGRAMS, add, reference
 from fbvm.base.areas import BUDGET, DUE, NEVER, SLOTS_OFFSET
 from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import STATEMENTS, Block, Node
+from fbvm.engine.native import engine as native
 from fbvm.engine.observation import Observation
 from fbvm.engine.python.engine import PythonEngine
 
@@ -98,6 +99,18 @@ def test_an_attempt_gives_what_has_ended_its_body() -> None:
         assert rig.trap is None
         given.append((rig.slot("u32", 4), rig.memory.read(BUDGET, "i64")))
     assert given == [(0, 47), (0x51, 50), (2, 50)]
+
+
+def test_what_an_attempt_gives_is_not_taken_for_what_its_temporary_was_before() -> None:
+    """The checks behind it stay, although the only `let` of the temporary is within their bounds."""
+    code = (("let", 1, "u32", const("u32", 0)), ("attempt", 1, None, 1, True),
+            ("store", "u32", at(4), ("check", "u32", ("tmp", "u32", 1), 0, 9, "R0102", 12)))  # fmt: skip
+    rig = execute(code, (("stop", "R0101", 12),))
+    assert rig.trap is not None and rig.trap.code == "R0102"
+    if native.available():
+        program = image(code, (("stop", "R0101", 12),))
+        trap = native.NativeEngine(program, power_on(program), 0).run(0)
+        assert trap is not None and trap.code == "R0102"
 
 
 def test_an_attempt_lets_pass_what_it_does_not_catch() -> None:
