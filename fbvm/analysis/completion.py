@@ -40,6 +40,10 @@ _PATH = re.compile(r"([A-Za-z_]\w*(?:\s*\[[^\[\]]*\]|\^|\.[A-Za-z_]\w*)*)\.\w*\Z
 _TYPED = re.compile(r"([A-Za-z_]\w*)#\w*\Z")
 _AT = re.compile(r"\bAT\s+(%?[\w. ]*)\Z", re.I)
 _OF_TYPE = re.compile(r"(?::|\bOF|\bTO)\s+\w*\Z|:\s*\w*\Z", re.I)
+_KINDS = {"field": "variable", "enumeration": "type"}
+"""The kinds of members that are called otherwise as items."""
+_NO_TYPES, _ONLY_TYPES = ("field", "function"), ("block", "type")
+"""Kinds of members that are no types of variables, and those that nothing but a declaration names."""
 _ADDRESS = re.compile(r"%\w*\Z")
 _WORD = re.compile(r"[@%!\w]*\Z")
 
@@ -48,7 +52,7 @@ _WORD = re.compile(r"[@%!\w]*\Z")
 class Item:
     """Something that can be written.  `insert` is a snippet (`$0` is where the cursor goes) if it is not the label itself;
     `kind` is "variable", "pin", "function", "block", "type", "enumerator", "keyword", "address", "instruction", "action",
-    "method" or "property"; `page` is the name under which `documentation` finds more."""
+    "method", "property" or "namespace"; `page` is the name under which `documentation` finds more."""
 
     label: str
     kind: str
@@ -69,7 +73,8 @@ def complete(program: Program, name: str, offset: int) -> list[Item]:
     if _in_comment(line):
         return []
     if path := _PATH.search(line):
-        return [_member(each, rank=1) for each in scope.members(path[1])]
+        unfit = _NO_TYPES if _in_section(text) and _OF_TYPE.search(line[:path.start()]) else _ONLY_TYPES
+        return [_member(each, rank=1) for each in scope.members(path[1]) if each.kind not in unfit]
     if typed := _TYPED.search(line):
         return [Item(each.name, each.kind, each.type, rank=1) for each in scope.members(typed[1]) if each.kind == "enumerator"]
     if at := _AT.search(line):
@@ -86,8 +91,8 @@ def complete(program: Program, name: str, offset: int) -> list[Item]:
 
 
 def _member(member: Member, rank: int) -> Item:
-    insert = f"{member.name}($0)" if member.kind == "method" else ""
-    return Item(member.name, "variable" if member.kind == "field" else member.kind, member.type, insert, rank=rank)
+    insert = f"{member.name}($0)" if member.kind in ("method", "function") else ""
+    return Item(member.name, _KINDS.get(member.kind, member.kind), member.type, insert, rank=rank)
 
 
 def documentation(page: str) -> str:
@@ -165,7 +170,7 @@ def _variables(scope: Scope) -> Iterator[Item]:
 def _types(program: Program, scope: Scope) -> Iterator[Item]:
     yield from (Item(kind, "type", rank=2) for kind in (*ELEMENTARY, "STRING", "WSTRING"))
     project = scope.checker.project
-    yield from (Item(entry.tree.name.text, "type", rank=1) for entry in list(project.types.values()) if not entry.source.library)
+    yield from (Item(entry.name, "type", rank=1) for entry in list(project.types.values()) if not entry.source.library)
     yield from (Item(pou.name, "block", "FUNCTION_BLOCK", rank=1) for pou in list(project.pous.values())
                 if pou.kind == "FUNCTION_BLOCK" and not pou.source.library)
     yield from (Item(word, "keyword", insert=snippet, rank=3) for word, snippet in (

@@ -17,8 +17,8 @@ from fbvm.syntax import tree
 
 Edit = tuple[int, int, str]
 """Start and end of a piece of a text, in characters from 0, and what is written there instead."""
-TYPES = ("BOOL", "INT", "REAL", "TIME", "DINT", "WORD", "STRING", "LREAL")
-"""Types that are tried for a name that is not declared."""
+TYPES = ("INT", "BOOL", "DINT", "REAL", "TIME", "WORD", "STRING", "LREAL")
+"""Types that are tried for a name that is not declared.  A whole number is an INT if it fits: 0 and 1 would fit a BOOL, too."""
 MOST = 8
 """Changes that are tried for one diagnostic."""
 _NEAR = re.compile(r"did you mean ([^?;]+)\?")

@@ -24,7 +24,8 @@ _STEP = re.compile(r"\s*(\[[^\[\]]*\]|\^|\.?\s*[A-Za-z_]\w*)")
 
 @dataclass(frozen=True)
 class Member:
-    """Something behind a point: `kind` is "field", "pin", "action", "method", "property" or "enumerator"."""
+    """Something behind a point: `kind` is "field", "pin", "action", "method", "property" or "enumerator", behind a NAMESPACE
+    "function", "block", "type", "enumeration" or "namespace"."""
 
     name: str
     kind: str
@@ -140,11 +141,30 @@ class Scope:
             return pins + actions + self.methods(block)
         if isinstance(kind, StructType):
             return [Member(field.name, "field", str(field.type)) for field in kind.fields.values()]
-        if kind is None and path.strip().isidentifier() and self.checker.project.is_space(path.strip(), self.source):
-            project = self.checker.project
-            return [Member(name, "field", str(found.type)) for name in project.names_in(path.strip())
-                    if (found := self.checker.listed(fold(path.strip()), fold(name), self.source)) is not None]
-        return []
+        return [*self._listed_in(path.strip()), *self._declared_in(path)] if kind is None else []
+
+    def _listed_in(self, space: str) -> list[Member]:
+        """The global variables behind the name of their list, or of what else may qualify them; [] for another name."""
+        project = self.checker.project
+        if not space.isidentifier() or not project.is_space(space, self.source):
+            return []
+        return [Member(name, "field", str(found.type)) for name in project.names_in(space)
+                if (found := self.checker.listed(fold(space), fold(name), self.source)) is not None]
+
+    def _declared_in(self, path: str) -> list[Member]:
+        """What a NAMESPACE declares that may be named here, and the namespaces in it; [] for another name."""
+        project, space = self.checker.project, self.checker.project.namespaces.space(path, self.source)
+        if space is None:
+            return []
+        inner = [Member(full.rpartition(".")[2], "namespace", "NAMESPACE")
+                 for folded, full in project.namespaces.declared.items() if folded.rpartition(".")[0] == space]
+        pous = [Member(pou.name.rpartition(".")[2], "function" if pou.is_function else "block", pou.kind)
+                for _, folded in project.pous if folded.rpartition(".")[0] == space
+                if (pou := project.pou(folded, self.source)) is not None]
+        types = [Member(entry.tree.name.text, "enumeration" if isinstance(entry.tree.spec, tree.EnumSpec) else "type", "TYPE")
+                 for _, folded in project.types if folded.rpartition(".")[0] == space
+                 if (entry := project.type_entry(folded, self.source)) is not None]
+        return [*pous, *types, *inner]
 
     def methods(self, block: Pou | None = None) -> list[Member]:
         """The methods and properties of a block that may be named here, each once; by default of the one around the place."""

@@ -29,7 +29,8 @@ _KINDS = {
     "type": types.CompletionItemKind.Struct, "enumerator": types.CompletionItemKind.EnumMember,
     "keyword": types.CompletionItemKind.Keyword, "address": types.CompletionItemKind.Reference,
     "instruction": types.CompletionItemKind.Operator, "action": types.CompletionItemKind.Method,
-    "method": types.CompletionItemKind.Method, "property": types.CompletionItemKind.Property}
+    "method": types.CompletionItemKind.Method, "property": types.CompletionItemKind.Property,
+    "namespace": types.CompletionItemKind.Module}
 
 
 # --- completion -----------------------------------------------------------------------------------------------------------

@@ -79,6 +79,32 @@ def test_what_can_be_written_inside_of_a_namespace() -> None:
     assert {"y", "q", "m", "Run"} <= {each.label for each in complete(program, "pump.st", offset)}
 
 
+SECRET = PLANT.replace("TYPE Mode", "FUNCTION INTERNAL Hidden : INT\n    Hidden := 1;\nEND_FUNCTION\nTYPE Mode")
+
+
+@each_of("before, written, offered", [
+    ("p(); o()", "n := Plant.", {"Twice": "function", "Mode": "type", "Pumps": "namespace"}),
+    ("p(); o()", "n := plant.pumps.", {}), ("p(); o()", "n := Plant.Pumps.", {}), ("p(); o()", "n := Plant.Nothing.", {}),
+    ("n : INT; END_VAR\n    p", "z : Plant.", {"Mode": "type", "Pumps": "namespace"}),
+    ("n : INT; END_VAR\n    p", "z : ARRAY [0..1] OF Plant.Pumps.", {"Pump": "block"}),
+    ("n : INT; END_VAR\n    p", "z : INT := Plant.", {"Twice": "function", "Mode": "type", "Pumps": "namespace"}),
+    ("m := Mode#Busy", "Plant.", {"Twice": "function", "Hidden": "function", "Mode": "type", "Pumps": "namespace"}),
+    ("m := Mode#Busy", "Pumps.", {}),
+])
+def test_what_can_be_written_behind_a_namespace(before: str, written: str, offered: dict[str, str]) -> None:
+    program, offset = at_mark(SECRET.replace(before, f"{MARK}{before}"))
+    program.replace("pump.st", SECRET[:offset] + written + SECRET[offset:])
+    found = complete(program, "pump.st", offset + len(written))
+    assert {each.label: each.kind for each in found} == offered
+    assert all(each.insert == ("Twice($0)" if each.label == "Twice" else each.insert) for each in found)
+
+
+def test_types_are_offered_with_their_namespace() -> None:
+    program, offset = at_mark(PLANT.replace("n : INT; END_VAR", f"n : {MARK}INT; END_VAR"))
+    labels = {each.label for each in complete(program, "pump.st", offset)}
+    assert {"Plant.Mode", "Plant.Pumps.Pump", "Pump"} <= labels and "Mode" not in labels
+
+
 def test_names_are_looked_up_anew_when_a_using_changes() -> None:
     program, _ = plant("p()", "p")
     assert program.diagnostics("pump.st") == []

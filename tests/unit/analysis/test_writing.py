@@ -159,6 +159,17 @@ def test_an_unknown_name_is_declared_with_a_type_that_fits() -> None:
     assert [fix.title for fix in fixes(program, "pump.st", offset, offset)] == ["Declare speed : INT"]
 
 
+@each_of("written, kind", [
+    ("‸n := 1;", "INT"), ("‸n := 0;", "INT"), ("‸n := 16#FF;", "INT"), ("‸n := 100_000;", "DINT"), ("‸n := 1.5;", "REAL"),
+    ("‸n := TRUE;", "BOOL"), ("IF ‸n THEN END_IF", "BOOL"), ("b := b AND ‸n;", "BOOL"), ("b := NOT ‸n;", "BOOL"),
+    ("‸n := T#1s;", "TIME"), ("‸n := w;", "WORD"), ("‸n := 'a';", "STRING"), ("‸n := l;", "LREAL"),
+    ("FOR ‸n := 0 TO 1 DO END_FOR", "INT"),
+])
+def test_the_type_of_an_unknown_name_is_the_usual_one(written: str, kind: str) -> None:
+    program, offset = at_mark(f"PROGRAM Main VAR b : BOOL; w : WORD; l : LREAL; END_VAR {written} END_PROGRAM\n")
+    assert [fix.title for fix in fixes(program, "pump.st", offset, offset)] == [f"Declare n : {kind}"]
+
+
 def test_a_warning_can_be_mended_or_suppressed() -> None:
     text = "PROGRAM Main\nVAR\n    ‸unused : INT;\n    b AT %QX0.0 : BOOL;\nEND_VAR\nb := TRUE;\nEND_PROGRAM\n"
     program, offset = at_mark(text)
