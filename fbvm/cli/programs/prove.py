@@ -114,19 +114,21 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json)
         questions += _ready(lambda: _named(Names(image), options))
         asked += [(image, question) for question in questions]
-    verdicts = []
+    verdicts: list[Verdict] = []
+    found: list[Verdict] = []
     for image, plain in asked:
         question = replace(plain, units=options["unit_rules"], lemmas=options["lemma"])
         verdict = _answered(image, question, options)
         verdicts.append(verdict)
+        if verdict.run is not None and len(verdicts) > len(pairs):  # kept before it is told: who reads may have gone
+            found.append(verdict)
+            _keep(image, found, options, files, libraries, program)
         if not as_json:
             _print(image, verdict)
     if as_json:
         cycle_ns, longest_ns = options["cycle"]
         rows = [_as_dict(verdict) for verdict in verdicts]
         say_json({"cycle_ns": cycle_ns, "longest_cycle_ns": longest_ns, "properties": rows})
-    if found := [verdict for verdict in verdicts[len(pairs):] if verdict.run is not None]:
-        _keep(asked[-1][0], found, options, files, libraries, program)
     sys.exit(status.GOOD if all(verdict.is_good for verdict in verdicts) else status.FAILED)
 
 
@@ -218,12 +220,12 @@ def _as_dict(verdict: Verdict) -> dict[str, object]:
 
 def _keep(image: Image, found: Sequence[Verdict], options: dict[str, Any], files: Sequence[Path], libraries: Sequence[Path],
           program: str | None) -> None:  # fmt: skip
-    """Writes the runs that were found into the files that --test, --trace and --html name."""
+    """Writes the runs that were found, the last one just now, into the files that --test, --trace and --html name."""
     if options["test_file"]:
         chosen = ({"program": program} if program else {}) | compile_options(files)
         with writing(options["test_file"]):
             write_file(options["test_file"], pytest_text(found, files, chosen))
-    if options["trace"] or options["html"]:
+    if len(found) == 1 and (options["trace"] or options["html"]):
         _record(image, found[0], options, files, libraries, program)
 
 

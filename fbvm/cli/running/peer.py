@@ -28,7 +28,7 @@ def command(port: int, host: str, trace: bool) -> None:
     """Serve Modbus TCP until Ctrl-C or SIGTERM, for every unit id.
 
     Holding register i holds 1000 + i, input register i 2000 + i, every second coil and every third discrete input is
-    ON.  Status 5 if the port cannot be used."""
+    ON.  Status 0 if a signal ends the server, 5 if the port cannot be used."""
     try:
         with loading():
             import pymodbus.server  # noqa: F401

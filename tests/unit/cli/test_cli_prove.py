@@ -14,7 +14,7 @@ from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.cli.main import main
-from fbvm.cli.programs import prove_tests
+from fbvm.cli.programs import prove, prove_tests
 from fbvm.cli.programs.prove import command
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Site
@@ -119,6 +119,30 @@ def test_the_run_is_recorded(tmp_path: Path) -> None:
     assert proved(INTERLOCK, "--never", "Main.Left", "--trace", str(trace)).exit_code == 1
     chart = CliRunner().invoke(main, ["chart", str(trace), "Main.Left", "Main.Backward"])
     assert (chart.exit_code, chart.stdout.split()) == (0, ["0", "Main.Left", "#", "Main.Backward", "#"])
+
+
+@pytest.mark.slow
+def test_what_was_found_is_written_also_for_a_reader_who_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in `fbvm prove ... --trace F | head -1`."""
+    def gone(text: object, **options: Any) -> None:
+        raise BrokenPipeError
+
+    monkeypatch.setattr(prove, "say", gone)
+    files = [tmp_path / name for name in ("found.fbtrace", "found.html", "test_found.py")]
+    options = [text for option, file in zip(("--trace", "--html", "--test"), files, strict=True) for text in (option, str(file))]
+    result = CliRunner().invoke(command, [INTERLOCK, "--never", "Main.Left", *options])
+    assert isinstance(result.exception, BrokenPipeError)
+    assert all(file.stat().st_size for file in files)
+
+
+@pytest.mark.slow
+def test_the_first_run_is_recorded_and_every_one_becomes_a_test(tmp_path: Path) -> None:
+    trace, tests = tmp_path / "found.fbtrace", tmp_path / "test_found.py"
+    asked = ("--never", "Main.Left AND Main.Right", "--never", "Main.Left", "--never", "Main.Right")
+    assert proved(INTERLOCK, *asked, "--trace", str(trace), "--test", str(tests)).exit_code == 1
+    chart = CliRunner().invoke(main, ["chart", str(trace), "Main.Left", "Main.Right"])
+    assert chart.stdout.split() == ["0", "Main.Left", "#", "Main.Right", "."]
+    assert tests.read_text(encoding="utf-8").count("\ndef test_") == 2
 
 
 @pytest.mark.parametrize("arguments", [[], ["--never", "Main.Nobody"], ["--never", "Main.Left +"], ["--always", "3"],
