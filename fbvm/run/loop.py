@@ -34,6 +34,8 @@ PLC_PROGRESS_NS = 100_000
 SWITCH_ON_NS = 250_000
 """In real time, so much later than a PLC the next is switched on, rounded down to whole periods: twice what the first scans of
 one take."""
+FIRST_PERIODS = 10
+"""In real time, for so many periods behind its first scan a PLC makes objects that stay."""
 PAUSE_NS = 1_000_000
 """How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
@@ -71,26 +73,31 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None,
     at most every 100 ms.  When `until` returns True between two scans, the loop is left; the runs go on with `resumed`, after
     `Running.resume` of each.  `until` may not look at the PLCs: those in a batch are up to date only behind the loop."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
-    with _uncollected() if networks else nullcontext():
-        _run_all(runs, progress, until, resumed, list(networks.values()))
+    with _uncollected() if networks else nullcontext(_nothing) as keep:
+        _run_all(runs, progress, until, resumed, list(networks.values()), keep)
 
 
 @contextmanager
-def _uncollected() -> Iterator[None]:
-    """Python's garbage collector leaves alone what is there already: to visit ten thousand PLCs takes several periods."""
-    is_ours = not gc.get_freeze_count()
-    if is_ours:
-        gc.freeze()
+def _uncollected() -> Iterator[Callable[[], None]]:
+    """Python's garbage collector leaves alone what is there already: to visit ten thousand PLCs takes several periods.  What is
+    there later is left alone, too, when the function is called that this gives."""
+    if gc.get_freeze_count():  # somebody else has decided
+        yield _nothing
+        return
+    gc.freeze()
     try:
-        yield
+        yield gc.freeze
     finally:
-        if is_ours:
-            gc.unfreeze()
+        gc.unfreeze()
+
+
+def _nothing() -> None:
+    """In place of `gc.freeze`."""
 
 
 def _run_all(runs: Sequence[Running], progress: Callable[[], None] | None, until: Callable[[], bool] | None, resumed: bool,
-             networks: Sequence[Network]) -> None:  # fmt: skip
-    """`run_all`; `networks` are those of real time."""
+             networks: Sequence[Network], keep: Callable[[], None]) -> None:  # fmt: skip
+    """`run_all`; `networks` are those of real time, `keep` keeps the garbage collector from what is there."""
     interrupts = Interrupts()
     clock: _Clock = _VirtualClock()
     watchdogs: list[Watchdog] = []
@@ -102,6 +109,7 @@ def _run_all(runs: Sequence[Running], progress: Callable[[], None] | None, until
         _begin_in_virtual_time(runs, resumed, len(runs) == 1 and until is None)
     queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
     batches = Batches(len(watchdogs) > 1 and _are_alone(runs))
+    all_on_ns = max((run.due_ns + FIRST_PERIODS * run.plc.cycle_ns for run in runs), default=0) if networks else 0
     told_ns, pause_ns = time.monotonic_ns(), max(PROGRESS_NS, PLC_PROGRESS_NS * len(runs))
     recorders = _recorders(runs)
     try:
@@ -110,6 +118,8 @@ def _run_all(runs: Sequence[Running], progress: Callable[[], None] | None, until
             while (due_ns := queue.next_ns()) is not None:
                 now_ns, woken = clock.reach(due_ns)
                 _scan_all(queue, now_ns, woken, watchdogs, batches)
+                if now_ns < all_on_ns:
+                    keep()
                 interrupts.check()
                 if until and until():
                     break

@@ -5,6 +5,7 @@ The host's clock is a stand-in that never waits.
 
 from __future__ import annotations
 
+import gc
 import heapq
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -292,6 +293,37 @@ def test_many_plcs_are_switched_on_one_after_another(clock: Clock) -> None:
     dates = {run.plc.servicing.clock_ns - at * MS for run, at in zip(runs, wanted, strict=True)}
     assert max(dates) - min(dates) < 1000 * MS
     assert all(run.plc.lateness.missed == 0 for run in runs)
+
+
+def frozen_between_scans(clock: Clock) -> list[int]:
+    """How many objects the garbage collector left alone behind each scan of eight PLCs that make an object in each."""
+    plcs, network, kept, made = [Plc(counter_image(), 100 * MS) for _ in range(8)], RealNetwork(clock), [], []
+    for plc in plcs:
+        plc.attach(Idle(), network)
+
+    def between() -> bool:
+        made.append([len(made)])
+        kept.append(gc.get_freeze_count())
+        return False
+
+    run_all([Running(plc, for_ns=4_000 * MS, phase_ns=number * 10 * MS) for number, plc in enumerate(plcs)], until=between)
+    return kept
+
+
+def test_the_garbage_collector_leaves_alone_what_plcs_make_when_they_are_switched_on(clock: Clock) -> None:
+    gc.unfreeze()
+    kept = frozen_between_scans(clock)
+    after = gc.get_freeze_count()
+    gc.freeze()
+    assert after == 0 and len(kept) == 8 * 40
+    assert 0 < kept[0] < kept[8] < kept[40] < kept[80], "each of the first ten scans of each PLC adds what it has made"
+    assert max(kept[100:]) == kept[100], "but what is made later may become garbage"
+
+
+def test_what_the_host_keeps_from_the_garbage_collector_stays_as_it_is(clock: Clock) -> None:
+    gc.freeze()
+    before = gc.get_freeze_count()
+    assert max(frozen_between_scans(clock)) <= before and 0 < gc.get_freeze_count() <= before
 
 
 def test_news_wake_only_whose_they_are(clock: Clock) -> None:
