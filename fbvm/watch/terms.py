@@ -14,7 +14,7 @@ from typing import cast
 from fbvm.base.types import BOOL, DATE, DINT, LREAL, REAL, TIME, EnumType, Type, base, common, fold
 from fbvm.watch.paths import Place
 from fbvm.watch.scanner import ConditionError
-from fbvm.watch.values import DATES, Value, conform, literal, nearest_real, parse_value, refusal, sort_of
+from fbvm.watch.values import DATES, Value, conform, literal, nearest_real, refusal, sort_of
 
 Read = Callable[[Place], Value]
 
@@ -31,7 +31,6 @@ class Term:
     sort: str
     type: Type | None = None
     constant: Value = None
-    literal: bool = False
     place: Place | None = None
     unknown: str = ""
     sign: str = ""
@@ -57,7 +56,7 @@ def literal_term(text: str) -> Term:
     except ValueError as error:
         raise ConditionError(str(error)) from None
     sort = sort_of(shown) if shown else "text" if isinstance(value, str) else "number"
-    return Term(text, lambda read: value, sort, shown if sort == "number" else None, value, literal=True)
+    return Term(text, lambda read: value, sort, shown if sort == "number" else None, value)
 
 
 def _quotient(a: int | float, b: int | float) -> int | float:
@@ -189,8 +188,6 @@ def _fitted(term: Term, other: Term) -> Term:
 
 def _as(kind: Type, term: Term, name: str) -> Value:
     """The value of a constant as a place of type `kind` holds it."""
-    if term.literal and not isinstance(term.constant, float) and (term.sort == "text" or sort_of(kind) != "text"):
-        return parse_value(kind, term.text, name)
     if term.sort != sort_of(kind) and (term.sort, sort_of(kind)) != ("number", "BOOL"):
         raise refusal(kind, name, term.text)
     value = term.constant

@@ -63,7 +63,7 @@ def test_an_address_may_have_a_space_within(text: str) -> None:
 
 
 @each_of("text", [
-    "c = Green", "green = c", "c = Colour.Green", "c <> Red", "c = Colour#green", "(c = Green) = TRUE",
+    "c = Green", "green = c", "c = Colour.Green", "c <> Red", "c = c", "c = Colour#green", "(c = Green) = TRUE",
 ])
 def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
     assert holds(text)
@@ -104,6 +104,7 @@ def test_literals_are_those_of_a_program(text: str) -> None:
     ("n = Green", "there is no Green"),
     ("n = Colour#Green", "Colour#Green stands beside nothing of its enumeration"),
     ("day = when", "= compares DATE with DATE_AND_TIME"),
+    ("day > 2024", "day is DATE and takes a date such as D#2024-01-31, not 2024"),
     ("day = DT#2024-01-01-00:00:00", "day is DATE and takes a date such as"),
     ("-text = 'a'", "- needs a number"),
     ("INT#99999 = n", "out of the range of INT"),

@@ -21,7 +21,12 @@ MAIN = StructType("Main", 200, 8, {
     "X2": Field("x2", t.WORD, 100),
     "X2_POS": Field("x2_pos", t.INT, 102),
 }, block=True)
-SYMBOLS = {"MAIN": Field("Main", MAIN, 180224), "D200": Field("d200", t.INT, 181000)}
+STEP = StructType("Step", 8, 8, {"X": Field("X", t.BOOL, 0)})
+CHART = StructType("Chart", 32, 8, {  # with steps that are called as a variable and as the chart itself
+    "FILL": Field("fill", t.INT, 0), "X": Field("X", t.BOOL, 2), "FILL STEP": Field("fill step", STEP, 8),
+    "CHART STEP": Field("Chart step", STEP, 16),
+}, block=True)
+SYMBOLS = {"CHART": Field("Chart", CHART, 190000), "MAIN": Field("Main", MAIN, 180224), "D200": Field("d200", t.INT, 181000)}
 
 
 def place(text: str) -> Place:
@@ -38,6 +43,8 @@ def place(text: str) -> Place:
     ("Main.flags.X1", "Main.flags.1", "BOOL", 180224 + 80, 1),
     ("Main.X2", "Main.x2", "WORD", 180224 + 100, None),
     ("Main. x2_pos", "Main.x2_pos", "INT", 180224 + 102, None),
+    ("Chart.fill", "Chart.fill", "INT", 190000, None), ("Chart.fill.X", "Chart.fill step.X", "BOOL", 190008, None),
+    ("Chart.X", "Chart.X", "BOOL", 190002, None),
     ("Main.x2.x3", "Main.x2.3", "BOOL", 180224 + 100, 3),
     ("Main.switch", "Main.switch", "BOOL", AREAS["CIO"].offset + 3038, 2),
     ("D200", "d200", "INT", 181000, None),
@@ -88,7 +95,7 @@ def test_a_range_is_its_places(text: str, names: list[str]) -> None:
     ("Main.conn.EN", "Main.conn has no EN; it has ENO"),
     ("conn.ENO", "did you mean Main.conn.ENO?"),
     ("ENO", "did you mean Main.conn.ENO?"),
-    ("nothing", "there is no nothing; known here: Main, d200"),
+    ("nothing", "there is no nothing; known here: Chart, Main, d200"),
     ("D40000", "D ends at 32767; 40000 does not exist"),
     ("Main.a[4, 0].x", "Main.a[4, 0]: 4 is outside 1..3"),
     ("Main.a[1].x", "Main.a has 2 subscripts, 1 given"),

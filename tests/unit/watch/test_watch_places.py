@@ -6,8 +6,12 @@ import pytest
 from rows import each_of
 
 from fbvm import Plc, compile_text
-from fbvm.base.memory import Memory
+from fbvm.base import types as t
+from fbvm.base.areas import AREAS, SLOTS_OFFSET, e_bank
+from fbvm.base.memory import WHOLE_BYTES, Memory
+from fbvm.base.types import Field
 from fbvm.code.image import Image
+from fbvm.code.operations import FIRST_OBJECT, OBJECT_SHIFT, OFFSET_SHIFT
 from fbvm.watch import places
 from fbvm.watch.conditions import DEEPEST, ConditionError, parse_condition, parse_expression, split_condition
 from fbvm.watch.names import Names
@@ -100,6 +104,13 @@ a := 5; b := 300; s.r REF= a; rs[0] REF= b; rs[1] REF= a; END_PROGRAM""", dialec
     plc.scan()
     assert plc.read("Main.s") == {"r": 5, "n": 0}
     assert plc.read("Main.rs") == [300, 5]
+    assert (plc.read("Main.s.r"), plc.read("Main.rs[1]")) == (5, 5)
+
+
+def test_a_variable_in_a_bank_behind_the_slots_has_its_own_bits_alone() -> None:
+    bank = e_bank("E0", 2 * SLOTS_OFFSET)
+    names = Names({"X": Field("x", t.BOOL, bank.offset, bit=3, absolute=True)}, {**AREAS, "E0": bank})
+    assert [found and found.name for found in (names.at(bank.offset, bit) for bit in (3, 4))] == ["x", "E0_0.04"]
 
 
 def test_nothing_has_a_name_behind_all_areas(plc: Plc, names: Names) -> None:
@@ -133,6 +144,14 @@ def test_references_are_read_as_names(plc: Plc, names: Names) -> None:
     assert names.read(plc.read, place(plc, "Main.w")) == "-> %MW20"
     assert names.read(plc.read, place(plc, "Main.pair")) == {"a": 0, "b": 0}
     assert names.read(plc.read, place(plc, "Main.flag")) is False
+
+
+def test_a_reference_that_has_left_an_area_is_outside_of_it() -> None:
+    start, end = AREAS["D"].offset, AREAS["D"].offset + AREAS["D"].size_bytes
+    names = Names({}, AREAS, [(start, end)])
+    told = [names.reference_name(FIRST_OBJECT << OBJECT_SHIFT | at << OFFSET_SHIFT | WHOLE_BYTES, t.WORD)
+            for at in (start - 2, start, end - 2, end)]
+    assert told == ["outside of D", "-> D0", "-> D32767", "outside of D"]
 
 
 def test_an_array_in_out_that_is_bound_to_nothing_yet_is_read_as_none() -> None:

@@ -92,6 +92,7 @@ def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) 
     (t.string(3), "a\0", "cannot hold the character"),
     (WIDE, "four", "x: 4 characters are out of range of WSTRING[3]"),
     (WIDE, "\U0001f600\U0001f600", "x: 4 characters are out of range of WSTRING[3]"),
+    (CHAR, "\u0100", "x: CHAR cannot hold the character"), (WCHAR, "\U00010000", "WCHAR cannot hold the character"),
     (CHAR, "\u20ac", "x: CHAR cannot hold the character"), (WCHAR, "\U0001f600", "WCHAR cannot hold the character"),
     (CHAR, "ab", "x is CHAR and takes one character, not 2"), (WCHAR, "", "x is WCHAR and takes one character, not 0"),
     (COLOUR, 1, "1 is no member of Colour; it has Red (0), Green (5)"),
@@ -101,6 +102,10 @@ def test_a_value_out_of_range_is_refused(kind: Type, value: object, message: str
     with pytest.raises(ValueError) as error:
         conform(kind, value, "x")
     assert message in str(error.value)
+
+
+def test_times_and_dates_may_be_given_as_literals() -> None:
+    assert conform(t.TIME, "1.5s", "x") == 1_500_000_000 and conform(t.DATE, "1970-01-02", "x") == 86_400_000_000_000
 
 
 @each_of(("kind", "value"), [
@@ -121,7 +126,10 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
     (t.WORD, "TRUE", "x is WORD and takes a whole number, not TRUE"),
     (t.INT, "1.5", "x is INT and takes a whole number, not 1.5"),
     (t.WORD, "-1", "x: -1 is out of range of WORD, which holds 0..65535; for these bits write 65535 or 16#FFFF"),
-    (t.BOOL, "2", "x is BOOL and takes TRUE or FALSE, not 2"),
+    (t.BOOL, "2", "x is BOOL and takes TRUE or FALSE, not 2"), (t.INT, "1e3", "x is INT and takes a whole number, not 1e3"),
+    (t.BYTE, "-129", "x: -129 is out of range of BYTE, which holds 0..255"),
+    (t.INT, "noon", "x: 'noon' is no literal; INT takes a whole number"),
+    (t.INT, "'", "x: \"'\" is no literal; INT takes a whole number"),
     (t.DATE, "DT#2024-01-01-00:00:00",
      "x is DATE and takes a date such as D#2024-01-31, not DT#2024-01-01-00:00:00"),
     (t.array(((1, 3),), t.INT), "1,2",
@@ -154,6 +162,7 @@ def test_bit_strings_are_shown_in_hexadecimal_on_request() -> None:
 
 @each_of(("kind", "value", "plain"), [
     (t.REAL, 0.10000000149011612, 0.1), (t.LREAL, 0.1, 0.1), (t.REAL, math.inf, "inf"), (t.LREAL, -math.inf, "-inf"),
+    (PAIR, None, None), (t.array(((0, 1),), t.REAL), None, None), (t.REAL, None, None),  # behind a reference that is null
     (t.LREAL, math.nan, "nan"), (PAIR, {"n": 1}, {"n": 1}), (t.array(((0, 1),), t.REAL), [math.inf, 0.5], ["inf", 0.5]),
 ])  # fmt: skip
 def test_values_become_those_of_json(kind: Type, value: object, plain: object) -> None:
