@@ -115,7 +115,9 @@ def pair(sign: str, left: Term, right: Term, whole: str) -> Term:
         known = [term.type for term in (left, right) if term.type]
         found = common(known[0], known[-1]) if known else None
         return _computed(text, sign, left, right, "number", found)
-    return _computed(text, sign, left, right, sort_of(kind), left.type if kind is DATE else kind)
+    if kind is DATE:  # the same day or instant, later or earlier
+        return _computed(text, sign, left, right, left.sort, left.type)
+    return _computed(text, sign, left, right, sort_of(kind), kind)
 
 
 def signed(sign: str, inner: Term, whole: str) -> Term:

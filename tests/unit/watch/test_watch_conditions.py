@@ -72,7 +72,9 @@ def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
 @each_of("text", [
     "done = ON", "done = BOOL#TRUE", "CIO 1509.15 = on", "done <> OFF",
     "when = DT#1970-01-02-00:00:00", "when > DT#1970-01-01-00:00:00",
-    "day < D#2024-01-31", "wait + 500ms = 2s", "wait * 2 = 3s", "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'",
+    "when + 1d = DT#1970-01-03-00:00:00", "when + 1d > when", "DT#1970-01-02-00:00:00 - 1s < when", "day + 1d = D#1970-01-02",
+    "day < D#2024-01-31", "2 * wait = 3s", "wait + 500ms = 2s", "wait * 2 = 3s",
+    "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'",
 ])
 def test_literals_are_those_of_a_program(text: str) -> None:
     assert holds(text)
@@ -103,6 +105,8 @@ def test_literals_are_those_of_a_program(text: str) -> None:
     ("c = n", "= compares Colour with INT"),
     ("n = Green", "there is no Green"),
     ("n = Colour#Green", "Colour#Green stands beside nothing of its enumeration"),
+    ("c = Shape.Green", "there is no Shape"), ("n * wait > text", "> compares TIME with STRING[80]"),
+    ("when + 1d = day", "= compares DATE_AND_TIME with DATE"),
     ("day = when", "= compares DATE with DATE_AND_TIME"),
     ("day > 2024", "day is DATE and takes a date such as D#2024-01-31, not 2024"),
     ("day = DT#2024-01-01-00:00:00", "day is DATE and takes a date such as"),

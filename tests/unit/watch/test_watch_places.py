@@ -126,7 +126,8 @@ def test_the_values_in_some_bytes_are_named_once_each(plc: Plc, names: Names) ->
 
 @each_of(("name", "address"), [
     ("Main.one", "CIO 31"), ("CIO 0", "CIO 0"), ("D0", "D0"), ("%MB0", "%MB0"),
-    ("Main.bit", "CIO 31.04"), ("Main.b", "%MX5.3"), ("Main.wide[2]", "CIO 32"), ("Main.flag", ""),
+    ("Main.bit", "CIO 31.04"), ("Main.b", "%MX5.3"), ("Main.wide[2]", "CIO 32"),
+    ("Main.bits[2]", "CIO 40.08"), ("Main.bits[11]", "CIO 41.01"), ("Main.flag", ""),
     ("Main.m", "%MB4"), ("Main.pumps[2, 0].level", "D50"),
 ])  # fmt: skip
 def test_the_address_of_a_located_variable(plc: Plc, names: Names, name: str, address: str) -> None:
@@ -218,6 +219,11 @@ def test_who_writes_as_other_software_is_told_the_spelling_here(plc: Plc, text: 
     with pytest.raises(UnknownPlace, match=r"did you mean|bank") as raised:
         plc.find(text)
     assert said in str(raised.value)
+
+
+def test_members_of_structures_are_not_proposed(plc: Plc) -> None:
+    with pytest.raises(UnknownPlace, match="there is no a; known here: Main"):
+        plc.find("a")
 
 
 def test_a_name_that_an_instance_declares_is_proposed_by_its_own_path_and_not_by_references() -> None:

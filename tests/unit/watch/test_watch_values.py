@@ -40,7 +40,7 @@ def test_times_are_read(text: str, time_ns: int) -> None:
     assert parse_time_ns(text) == time_ns
 
 
-@each_of("text", ["", "10", "ms", "10 ms x", "5s,", "T#"])
+@each_of("text", ["", "10", "ms", "10 ms x", "5s,", "T#", "T#T#1s"])
 def test_what_is_no_time_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is no time; write 10ms"):
         parse_time_ns(text)
@@ -72,6 +72,7 @@ def test_literals(text: str, value: object) -> None:
     (t.TOD, "TOD#00:00:01", 1_000_000_000), (t.REAL, "0.1", nearest_real(0.1)), (t.string(), "'a$27b'", "a'b"),
     (t.string(), "a\u00ff", "a\u00ff"),
     (t.array(((1, 3),), t.INT), "1,2,3", [1, 2, 3]), (t.array(((1, 3),), t.INT), "[1, -2, 16#F]", [1, -2, 15]),
+    (t.array(((0, 1),), t.array(((0, 1),), t.INT)), "[[1, 2], [3, 4]]", [[1, 2], [3, 4]]),
     (t.array(((1, 2),), t.string()), "'a,b', c", ["a,b", "c"]), (COLOUR, "5", 5), (LEVEL, "100", 100),
     (CHAR, "a", "a"), (CHAR, "'", "'"), (CHAR, "'$0A'", "\n"), (CHAR, "CHAR#'x'", "x"), (WCHAR, '"$20AC"', "\u20ac"),
     (WCHAR, "\u20ac", "\u20ac"), (WIDE, '"a$00e9"', "a\u00e9"), (WIDE, "\u20ac1", "\u20ac1"), (WIDE, "WSTRING#'ab'", "ab"),
@@ -88,7 +89,7 @@ def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) 
     (t.REAL, 1e39, "x: 1e+39 is out of range of REAL"),
     (t.LREAL, 10**400, "out of range of LREAL"),
     (t.string(3), "four", "x: 4 characters are out of range of STRING[3]"),
-    (t.string(3), "\u20ac", "cannot hold the character"),
+    (t.string(3), "\u0100", "cannot hold the character"), (t.string(3), "\u20ac", "cannot hold the character"),
     (t.string(3), "a\0", "cannot hold the character"),
     (WIDE, "four", "x: 4 characters are out of range of WSTRING[3]"),
     (WIDE, "\U0001f600\U0001f600", "x: 4 characters are out of range of WSTRING[3]"),
