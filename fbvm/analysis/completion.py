@@ -13,7 +13,7 @@ from fbvm.analysis.hover import all_located
 from fbvm.analysis.names import key_of
 from fbvm.analysis.program import Program
 from fbvm.analysis.scopes import Member, Scope, scope_at
-from fbvm.base.areas import AREAS
+from fbvm.base.areas import AREAS, SHARED_AREAS, SIZED_AREAS, with_sizes_apart
 from fbvm.base.types import ELEMENTARY, EnumType, fold
 from fbvm.check import block_pages
 from fbvm.check.calls import functions
@@ -202,14 +202,17 @@ def _free_addresses(program: Program, written: str) -> Iterator[Item]:
     behind: dict[str, int] = {}
     for each in all_located(program):
         assert each.location is not None
-        words = max(1, (each.type.size + 1) // 2)
+        unit = SIZED_AREAS[each.location.area].address_bits // 8 if each.location.area in SIZED_AREAS else 2
+        words = max(1, -(-each.type.size // max(1, unit)))
         behind[each.location.area] = max(behind.get(each.location.area, 0), each.location.number + words)
-    for area, row in AREAS.items():
-        label = f"%{area}" if area in "IQM" else area
+    apart = program.dialect.sizes_apart
+    for area, row in (with_sizes_apart(AREAS, SIZED_AREAS.values()) if apart else AREAS).items():
+        label = f"%{area}" if area in SHARED_AREAS else area
         free = behind.get(area)
         if free is not None:
-            text = f"%{area}W{free // 2 + free % 2}" if area in "IQM" else f"{area} {free}" if area == "CIO" else f"{area}{free}"
-            yield Item(text, "address", f"the next free word: {row.title}", rank=1)
+            text = f"%{area}W{free // 2 + free % 2}" if area in SHARED_AREAS else \
+                f"{area} {free}" if area == "CIO" else f"{area}{free}"
+            yield Item(text, "address", f"the next free {'place' if area in SIZED_AREAS else 'word'}: {row.title}", rank=1)
         yield Item(label, "address", row.title, rank=2)
 
 

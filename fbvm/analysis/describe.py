@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.analysis.comments import comment_at
 from fbvm.analysis.declarations import Declared
-from fbvm.base.areas import AREAS, AddressError, parse_address
+from fbvm.base.areas import FIXED_OR_SIZED_AREAS, Address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import EnumType, StructType
 from fbvm.check import block_pages
@@ -73,8 +73,8 @@ def markdown(declared: Declared, value: Value | None = None) -> str:
     if said := comment(declared.source, declared.node):
         lines += ["", said]
     if declared.variable is not None and declared.variable.location is not None:
-        lines += ["", f"At {declared.variable.location}: {AREAS[declared.variable.location.area].title}."
-                  if declared.variable.location.area in AREAS else f"At {declared.variable.location}."]
+        area = FIXED_OR_SIZED_AREAS.get(declared.variable.location.area)
+        lines += ["", f"At {declared.variable.location}: {area.title}." if area else f"At {declared.variable.location}."]
     if declared.source.library:
         lines += ["", f"Library {declared.source.library}"]
     return "\n".join(lines)
@@ -101,11 +101,8 @@ def signature(name: str) -> str:
     return f"{name}(IN1, IN2)" if name in functions.OPERATORS else f"{name}(...)"
 
 
-def address(text: str, symbols: list[str]) -> str:
-    """A PLC memory address as Markdown: its area, and the variables that lie there; "" for what is no address."""
-    try:
-        meant = parse_address(text)
-    except AddressError:
-        return ""
-    lines = [f"**{meant}**: {AREAS[meant.area].title}" if meant.area in AREAS else f"**{meant}**"]
+def address(meant: Address, symbols: list[str]) -> str:
+    """A PLC memory address as Markdown: its area, and the variables that lie there."""
+    area = FIXED_OR_SIZED_AREAS.get(meant.area)
+    lines = [f"**{meant}**: {area.title}" if area else f"**{meant}**"]
     return "\n\n".join([*lines, *(f"`{symbol}`" for symbol in symbols)])

@@ -9,7 +9,7 @@ from fbvm.analysis import describe
 from fbvm.analysis.declarations import find
 from fbvm.analysis.program import Program
 from fbvm.analysis.references import use_at
-from fbvm.base.areas import AddressError, parse_address
+from fbvm.base.areas import AREAS, Address, AddressError, parse_address
 from fbvm.base.pages import page
 from fbvm.base.types import fold
 from fbvm.check import block_pages, instructions
@@ -46,7 +46,7 @@ def hover_of_word(program: Program, text: str, offset: int) -> Hover | None:
     if found is None or program.checked is None:
         return None
     word, checker = found[0], program.checked.checker
-    known = describe.address(word, [describe.variable(each) for each in located(program, word)])
+    known = _described(program, word)
     for key in (("global", "", fold(word)), ("pou", "", fold(word)), ("type", "", fold(word))) if not known else ():
         declared = find(checker, key)
         known = describe.markdown(declared) if declared is not None else known
@@ -71,18 +71,29 @@ def _address(program: Program, name: str, offset: int) -> Hover | None:
     at = offset - part.base
     for node in part.nodes:
         if isinstance(node, tree.Direct | tree.Location) and node.start <= at <= node.end:
-            text = describe.address(node.text, [describe.variable(each) for each in located(program, node.text)])
+            text = _described(program, node.text)
             return Hover(part.base + node.start, part.base + node.end, text) if text else None
     return None
 
 
+def _described(program: Program, text: str) -> str:
+    """What is known of an address, as Markdown; "" for a text that is none."""
+    meant = _meant(program, text)
+    return "" if meant is None else describe.address(meant, [describe.variable(each) for each in located(program, text)])
+
+
 def located(program: Program, text: str) -> list[Variable]:
     """The variables that are declared at an address."""
+    meant = _meant(program, text)
+    return [each for each in all_located(program) if each.location == meant] if meant is not None else []
+
+
+def _meant(program: Program, text: str) -> Address | None:
+    """The address that a text names in the dialect of a program; None for a text that is none."""
     try:
-        meant = parse_address(text)
+        return parse_address(text, program.checked.checker.areas if program.checked is not None else AREAS)
     except AddressError:
-        return []
-    return [each for each in all_located(program) if each.location == meant]
+        return None
 
 
 def all_located(program: Program) -> list[Variable]:

@@ -2,14 +2,15 @@
 
 Omron areas count 16-bit words, the portable areas %I %Q %M count bytes.  The buffer begins with the system page (what
 machine and engines exchange); behind the areas come the slots of globals and instances, E banks come last and
-only if a program or a unit names them.  Before them lie the areas of units (mailboxes), if the program names any.
+only if a program or a unit names them.  Before them lie the areas of units (mailboxes), if the program names any, and where
+a PLC keeps %QX0.0, %QB0 and %QW0 apart an area for each size that the program names (`SIZED_AREAS`).
 Sizes: W394 and etn21 facts, CS1/CJ1/CJ2 (CIO 6144, W 512, H 512 + 1024 for blocks, A 960, D 32768, 13 E banks, T/C 4096).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from fbvm.base.digits import whole_number
@@ -31,6 +32,8 @@ class Area:
     """Kept over a warm start and a mode change."""
     title: str = ""
     """What it holds, for lists."""
+    address_bits: int = 0
+    """Of an area of SIZED_AREAS the size that all its addresses have, in bits; 0 where an address may have any size."""
 
     @property
     def size_bytes(self) -> int:
@@ -56,8 +59,29 @@ _ROWS = (
 AREAS: dict[str, Area] = {row[0]: Area(*row) for row in _ROWS}
 FLAG_AREAS = frozenset(("CF", "TF", "CNF"))
 """Areas that count bits."""
-PORTABLE_AREAS = frozenset("IQM")
+_SIZES = {"X": 1, "B": 8, "W": 16, "D": 32, "L": 64}
+_SIZE_TITLES = {"X": "bits", "B": "bytes", "W": "words", "D": "double words", "L": "long words"}
+SIZED_AREAS = {name: Area(name, 0, AREAS[area].count, 8, title=f"{AREAS[area].title}, {_SIZE_TITLES[size]}", address_bits=bits)
+               for area in "IQM" for size, bits in _SIZES.items() for name in (f"%{area}{size}",)}
+"""Areas in place of I, Q and M on a PLC that has memory of its own for each size of address, as those of OpenPLC and Beremiz
+have: `%QX0.0` is bit 0 of the area %QX, and no bit of `%QW0`, the first word of the area %QW.  A map of areas has either I, Q
+and M or of these the ones that the program names; `parse_address` goes by that.  Each goes as far as the shared area does.
+
+Sources: OpenPLC's runtimes keep bool_output, byte_output, int_output, dint_output, lint_output and their like for inputs and
+memory (image_tables); matiec makes of each located name a variable of its own, `__QX0_0` and `__QW0`."""
+PORTABLE_AREAS = frozenset(("I", "Q", "M", *SIZED_AREAS))
 """Areas that count bytes and are written with a size, as in `%MW10`."""
+FIXED_OR_SIZED_AREAS: Mapping[str, Area] = {**AREAS, **SIZED_AREAS}
+"""All areas that one program or another has without an E bank or a unit, for what is said of them."""
+INPUT_AREAS = frozenset(name for name in PORTABLE_AREAS if name.lstrip("%").startswith("I"))
+OUTPUT_AREAS = frozenset(name for name in PORTABLE_AREAS if name.lstrip("%").startswith("Q"))
+SHARED_AREAS = frozenset("IQM")
+"""Those in which addresses of all sizes lie."""
+
+
+def with_sizes_apart(areas: Mapping[str, Area], sized: Iterable[Area]) -> dict[str, Area]:
+    """Areas of a PLC that keeps sizes of addresses apart: without I, Q and M, and with some of SIZED_AREAS."""
+    return {**{name: area for name, area in areas.items() if name not in SHARED_AREAS}, **{area.name: area for area in sized}}
 
 SLOTS_OFFSET = 180224
 """Where the slots of globals and instances begin."""
@@ -174,6 +198,11 @@ class Address:
         return self.number % 8 if self.area in FLAG_AREAS else (self.bit or 0) % 8
 
     def __str__(self) -> str:
+        if self.area in SIZED_AREAS:
+            if self.bit is None:
+                return f"{self.area}{self.number}"
+            number, rest = divmod(8 * self.number + self.bit, max(8, SIZED_AREAS[self.area].address_bits))
+            return f"{self.area}{number}.{rest}"
         if self.area in PORTABLE_AREAS:
             size = "X" if self.bit is not None else {8: "B", 16: "W", 32: "D", 64: "L"}[self.size_bits or 8]
             return f"%{self.area}{size}{self.number}" + (f".{self.bit}" if self.bit is not None else "")
@@ -188,7 +217,6 @@ class Address:
 _OMRON = re.compile(r"%?\s*(CIO|DM|D|W|H|A|TF|CNF|CF|T|C|E([0-9A-F])_|E([0-9A-F])\s*:)?\s*(\d+)(?:\.(\d+))?", re.I)
 _PORTABLE = re.compile(r"%\s*([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?", re.I)
 _MAILBOX = re.compile(rf"%?\s*({MAILBOX_NAME.pattern})\s*(\d+)(?:\.(\d+))?", re.I)
-_SIZES = {"X": 1, "": 1, "B": 8, "W": 16, "D": 32, "L": 64}
 
 
 class AddressError(ValueError):
@@ -198,17 +226,17 @@ class AddressError(ValueError):
 def parse_address(text: str, areas: Mapping[str, Area] = AREAS, words: bool = False) -> Address:
     """The address that `text` names: `D100`, `%D100`, `CIO 1519.03`, `1519.03`, `E0_100`, `%MW10`, `%IX0.3`.
 
-    `areas` are the areas of the PLC, with those of its units; E banks are always known.  A bit of a larger unit is
-    returned as a bit of one of its bytes; with `words` what counts behind %IX, %QX and %MX is words, %IX1.15 the last bit of the
-    second one.  Raises AddressError for text that is no address, and for an address outside its
-    area.
+    `areas` are the areas of the PLC, with those of its units; E banks are always known.  If I, Q and M are not among them, the
+    address lies in one of SIZED_AREAS.  A bit of a larger unit is returned as a bit of one of its bytes; with `words` what counts
+    behind %IX, %QX and %MX is words, %IX1.15 the last bit of the second one.  Raises AddressError for text that is no address,
+    and for an address outside its area.
 
     >>> str(parse_address("1519.3")), str(parse_address("DM100")), str(parse_address("%MW4.15"))
     ('CIO 1519.03', 'D100', '%MX9.7')
     """
     text = text.strip()
     if match := _PORTABLE.fullmatch(text):
-        return _portable(match, words)
+        return _portable(match, areas, words)
     match = _OMRON.fullmatch(text)
     if not match:
         mailbox = _MAILBOX.fullmatch(text)
@@ -223,16 +251,19 @@ def parse_address(text: str, areas: Mapping[str, Area] = AREAS, words: bool = Fa
     return check_address(Address(name, whole_number(match[4]), bit))
 
 
-def _portable(match: re.Match[str], words: bool) -> Address:
-    area, size = match[1].upper(), _SIZES[match[2].upper()]
+def _portable(match: re.Match[str], areas: Mapping[str, Area], words: bool) -> Address:
+    area, letter = match[1].upper(), match[2].upper() or "X"
+    size = _SIZES[letter]
+    if area not in areas:
+        area = f"%{area}{letter}"
     if size == 1:
         if match[4] is None and match[2] == "":
-            raise AddressError(f"%{area}{match[3]} has no size: write %{area}X{match[3]}.0 or %{area}W{match[3]}")
+            raise AddressError(f"%{match[1]}{match[3]} has no size: write %{match[1]}X{match[3]}.0 or %{match[1]}W{match[3]}")
         number, bit = whole_number(match[3]), whole_number(match[4] or "0")
         if words and bit > 15:
             raise AddressError(f"bit {bit} does not exist; bits of a word are 0 to 15")
-        return check_address(Address(area, 2 * number + bit // 8, bit % 8, 1) if words else Address(area, number, bit, 1))
-    whole = check_address(Address(area, whole_number(match[3]), None, size))
+        return check_address(Address(area, 2 * number + bit // 8, bit % 8, 1) if words else Address(area, number, bit, 1), areas)
+    whole = check_address(Address(area, whole_number(match[3]), None, size), areas)
     if match[4] is None:
         return whole
     bit = whole_number(match[4])
@@ -247,6 +278,8 @@ def check_address(address: Address, areas: Mapping[str, Area] = AREAS) -> Addres
         area = areas[address.area]
     elif address.area in E_NAMES:
         area = e_bank(address.area, 0)
+    elif address.area in PORTABLE_AREAS:
+        raise AddressError(f"the program names no address such as {address}, and each size of address has memory of its own here")
     else:
         raise AddressError(f"there is no E bank {address.area[1:]}; banks are 0 to {E_BANKS - 1:X}")
     if area.unit_bits == 1 and address.bit is not None:
@@ -257,6 +290,6 @@ def check_address(address: Address, areas: Mapping[str, Area] = AREAS) -> Addres
     size = max(1, address.size_bits // 8) if area.unit_bits == 8 else 1
     step = size if address.bit is None else 1
     if address.number < 0 or (address.number + 1) * step > area.count:
-        shown = area.name if area.unit_bits != 8 else f"%{area.name}"
+        shown = f"%{area.name}" if area.name in SHARED_AREAS else area.name
         raise AddressError(f"{shown} ends at {area.count // step - 1}; {address.number} does not exist")
     return address

@@ -227,9 +227,9 @@ QUESTIONS = {
                         "pointer"),
     "dates_take_durations": ("D#2024-12-31 + T#1d: a DATE and a TIME", "an error",
                              "the DATE so much later or earlier, which may have hours in it"),
-    "sizes_apart": ("a AT %QX0.0 beside b AT %QW0: a bit of the word", "shares memory with it",
-                    "shares memory with it, with a warning (S0691): on a PLC of OpenPLC or Beremiz each size of address has "
-                    "memory of its own"),
+    "sizes_apart": ("a AT %QX0.0 beside b AT %QW0: addresses of two sizes", "a is a bit of b: one memory for all sizes",
+                    "a is no part of b: each of %QX, %QB, %QW, %QD and %QL has memory of its own, as on a PLC of OpenPLC or "
+                    "Beremiz, and so have those of %I and %M"),
     "callables_apart": ("DAY_OF_MONTH(d), where a variable that is no instance has the name of the function", "an error",
                         "the function"),
     "short_names": ("DT, TOD, LDT, LTOD as names", "an error", "taken, with a warning (S0193)"),
@@ -304,7 +304,7 @@ _ROWS = (
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
             constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True,
-            short_references=True, doubled_quotes=True),
+            sizes_apart=True, short_references=True, doubled_quotes=True),
     Dialect("rusty", "programs for RuSTy", ("rusty",), reals_of_other_widths=True, loop_ends_each_pass=True,
             loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area, Mailbox, e_bank
+from fbvm.base.areas import AREAS, PAGE_BYTES, SIZED_AREAS, SLOTS_OFFSET, Area, Mailbox, e_bank, with_sizes_apart
 from fbvm.base.types import Field, Type
 from fbvm.code.operations import Block
 
@@ -75,18 +75,21 @@ class Layout:
     """How large the parts of the flat buffer of a PLC are, and where they begin.
 
     `slots_size` is the number of bytes of variables, instances, frames and leases; `e_banks` names the optional banks of the
-    E area that the program uses; `mailboxes` are areas that units bring."""
+    E area that the program uses; `mailboxes` are areas that units bring.  `sized` names those of SIZED_AREAS that the program
+    uses, which are there in place of I, Q and M; None where sizes of addresses share these."""
 
     slots_size: int
     e_banks: tuple[str, ...] = ()
     mailboxes: tuple[Mailbox, ...] = ()
+    sized: tuple[str, ...] | None = None
 
     @cached_property
     def areas(self) -> dict[str, Area]:
-        """All areas that a PLC with this image has: behind the slots what units bring, then E banks."""
-        areas = dict(AREAS)
+        """All areas that a PLC with this image has: behind the slots what units bring, then those for sizes, then E banks."""
+        areas = dict(AREAS) if self.sized is None else with_sizes_apart(AREAS, ())
         at = _page_up(SLOTS_OFFSET + self.slots_size)
-        for area in (*(box.at(0) for box in self.mailboxes), *(e_bank(name, 0) for name in self.e_banks)):
+        for area in (*(box.at(0) for box in self.mailboxes), *(SIZED_AREAS[name] for name in self.sized or ()),
+                     *(e_bank(name, 0) for name in self.e_banks)):
             areas[area.name] = replace(area, offset=at)
             at = _page_up(at + area.size_bytes)
         return areas

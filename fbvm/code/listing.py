@@ -41,6 +41,8 @@ def _layout(image: Image) -> Iterator[str]:
     layout = image.layout
     yield f"layout    {layout.size} bytes: {layout.slots_size} of slots from {SLOTS_OFFSET}" + (
         f", E banks {' '.join(layout.e_banks)}" if layout.e_banks else "")
+    if layout.sized:
+        yield f"apart     {' '.join(f'{name} at {layout.areas[name].offset}' for name in layout.sized)}"
     for box in layout.mailboxes:
         yield f"mailbox   {box.name}: {box.head_words} words, then {box.slots} slots of {box.slot_words}"
 
@@ -100,6 +102,9 @@ def _absolute(offset: int, areas: dict[str, Area], bit: int | None = None) -> st
             number, odd = divmod(offset - area.offset, area.unit_bits // 8)
             if bit is not None:
                 return str(AreaAddress(area.name, number, 8 * odd + bit))
+            if area.address_bits > 8:
+                number, odd = divmod(number, area.address_bits // 8)
+                return str(AreaAddress(area.name, number, None, area.address_bits)) + (f"+{odd}" if odd else "")
             word = str(AreaAddress(area.name, number, None, 8 if area.unit_bits == 8 else 0))
             return word + ("+1" if odd else "")
     return str(offset) + (f".{bit}" if bit is not None else "")

@@ -205,19 +205,22 @@ def _areas(debug: DebugSession, session: Session | PastSession) -> Container:
 
 
 def _area(debug: DebugSession, session: Session | PastSession, area: Area) -> Body:
+    width = area.address_bits or area.unit_bits
+    units = area.size_bytes * 8 // width
+
     def rows(start: int, count: int) -> list[Body]:
         found: list[Body] = []
-        for number in range(start, min(start + count, area.count)):
-            bits = number * area.unit_bits
-            unit = Place("", BOOL, area.offset + bits // 8, bits % 8 if area.unit_bits == 1 else None)
+        for number in range(start, min(start + count, units)):
+            bits = number * width
+            unit = Place("", BOOL, area.offset + bits // 8, bits % 8 if width == 1 else None)
             name = session.names.address(unit)
             if name:
                 found.append(variable(debug, session, _found(session, name), name))
         return found
 
-    row: Body = {"name": area.name, "value": area.title or f"{area.count} units", "type": "area",
+    row: Body = {"name": area.name, "value": area.title or f"{units} units", "type": "area",
                  "memoryReference": reference_of(area.offset)}  # fmt: skip
-    return _indexed(debug, row, area.count, rows, session.player.find)
+    return _indexed(debug, row, units, rows, session.player.find)
 
 
 def _indexed(debug: DebugSession, row: Body, count: int, rows: Callable[[int, int], list[Body]],

@@ -155,7 +155,9 @@ class Names:
         if area is None or area.unit_bits != 8 or size not in _LETTERS or self._at_area(offset, None):
             return None
         number, rest = divmod(offset - area.offset, size)
-        return find_place({}, self._areas, f"%{area.name}{_LETTERS[size]}{number}") if rest == 0 else None
+        if rest or area.address_bits not in (0, 8 * size):
+            return None
+        return find_place({}, self._areas, f"%{area.name.lstrip('%')[0]}{_LETTERS[size]}{number}")
 
     def _chain(self, offset: int, bit: int | None) -> Iterator[Place]:
         """The variables to which a byte belongs: each is followed by its element or member that holds the byte."""
@@ -264,7 +266,10 @@ def _address(areas: Mapping[str, Area], area: Area, offset: int, bit: int | None
     if area.name in FLAG_AREAS:
         address = Address(area.name, distance * 8 + (bit or 0))
         text = f"{area.name}{address.number}"  # T0005 alone means the present value
+    elif area.address_bits > 8 and bit is None:
+        address = Address(area.name, distance * 8 // area.address_bits, None, area.address_bits)
     elif area.unit_bits == 8:
+        bit = 0 if area.address_bits == 1 and bit is None else bit
         address = Address(area.name, distance, bit, 1 if bit is not None else 8)
     else:
         address = Address(area.name, distance // 2, None if bit is None else distance % 2 * 8 + bit)

@@ -4,7 +4,7 @@ Source: IEC 61131-3 ed. 3 table 15, and the operators of CODESYS, of which some 
 
 from __future__ import annotations
 
-from fbvm.base.areas import FLAG_AREAS
+from fbvm.base.areas import PORTABLE_AREAS
 from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, RefType, StructType, Type, string
 from fbvm.check.calls.arguments import Arguments
 from fbvm.check.expressions import qualified
@@ -113,11 +113,11 @@ def _bit_address(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None
         return None
     facts = scope.facts
     address = facts.directs.get(value) or (facts.variables[value].location if value in facts.variables else None)
-    if address is None or address.area not in _SEGMENTS or address.area in FLAG_AREAS:
+    if address is None or address.area not in PORTABLE_AREAS:
         scope.error("S0405", value, "BITADR asks where in %I, %Q or %M a variable lies, and this lies in none of them",
                     "declare it AT %MX0.0")
         return None
-    facts.constants[call] = _SEGMENTS[address.area] + address.byte_offset() * 8 + (
+    facts.constants[call] = _SEGMENTS[address.area.lstrip("%")[0]] + address.byte_offset() * 8 + (
         address.bit_in_byte() if address.bit is not None else 0)
     return DWORD
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fbvm.base.areas import E_NAMES, FLAG_AREAS, PORTABLE_AREAS, Address, AddressError
+from fbvm.base.areas import E_NAMES, FLAG_AREAS, PORTABLE_AREAS, SIZED_AREAS, Address, AddressError
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
@@ -46,7 +46,7 @@ def completes(context: Context, address: Address, variable: Variable, node: tree
     area, size = _parts(variable)
     where = f"{variable.name} is declared AT {variable.open_location}"
     if area not in _names(address.area):
-        letters = address.area if address.area in PORTABLE_AREAS else _names(address.area)[-1]
+        letters = _names(address.area)[-1]
         context.report.add("S0604", source, node, f"{where}, and {address} lies in another area",
                            f"write {example(variable)}, or declare it  AT %{letters}*",
                            (variable.source, variable.node.start, "declared here"))
@@ -80,6 +80,8 @@ def _names(area: str) -> tuple[str, ...]:
     """The letters that name an area: those of its words, of its flags, and of all banks of E."""
     if area in E_NAMES:
         return area, "EM", "E"
+    if area in SIZED_AREAS:
+        return (area[1],)
     return {"D": ("DM", "D"), "TF": ("TF", "T"), "CNF": ("CNF", "C")}.get(area, (area,))
 
 

@@ -103,7 +103,7 @@ class VarConfig:
         address = location_of(self.context, shown, spot.type, source)
         if address is not None and variable.own is not None:
             self.report.add("S0193", source, location, f"{variable.name} is not declared AT %I*, %Q* or %M*, and lies here",
-                            f"declare it  AT %{address.area if address.area in PORTABLE_AREAS else 'M'}*")
+                            f"declare it  AT %{address.area.lstrip('%')[0] if address.area in PORTABLE_AREAS else 'M'}*")
             return address
         return address if address is not None and completes(self.context, address, variable, location, source) else None
 

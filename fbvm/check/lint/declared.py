@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fbvm.base.areas import AREAS, FLAG_AREAS, Address
+from fbvm.base.areas import FIXED_OR_SIZED_AREAS, FLAG_AREAS, Address
 from fbvm.base.types import BOOL, ArrayType, Type, base, fold
 from fbvm.check.expressions.values import is_any
 from fbvm.check.lint.body import Body
@@ -109,37 +109,26 @@ def result(body: Body) -> None:
 # --- places in memory -------------------------------------------------------------------------------------------------
 
 
-def overlaps(report: Report, variables: Iterable[Variable], sizes_apart: bool) -> None:
+def overlaps(report: Report, variables: Iterable[Variable]) -> None:
     """Warn of located variables of one list of declarations that share memory, unless one is a part of the other.
 
-    Parts are bits of words, and elements of arrays, structures and bit strings.  With `sizes_apart` there are none among
-    addresses of %I, %Q and %M whose letters for the size differ."""
+    Parts are bits of words, and elements of arrays, structures and bit strings."""
     spans: dict[str, list[tuple[int, int, Variable]]] = {}
     for variable in variables:
         hidden = variable.name.startswith("$")  # what rungs have at an address: others may have it as another type
-        if variable.location is not None and variable.location.area in AREAS and not hidden:
+        if variable.location is not None and variable.location.area in FIXED_OR_SIZED_AREAS and not hidden:
             first = _first_bit(variable.location)
             size = 1 if base(variable.type) == BOOL else variable.type.size * 8
             spans.setdefault(variable.location.area, []).append((first, first + size, variable))
     for placed in spans.values():
         placed.sort(key=lambda span: span[:2])
         for (first, end, lower), (second, other_end, upper) in _neighbours(placed):
-            apart = sizes_apart and _size(lower) != _size(upper)
-            if apart or _clash((first, end, lower.type), (second, other_end, upper.type)):
+            if _clash((first, end, lower.type), (second, other_end, upper.type)):
                 later, earlier = sorted((lower, upper), key=lambda v: -v.node.start)
                 report.add("S0691", later.source, later.node,
                            f"{later.name} at {later.location} shares memory with {earlier.name} at {earlier.location}, "
-                           f"which is {earlier.type}", _APART if apart else "",
+                           f"which is {earlier.type}", "",
                            (earlier.source, earlier.node.start, "declared here"))
-
-
-_APART = "on a PLC of OpenPLC or Beremiz each size of address has memory of its own: give one of them a higher number"
-
-
-def _size(variable: Variable) -> int:
-    """The bits of the size that the address of a variable names."""
-    assert variable.location is not None
-    return variable.location.size_bits
 
 
 def _neighbours(placed: list[tuple[int, int, Variable]]) -> Iterable[tuple[tuple[int, int, Variable], ...]]:

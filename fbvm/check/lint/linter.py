@@ -43,8 +43,7 @@ def lint_steps(context: Context, program: str | None) -> Iterator[None]:
         flow(body)
         writes.body(body)
         declared.result(body)
-        declared.overlaps(report, [variable for variable in pou.order if variable.owner is pou],
-                          context.project.dialect.sizes_apart)
+        declared.overlaps(report, [variable for variable in pou.order if variable.owner is pou])
     for pou in own:
         yield
         declared.unused(report, pou, uses)
@@ -66,7 +65,7 @@ def _globals(context: Context, uses: declared.Uses) -> None:
             by_source.setdefault(variable.source.name, []).append(variable)
             declared.never_called(context.report, variable, uses)
     for variables in by_source.values():
-        declared.overlaps(context.report, variables, context.project.dialect.sizes_apart)
+        declared.overlaps(context.report, variables)
 
 
 def _tasks(context: Context, own: list[Pou]) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from fbvm.base.areas import Address
+from fbvm.base.areas import OUTPUT_AREAS, Address
 from fbvm.base.types import BOOL, base
 from fbvm.check.expressions.writes import place
 from fbvm.check.lint.body import Body
@@ -90,7 +90,7 @@ class Writes:
 def _is_coil(key: Key) -> bool:
     """True for a bit that is visible outside of its body, and for any output address."""
     if isinstance(key, Address):
-        return key.bit is not None or key.area == "Q"
+        return key.bit is not None or key.area in OUTPUT_AREAS
     return isinstance(key, Variable) and key.owner is None and base(key.type) == BOOL
 
 

@@ -8,7 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from fbvm.base.areas import AREAS, E_NAMES, Address, Area, Mailbox, e_bank, parse_address
+from fbvm.base.areas import (
+    AREAS,
+    E_NAMES,
+    SIZED_AREAS,
+    Address,
+    Area,
+    Mailbox,
+    e_bank,
+    parse_address,
+    with_sizes_apart,
+)
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import EnumType, RefType, StructType, Type, derives, fold
@@ -62,6 +72,10 @@ class Context:
         self.areas: dict[str, Area] = {**AREAS, **{name: e_bank(name, 0) for name in E_NAMES},
                                        **{name: box.at(0) for name, box in mailboxes.items()}}
         """Areas that a program may name; where the optional ones lie is known after layout."""
+        if project.dialect.sizes_apart:
+            self.areas = with_sizes_apart(self.areas, SIZED_AREAS.values())
+        self.sized: set[str] = set()
+        """Names of the areas for one size of address that the program uses."""
         self.e_banks: set[str] = set()
         """Names of the banks of E memory that the program uses."""
         self.mailboxes: dict[str, Mailbox] = {}
@@ -93,12 +107,14 @@ class Context:
     # --- areas, numbers ---------------------------------------------------------------------------------------------
 
     def use_area(self, name: str) -> None:
-        """Record that the program names an area: a PLC has E banks and mailboxes of units only then."""
+        """Record that the program names an area: a PLC has E banks, mailboxes of units and areas for a size only then."""
         self.project.dependencies.record("area", name)
         if name in self.project.libraries.mailboxes:
             self.mailboxes[name] = self.project.libraries.mailboxes[name]
         elif name in E_NAMES:
             self.e_banks.add(name)
+        elif name in SIZED_AREAS:
+            self.sized.add(name)
 
     def new_type_identifier(self) -> int:
         """The number that begins each instance of one more block or program."""

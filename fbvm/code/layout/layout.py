@@ -104,7 +104,8 @@ def _frames_and_leases(checker: Checker, end: int) -> Placement:
         start = SLOTS_OFFSET + end + LEASE_BYTES
         stack = FrameStack(start, start + stack_bytes(largest), leases, SLOTS_OFFSET + end)
         leases, end = leases + 1, stack.end - SLOTS_OFFSET
-    placement = Placement(Layout(end, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())),
+    placement = Placement(Layout(end, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values()),
+                                 tuple(sorted(checker.sized)) if checker.project.dialect.sizes_apart else None),
                           objects=Objects((), leases, leases_at), stack=stack)
     if stack is not None:
         placement.initial.append((stack.row_at, b"".join(n.to_bytes(4, "little") for n in (stack.start, stack.start, 1, 1))))

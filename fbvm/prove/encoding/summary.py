@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from fbvm.base.areas import AREAS
+from fbvm.base.areas import AREAS, INPUT_AREAS
 from fbvm.base.types import ArrayType, Field, StructType
 from fbvm.code.image import Image
 from fbvm.engine.depths import with_recursion_room
@@ -226,8 +226,8 @@ class _Fixpoint:
 
 def input_places(image: Image) -> list[tuple[int, int, int | None]]:
     """The places (offset, bytes, bit) of inputs: %I, and VAR_INPUT of programs."""
-    area = AREAS["I"]
-    found: list[tuple[int, int, int | None]] = [(area.offset, area.size_bytes, None)]
+    found: list[tuple[int, int, int | None]] = [(area.offset, area.size_bytes, None)
+                                                for area in image.layout.areas.values() if area.name in INPUT_AREAS]
     for task in image.tasks:
         for run in task.programs:
             symbol = image.symbols.get(run.name.upper())

@@ -27,7 +27,8 @@ def describe(source: ScanSource, head: Mapping[str, Any]) -> int:
         source.symbols = symbols.from_data(head)
         extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
         boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
-        layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes)
+        sized = head.get("sized")
+        layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes, None if sized is None else tuple(sized))
         source.areas, size = layout.areas, layout.size
         if not 0 <= layout.slots_size <= LARGEST_BYTES:
             raise ValueError(f"{layout.slots_size} bytes of slots")

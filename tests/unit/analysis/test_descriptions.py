@@ -16,6 +16,7 @@ from fbvm.analysis.hover import hover, hover_of_word, located
 from fbvm.analysis.program import Program
 from fbvm.analysis.references import Refusal, called, callers, declared_at, references, rename
 from fbvm.analysis.tokens import address_hints, tokens
+from fbvm.base.areas import parse_address
 
 PLANT = """\
 TYPE
@@ -150,8 +151,31 @@ def test_who_calls_what_is_no_pou_or_is_gone() -> None:
     for key in (("global", "", "TOTAL"), ("pou", "", "GONE"), ("variable", "", "MAIN", "P1")):
         assert list(callers(program, key)) == []
     assert list(called(program, ("pou", "", "GONE"))) == []
-    assert located(program, "nonsense") == [] and describe.address("nonsense", []) == ""
-    assert describe.address("D5", ["VAR a", "VAR b"]) == "**D5**: data words\n\n`VAR a`\n\n`VAR b`"
+    assert located(program, "nonsense") == [] and hover_of_word(program, "nonsense", 1) is None
+    assert describe.address(parse_address("D5"), ["VAR a", "VAR b"]) == "**D5**: data words\n\n`VAR a`\n\n`VAR b`"
+
+
+@each_of("dialect, shown, other, offered", [
+    ("standard", "**%QW3**: outputs of portable programs", "**%QX6.2**: outputs of portable programs", ("%QW4", "%Q")),
+    ("matiec", "**%QW3**: outputs of portable programs, words", "**%QW3.2**: outputs of portable programs, words",
+     ("%QW4", "%QW")),
+])
+def test_an_address_is_described_as_its_plc_has_it(dialect: str, shown: str, other: str, offered: tuple[str, ...]) -> None:
+    text = "PROGRAM Main\nVAR lamp AT %QX6.2 : BOOL; speed AT %QW3 : INT; END_VAR\nlamp := %QW3.2;\nEND_PROGRAM\n"
+    program = Program(dialect=dialect)
+    program.replace("plc.st", text)
+    program.check_all()
+    found = hover(program, "plc.st", text.index("speed AT %QW3") + len("speed AT %"))
+    assert found is not None and found.markdown.split("\n\n")[0] == shown
+    found = hover(program, "plc.st", text.index("%QW3.2") + 1)
+    assert found is not None and found.markdown.split("\n\n")[0] == other
+    assert [each.location is not None and str(each.location) for each in located(program, "%QX6.2")] == ["%QX6.2"]
+    assert bool(located(program, "%QW3.2")) == (dialect == "standard")
+    half = text.replace("END_VAR", "new AT %")
+    program.replace("plc.st", half)
+    program.check_all()
+    labels = [item.label for item in complete(program, "plc.st", half.index("new AT %") + len("new AT %"))]
+    assert set(offered) <= set(labels) and ("%Q" in labels) == (dialect == "standard")
 
 
 @each_of("text, said", [

@@ -11,15 +11,45 @@ from fbvm.base.areas import (
     AREAS,
     E_BANKS,
     E_WORDS,
+    SIZED_AREAS,
     SLOTS_OFFSET,
     AddressError,
     Mailbox,
     e_bank,
     parse_address,
     refusal,
+    with_sizes_apart,
 )
 
 MAILBOX = Mailbox("BOX", 4, 3, 20)
+
+
+APART = with_sizes_apart(AREAS, SIZED_AREAS.values())
+
+
+@each_of("text, area, offset, bit, shown", [
+    ("%QX3.5", "%QX", 3, 5, "%QX3.5"), ("%Q3.5", "%QX", 3, 5, "%QX3.5"), ("%QB3", "%QB", 3, 0, "%QB3"),
+    ("%QW3", "%QW", 6, 0, "%QW3"), ("%ID3", "%ID", 12, 0, "%ID3"), ("%ML3", "%ML", 24, 0, "%ML3"),
+    ("%QW3.12", "%QW", 7, 4, "%QW3.12"), ("%MB3.2", "%MB", 3, 2, "%MB3.2"), ("%ML1.63", "%ML", 15, 7, "%ML1.63"),
+    ("D7", "D", 14, 0, "D7"),
+])
+def test_each_size_of_address_has_an_area_where_sizes_are_apart(text: str, area: str, offset: int, bit: int, shown: str) -> None:
+    address = parse_address(text, APART)
+    assert (address.area, address.byte_offset(), address.bit_in_byte(), str(address)) == (area, offset, bit, shown)
+    assert parse_address(shown, APART) == address
+
+
+@each_of("text, said", [
+    ("%QW2048", "%QW ends at 2047; 2048 does not exist"), ("%QB4096", "%QB ends at 4095; 4096 does not exist"),
+    ("%QX0.8", "bit 8 does not exist; bits are 0 to 7"), ("%QW0.16", "bit 16 does not exist; bits of %QW0 are 0 to 15"),
+    ("QW5", "'QW5' is not an address"),
+    ("%Q5", "%Q5 has no size: write %QX5.0 or %QW5"),
+    ("%MW1", "the program names no address such as %MW1, and each size of address has memory of its own here"),
+])
+def test_a_size_that_is_not_there_is_said(text: str, said: str) -> None:
+    with pytest.raises(AddressError) as raised:
+        parse_address(text, with_sizes_apart(AREAS, [area for name, area in SIZED_AREAS.items() if name != "%MW"]))
+    assert str(raised.value) == said
 
 
 def test_areas_lie_one_behind_the_other() -> None:

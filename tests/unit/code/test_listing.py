@@ -75,6 +75,18 @@ def test_e_banks_are_named() -> None:
     ]
 
 
+def test_areas_for_sizes_are_named() -> None:
+    sized = Layout(10, ("E0",), (), ("%QW", "%QX"))
+    shown = listing(Image(sized, (), (), {}, ((184320, b"\1"), (184323, b"\2"), (188416, b"\4")), (), image().sites))
+    assert shown.split("\n") == [
+        "layout    258048 bytes: 10 of slots from 180224, E banks E0",
+        "apart     %QW at 184320 %QX at 188416",
+        "initial   %QW0         01",
+        "initial   %QW1+1       02",
+        "initial   %QX0         04",
+    ]
+
+
 def test_statements_stand_beside_their_lines() -> None:
     t1 = ("tmp", "i16", 1)
     code: Block = (

@@ -80,6 +80,15 @@ def test_an_input_of_a_subrange_has_its_ends_and_nothing_behind_them() -> None:
     assert words == {-4: "unreachable", -3: "reached", 5: "reached", 6: "unreachable"}
 
 
+def test_inputs_of_all_sizes_are_inputs_where_these_are_apart() -> None:
+    text = ("PROGRAM Main VAR a AT %IX0.0 : BOOL; b AT %IW0 : INT; q AT %QX0.0 : BOOL; r AT %QW0 : INT; END_VAR\n"
+            "q := a; r := b; END_PROGRAM")
+    made = compile_text(text, dialect="matiec").image
+    assert made is not None
+    for wanted in ("Main.q AND Main.r = 6", "Main.q AND Main.r = 7", "NOT Main.q AND Main.r = 7"):
+        assert asked(made, REACH, wanted).word == "reached"
+
+
 def test_what_is_never_reached_is_said_to_be_unreachable() -> None:
     verdict = asked(program(COUNTER.replace("5;", "5; IF n > 9 THEN n := 0; END_IF"), COUNTED), REACH, "Main.n = 11")
     assert (verdict.word, verdict.is_good) == ("unreachable", False)

@@ -69,6 +69,22 @@ def test_values_are_read_by_name() -> None:
     assert trace.at(2).read("CIO 0.00") is False
 
 
+def test_where_sizes_are_apart_addresses_are_those_of_their_size() -> None:
+    text = "PROGRAM Main VAR lamp AT %QX0.1 : BOOL; n AT %QW0 : INT; END_VAR n := n + 1; lamp := n > 1; END_PROGRAM"
+    made = compile_text(text, dialect="matiec").image
+    assert made is not None
+    plc, file = Plc(made), io.BytesIO()
+    with_trace = TraceWriter(plc, file, Depth.SCANS)
+    plc.run(scans=3)
+    with_trace.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    assert [[trace.at(scan).read(name) for name in ("%QW0", "%QX0.1", "%QX0.0")] for scan in range(3)] == [
+        [1, False, False], [2, True, False], [3, True, False]]
+    assert trace.names.address(trace.find("Main.lamp")) == "%QX0.1"
+    with pytest.raises(UnknownPlace, match="names no address such as %QB0"):
+        trace.at(0).read("%QB0")
+
+
 @pytest.mark.slow
 def test_a_scan_that_is_not_there() -> None:
     with pytest.raises(ValueError, match="scan 10 is not in the trace, which has scans 0 to 9"):

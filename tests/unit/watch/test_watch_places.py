@@ -265,3 +265,27 @@ def test_parentheses_go_so_deep_and_not_deeper(plc: Plc) -> None:
     assert parse_condition(deep, plc.find).holds(plc.read)
     with pytest.raises(ConditionError):
         parse_condition(f"({deep})", plc.find)
+
+
+APART = """PROGRAM Main
+VAR speed AT %QW2 : INT; row AT %MW0 : ARRAY[0..3] OF INT; lamp AT %QX0.3 : BOOL; level AT %MD7 : DINT; p : REF_TO WORD; END_VAR
+p := REF(%MW9);
+END_PROGRAM"""
+
+
+@each_of("text, name", [
+    ("%QW2", "Main.speed"), ("%QW3", "%QW3"), ("%QX0.3", "Main.lamp"), ("%QX0.4", "%QX0.4"),
+    ("%MW2", "Main.row[2]"), ("%MD7", "Main.level"),
+    ("%MD8", "%MD8"), ("%MW9", "%MW9"),
+])
+def test_where_sizes_are_apart_a_byte_has_the_name_of_its_size(text: str, name: str) -> None:
+    made = compile_text(APART, dialect="matiec", lint=False)
+    assert made.image is not None
+    plc = Plc(made.image)
+    names, where = Names.of(made.image, plc.memory.areas), place(plc, text)
+    found = names.at(where.offset, where.bit)
+    assert found is not None and (found.name, found.offset) == (name, where.offset)
+    plc.scan()
+    assert names.read(plc.read, place(plc, "Main.p")) == "-> %MW9"
+    with pytest.raises(UnknownPlace, match="the program names no address such as %IW0"):
+        place(plc, "%IW0")
