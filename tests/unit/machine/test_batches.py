@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from test_units_in_code import MS, Rig, image
@@ -11,6 +12,8 @@ from toy_unit import Echoing, _Echo
 
 from fbvm import Etn21, Plc, compile_text
 from fbvm.engine.native import engine as native
+from fbvm.engine.native.scans.code import ALL_OVER
+from fbvm.machine.batch import BatchPlace, BatchScans, place_of
 from fbvm.machine.plc import Mode
 from fbvm.run import batches, loop, watchdog
 from fbvm.run.loop import run_all
@@ -97,6 +100,35 @@ class Ran:
 SELDOM: list[dict[str, Any]] = [{"every": every} for every in (40, 33, 50, 40, 29, 61, 40)]
 OTHERS: list[dict[str, Any]] = [
     {"every": 17, "interval": "INTERVAL := T#7ms, "}, {"every": 90, "trap": 55}, {"every": 5, "slow": False}]  # fmt: skip
+
+
+def test_machine_code_says_who_wants_something_and_goes_on_behind_it() -> None:
+    """A point below 0 is no trap; the scans of the PLCs begin with the first, and again behind each that wanted something."""
+    answers = iter([(1 << 32) | 0xFFFF_FFFE, (2 << 32) | 7, (4 << 32) | 0x8000_0000, ALL_OVER])
+    calls: list[tuple[list[int], int, int, int]] = []
+
+    def call(rows_at: int, first: int, count: int, now_ns: int) -> int:
+        calls.append((list((ctypes.c_int64 * 10).from_address(rows_at)), first, count, now_ns))
+        return next(answers)
+
+    places = [SimpleNamespace(call=call, scans=SimpleNamespace(parameters_at=1000 + number)) for number in range(5)]
+    batch = BatchScans([(cast(BatchPlace, place), 50 * number) for number, place in enumerate(places)])
+    assert list(batch.scan(9)) == [(1, -2), (2, 7), (4, -0x8000_0000)]
+    assert calls[0] == ([1000, 0, 1001, 50, 1002, 100, 1003, 150, 1004, 200], 0, 5, 9)
+    assert [first for _, first, _, _ in calls] == [0, 2, 3, 5]
+
+
+@pytest.mark.slow
+def test_a_plc_that_leaves_a_batch_is_up_to_date() -> None:
+    rig = Rig(image(), (0,), virtual_time=False)
+    for scan in range(4):
+        rig.plc.scan(scan * MS)
+    place, before = place_of(rig.plc), rig.plc._io.skipped
+    assert place is not None
+    place.leave(rig.plc, 0, 0)
+    assert (rig.plc.scans, rig.plc.now_ns, rig.plc._io.skipped) == (4, 3 * MS, before)
+    place.leave(rig.plc, 3, 8 * MS)
+    assert (rig.plc.scans, rig.plc.now_ns, rig.plc._io.skipped) == (7, 8 * MS, before + 3)
 
 
 @pytest.mark.slow

@@ -149,6 +149,20 @@ def test_who_wants_every_scan_gets_it(monkeypatch: pytest.MonkeyPatch, disturb: 
     assert plc.run(scans=10) == "scans" and plc.scans == 20
 
 
+@pytest.mark.parametrize("disturb", [
+    lambda plc: plc.phases.append(lambda plc, phase: None), lambda plc: plc.force("D7", 5),
+    lambda plc: plc.attach(Etn21(0, "192.168.250.2"), LoopNetwork()), lambda plc: setattr(plc, "mode", Mode.PROGRAM),
+    lambda plc: plc.cold_start(),
+], ids=["phases", "force", "unit", "mode", "first scan"])  # fmt: skip
+def test_who_wants_every_scan_gets_it_with_breakpoints_too(disturb: Any) -> None:
+    plc = Plc(IMAGE, engine="native")
+    plc.scan()
+    plc.breakpoints.line("Other", when="P.n = 9999")
+    assert plc.scan_many(5) and plc.scans == 6
+    disturb(plc)
+    assert not plc.scan_many(5) and plc.scans == 6
+
+
 def test_after_a_restart_the_first_scan_is_one_again() -> None:
     many, one = Plc(IMAGE, engine="native"), single(Plc(IMAGE, engine="native"))
     for plc in (many, one):

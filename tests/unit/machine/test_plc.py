@@ -226,6 +226,13 @@ def test_a_force_holds_before_and_after_the_program(plc: Plc) -> None:
     assert (plc.read("Main.n"), plc.forces) == (51, {})
 
 
+def test_a_force_is_there_again_before_the_program_whatever_was_written_meanwhile(plc: Plc) -> None:
+    plc.force("Main.n", 50)
+    plc.write("Main.n", -9)
+    plc.scan()
+    assert plc.read("Main.done") is True
+
+
 def test_a_forced_bit_leaves_its_neighbours(plc: Plc) -> None:
     plc.force("CIO 100.03", True)
     plc.write("CIO 100", 0)
@@ -473,6 +480,42 @@ def test_connections_do_not_travel_in_time(plc: Plc) -> None:
     plc.attach(_Echo(), _Wire())
     with pytest.raises(ValueError, match="do not travel in time"):
         plc.restore(state)
+
+
+def test_a_plc_goes_on_from_a_state_with_the_units_that_belong_to_it(plc: Plc) -> None:
+    plc.attach(first := _Echo(), _Wire())
+    plc.run(scans=3)
+    state, attached = plc.snapshot(), list(plc.units)
+    plc.run(scans=2)
+    plc.resume(state)
+    assert (plc.units, plc.scans, plc.read("D300")) == ([], 3, 3)
+    plc.scan()
+    assert plc.read("D300") == 3
+    plc.resume(state, attached)
+    plc.scan()
+    assert [each.unit for each in plc.units] == [first] and plc.read("D300") == 4
+
+
+def test_a_recorder_is_told_of_each_refresh_and_of_the_events_in_it(plc: Plc) -> None:
+    class Refreshes(_Told):
+        def __init__(self) -> None:
+            super().__init__()
+            self.told: list[object] = []
+
+        def received(self, unit: int, events: Sequence[Event]) -> None:
+            self.told.append((unit, list(events)))
+
+        def refresh_begins(self) -> None:
+            self.told.append("begins")
+
+        def refresh_ended(self) -> None:
+            self.told.append("ended")
+
+    recorder = Refreshes()
+    plc.record_inputs(recorder)
+    plc.attach(_Echo(), _Wire())
+    plc.run(scans=2)
+    assert recorder.told == ["begins", "ended", "begins", (0, [Sent(1, 1)]), "ended"]
 
 
 def test_real_connections_in_virtual_time_are_refused(plc: Plc) -> None:
