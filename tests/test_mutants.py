@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
 
+import coverage
 import pytest
 
 HOUSE = Path(__file__).resolve().parent.parent
@@ -22,6 +24,8 @@ def load() -> Any:
 
 
 m = load()
+from reached import Reached  # noqa: E402
+
 PYTHON = '''"""Text with 1 < 2."""
 LIMIT: int = 3  # ö
 
@@ -117,13 +121,12 @@ def test_a_copy_runs_the_mutant_and_is_restored(tmp_path: Path) -> None:
     copy = m.Copy(tmp_path)
     path = Path("fbvm/wire/modbus.py")
     text = (HOUSE / path).read_text(encoding="utf-8")
-    tests = ["tests/unit/wire"]
-    assert copy.passes(tests, "not slow", 100)
+    run = (["tests/unit/wire"], "not slow", 100)
     start = text.index("\nMAX_PDU_BYTES = ") + 1
     broken = m.Mutant(path, start, text.index("\n", start), "MAX_PDU_BYTES = 9")
-    assert not copy.survives(broken, tests, "not slow", 100)
+    assert copy.finds(broken, *run)
     same = m.Mutant(path, len(text), len(text), "\n")
-    assert copy.survives(same, tests, "not slow", 100)
+    assert not copy.finds(same, *run)
     assert (HOUSE / path).read_text(encoding="utf-8") == (copy.folder / path).read_text(encoding="utf-8") == text
 
 
@@ -142,11 +145,40 @@ def test_what_the_quick_tests_do_not_find_is_tried_with_the_slow_ones(tmp_path: 
     for file in (copy.folder / "tests" / "unit" / "net").glob("test_*.py"):
         file.unlink()
     made = [m.Mutant(path, at, at + 1, "2") for at in (4, 10, 16)]
-    stages = [m.Stage(copy, name, 100) for name in m.STAGES]
+    stages = [m.Stage(copy, name) for name in m.STAGES]
     assert [[stage.finds(one) for stage in stages] for one in made] == [[True, False], [False, True], [False, False]]
     assert m.told(stages, 3) == "1 of 3 by quick tests, 1 by slow ones" and m.told(stages[:1], 3) == "1 of 3 by quick tests"
     (folder / "test_made.py").write_text(quick, encoding="utf-8")
-    assert not m.Stage(copy, "slow", 100).finds(made[0])
+    assert not m.Stage(copy, "slow").finds(made[0])
     (copy.folder / path).write_text("a = 3\n", encoding="utf-8")
-    with pytest.raises(RuntimeError, match="the quick tests fail without a mutant"):
-        m.Stage(copy, "quick", 100).finds(m.Mutant(path, 4, 5, "4"))
+    assert not m.Stage(copy, "quick").finds(made[0]), "a test that fails without the mutant finds nothing"
+
+
+@pytest.mark.slow
+def test_tests_of_other_rooms_that_execute_the_statement_are_tried(tmp_path: Path) -> None:
+    """`b` is looked at in another room only.  What was changed behind the run that was measured is tried as a whole file."""
+    copy = m.Copy(tmp_path / "now")
+    for room in ("wire", "net"):
+        shutil.rmtree(copy.folder / "tests" / "unit" / room)
+    path, other = Path("fbvm/wire/made.py"), "tests/unit/base/test_made.py"
+    now = "# A comment.\n\ndef one():\n    return 1\n\ndef two():\n    return 2\n"
+    (copy.folder / path).write_text(now, encoding="utf-8")
+    looks = "from fbvm.wire import made\n\ndef test_two():\n    assert made.two() == 2\n"
+    (copy.folder / other).write_text(looks, encoding="utf-8")
+    then = tmp_path / "then"
+    for name, text in ((path, now.partition("\n\n")[2]), (other, looks)):
+        (then / name).parent.mkdir(parents=True)
+        (then / name).write_text(text, encoding="utf-8")
+    data = coverage.CoverageData(str(tmp_path / "map"))
+    data.set_context(f"{other}::test_two|run")
+    data.add_lines({str(then / path): [5]})
+    data.write()
+    reached = Reached(tmp_path / "map", copy.folder)
+    assert reached.tests(path, now, now.index("return 2")) == [f"{other}::test_two"]
+    assert reached.tests(path, now, now.index("return 1")) is None
+    at = now.index("2\n")
+    broken = m.Mutant(path, at, at + 1, "3")
+    assert not m.Stage(copy, "quick", reached).finds(broken), "the room has no tests"
+    assert m.Stage(copy, m.ELSEWHERE, reached).finds(broken)
+    (copy.folder / other).write_text(looks.replace("== 2", "> 0"), encoding="utf-8")
+    assert reached.elsewhere([f"{other}::test_two"], []) == reached.among([f"{other}::test_two"], [other]) == [other]

@@ -1,12 +1,17 @@
 """Breaks fbvm in small ways and counts how many of them the tests find.  It gates nothing.
 
-    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--quick]
+    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--quick] [--reach FILE]
 
 ROOM is a folder or file of `fbvm/` or `fblib/`: `check`, `units/etn21`, `omron/mtcp_etn`, `record/draw/why.py`.  A mutant is
 one edit of one file: another relation, AND for OR, a constant plus one, a condition negated, a statement removed, None for a
 result.  Each is written into a copy of the repository in a temporary folder, where the quick tests of the room run, first those
 that name the file.  A mutant that they do not find is tried again with the slow tests of the same files, unless `--quick` is
 given.  The last line counts both, and a mutant that no test finds is printed as a difference.
+
+Which tests of the whole suite execute a line is known with `--reach FILE`, the `.coverage` of a run (with `pip install
+pytest-cov`) of `pytest -n auto --cov=fbvm --cov-context=test --cov-report= -W ignore`: then only those of the room's tests run
+that execute the changed statement, and a mutant that they do not find is tried with those of other rooms.  The sources of that
+run stay where they were: what was changed since is told by comparing.
 
 A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).
 Those that were looked at and stay are in mutants_survivors.md, each with its reason."""
@@ -17,7 +22,6 @@ import argparse
 import ast
 import difflib
 import importlib.util
-import math
 import os
 import random
 import re
@@ -34,7 +38,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HOUSE = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(HOUSE))
+sys.path[:0] = [str(HOUSE), str(HOUSE / "tests" / "bench")]
+
+from reached import Reached  # noqa: E402
 
 from fbvm.base.diagnostics import Source, errors  # noqa: E402
 from fbvm.syntax import tree  # noqa: E402
@@ -75,8 +81,15 @@ TESTS = {
 }  # fmt: skip
 """The folders and files of tests that matter for a room, and those beside them for a part of it; for other rooms the folder of
 their own name."""
-STAGES = {"quick": "not slow", "slow": "slow"}
-"""The marks of the tests with which a mutant is tried, one stage after the other until one finds it."""
+STAGES = {"quick": ("not slow", 60), "slow": ("slow", 200)}
+"""The marks of the tests with which a mutant is tried, one stage after the other until one finds it, and how many seconds of
+processor time a process of theirs may take: a mutant that takes longer runs for ever, and is found."""
+ELSEWHERE = "others'"
+"""The stage of the tests of other rooms that execute the changed statement."""
+WAITING = 10
+"""Times the processor time that tests may take in real time: others use the machine, too."""
+DISTURBED = 3
+"""So many tests that fail without the mutant, too, are left out; with more of them, nothing is found."""
 NO_TEST = 5
 """The exit status of pytest if it ran no test: nothing was found."""
 RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is": "is not", "is not": "is",
@@ -84,8 +97,8 @@ RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==",
 OPERATORS = re.compile(r"\bis\s+not\b|\bnot\s+in\b|\bis\b|\bin\b|[<>!=]=|[<>]")
 ST_WORDS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "=": "<>", "<>": "=", "AND": "OR", "OR": "AND", "TRUE": "FALSE",
             "FALSE": "TRUE"}  # fmt: skip
-SLOWEST = 4
-"""Times that of the tests without a mutant, after which a mutant counts as found: it runs for ever."""
+FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.M)
+"""A line of the summary of pytest."""
 
 
 @dataclass(frozen=True)
@@ -242,30 +255,49 @@ class Copy:
             elif (HOUSE / name).is_file():
                 shutil.copyfile(HOUSE / name, self.folder / name)
 
-    def passes(self, tests: list[str], marks: str, limit_s: float) -> bool:
-        """True if the tests with these marks pass, or if there are none; False for a failure, and after `limit_s` seconds."""
+    def failure(self, tests: list[str], marks: str, limit_s: int, without: list[str]) -> str | None:
+        """Which of the tests with these marks fails first, or None if all pass, or if there are none.
+
+        "" if it is not known, as after `limit_s` seconds of processor time."""
+        chosen, said = self.folder.parent / "tests.txt", self.folder.parent / "said.txt"
+        chosen.write_text("\n".join(tests), encoding="utf-8")
         # `ulimit -t` holds for every process that a test starts, also for one in a session of its own, out of killpg's reach.
-        pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", marks, *tests]
-        command = ["sh", "-c", f"ulimit -t {math.ceil(limit_s)}; exec {shlex.join(pytest)}"]
-        with subprocess.Popen(command, cwd=self.folder, env=self._environment, stdout=subprocess.DEVNULL,
-                              stderr=subprocess.DEVNULL, start_new_session=True) as running:
+        pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-rfE", "--tb=no", "-p", "no:cacheprovider", "-m", marks,
+                  *(word for test in without for word in ("--deselect", test)), f"@{chosen}"]  # fmt: skip
+        command = ["sh", "-c", f"ulimit -t {limit_s}; exec {shlex.join(pytest)}"]
+        with said.open("w", encoding="utf-8") as out, subprocess.Popen(
+                command, cwd=self.folder, env=self._environment, stdout=out, stderr=subprocess.DEVNULL,
+                start_new_session=True) as running:  # fmt: skip
             try:
-                return running.wait(limit_s) in (0, NO_TEST)
+                if running.wait(limit_s * WAITING) in (0, NO_TEST):
+                    return None
             except subprocess.TimeoutExpired:
-                return False
+                return ""
             finally:
                 with suppress(ProcessLookupError):
                     os.killpg(running.pid, signal.SIGKILL)
+        failed = FAILED.search(said.read_text(encoding="utf-8", errors="replace"))
+        return failed[1] if failed else ""
 
-    def survives(self, mutant: Mutant, tests: list[str], marks: str, limit_s: float) -> bool:
-        """True if none of the tests finds a mutant; afterwards the file is as it was."""
+    def finds(self, mutant: Mutant, tests: list[str], marks: str, limit_s: int) -> bool:
+        """True if one of the tests finds a mutant: fails with it, and passes without it.  Afterwards the file is as it was."""
         file = self.folder / mutant.path
         text = file.read_text(encoding="utf-8")
-        try:
-            _write(file, mutant.apply(text))
-            return self.passes(tests, marks, limit_s)
-        finally:
-            _write(file, text)
+        disturbed: list[str] = []
+        while len(disturbed) <= DISTURBED:
+            try:
+                _write(file, mutant.apply(text))
+                failed = self.failure(tests, marks, limit_s, disturbed)
+            finally:
+                _write(file, text)
+            if failed is None:
+                return False
+            if self.failure([failed] if failed else tests, marks, limit_s, disturbed) is None:
+                return True
+            disturbed.append(failed)
+            if not failed:
+                break
+        return False
 
 
 def _write(file: Path, text: str) -> None:
@@ -275,29 +307,30 @@ def _write(file: Path, text: str) -> None:
 
 
 class Stage:
-    """The quick tests, or the slow ones.  How long those of a file take without a mutant is measured once."""
+    """The tests of a kind: the quick or the slow ones of the room, or those of other rooms."""
 
-    def __init__(self, copy: Copy, name: str, limit_s: float) -> None:
+    def __init__(self, copy: Copy, name: str, reached: Reached | None = None) -> None:
         self.name = name
         self.found = 0
-        self._copy, self._marks, self._limit_s = copy, STAGES[name], limit_s
-        self._whole_s: dict[tuple[str, ...], float] = {}
+        self._copy, self._reached = copy, reached
+        self._runs = list(STAGES.values()) if name == ELSEWHERE else [STAGES[name]]
 
     def finds(self, mutant: Mutant) -> bool:
-        """True if one of the tests fails, or takes too long.  Raises RuntimeError if they fail without a mutant."""
-        tests = tests_of(mutant.path, self._copy.folder)
-        found = not self._copy.survives(mutant, tests, self._marks, 10 + SLOWEST * self._whole(tests))
+        """True if one of the tests finds the mutant."""
+        tests = self._tests(mutant)
+        found = bool(tests) and any(self._copy.finds(mutant, tests, *run) for run in self._runs)
         self.found += found
         return found
 
-    def _whole(self, tests: list[str]) -> float:
-        key = tuple(sorted(tests))
-        if key not in self._whole_s:
-            start = time.monotonic()
-            if not self._copy.passes(tests, self._marks, self._limit_s):
-                raise RuntimeError("\n".join([f"the {self.name} tests fail without a mutant, or take too long:", *tests]))
-            self._whole_s[key] = time.monotonic() - start
-        return self._whole_s[key]
+    def _tests(self, mutant: Mutant) -> list[str]:
+        own = tests_of(mutant.path, self._copy.folder)
+        if self._reached is None:
+            return own
+        text = (self._copy.folder / mutant.path).read_text(encoding="utf-8")
+        reaching = self._reached.tests(mutant.path, text, mutant.start)
+        if self.name == ELSEWHERE:
+            return self._reached.elsewhere(reaching, own)
+        return self._reached.among(reaching, own)
 
 
 def difference(mutant: Mutant, text: str) -> str:
@@ -313,7 +346,8 @@ def main() -> int:
     options.add_argument("--count", type=int, default=20, help="mutants that are tried (20)")
     options.add_argument("--seed", type=int, default=0, help="which of all mutants (0)")
     options.add_argument("--seconds", type=float, default=600, help="none is begun after this time (600)")
-    options.add_argument("--quick", action="store_true", help="leave the slow tests out")
+    options.add_argument("--quick", action="store_true", help="only the quick tests of the room")
+    options.add_argument("--reach", metavar="FILE", type=Path, help="which tests execute which lines: a .coverage with contexts")
     given = options.parse_args()
     begun = time.monotonic()
     texts = {path: (HOUSE / path).read_text(encoding="utf-8") for path in files_of(given.room)}
@@ -321,18 +355,15 @@ def main() -> int:
     chosen = random.Random(given.seed).sample(found, min(given.count, len(found)))
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
-        stages = [Stage(copy, name, given.seconds) for name in STAGES if name == "quick" or not given.quick]
+        reached = Reached(given.reach, copy.folder) if given.reach else None
+        names = ["quick"] if given.quick else [*STAGES, ELSEWHERE] if reached else [*STAGES]
+        stages = [Stage(copy, name, reached) for name in names]
         survivors, tried = 0, 0
         for mutant in chosen:
             if time.monotonic() - begun > given.seconds:
                 break
-            try:
-                is_found = any(stage.finds(mutant) for stage in stages)
-            except RuntimeError as error:
-                print(error, file=sys.stderr)
-                return 1
             tried += 1
-            if not is_found:
+            if not any(stage.finds(mutant) for stage in stages):
                 survivors += 1
                 print(difference(mutant, texts[mutant.path]), end="\n\n", flush=True)
     print(f"{given.room}: {told(stages, tried)}, {survivors} survived; "
@@ -341,7 +372,7 @@ def main() -> int:
 
 
 def told(stages: list[Stage], tried: int) -> str:
-    """How many mutants each stage found: "31 of 40 by quick tests, 6 by slow ones"."""
+    """How many mutants each stage found: "31 of 40 by quick tests, 6 by slow ones, 1 by others' ones"."""
     quick, *slow = stages
     return ", ".join([f"{quick.found} of {tried} by {quick.name} tests", *(f"{one.found} by {one.name} ones" for one in slow)])
 

@@ -1,0 +1,79 @@
+"""Which tests of the whole suite execute a statement, by a data file of coverage.py with one context a test."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+from pathlib import Path
+
+MOST = 400
+"""So many tests that execute a statement are tried, evenly chosen among all."""
+PACKAGE = "fbvm"
+
+
+class Reached:
+    """The tests that executed each line, when the file was written, and what of tests and sources was changed since."""
+
+    def __init__(self, file: Path, house: Path) -> None:
+        from coverage import CoverageData  # pip install pytest-cov
+
+        self._data = CoverageData(str(file))
+        self._data.read()
+        self._house = house
+        measured = next(Path(name) for name in self._data.measured_files() if f"/{PACKAGE}/" in name.replace("\\", "/"))
+        self._root = next(folder.parent for folder in measured.parents if folder.name == PACKAGE)
+
+    def tests(self, path: Path, text: str, start: int) -> list[str] | None:
+        """The tests that executed the statement at an offset of a source; None if that is not known, as for what is imported."""
+        if path.suffix != ".py" or not (self._root / path).is_file():
+            return None
+        contexts = self._data.contexts_by_lineno(str(self._root / path))
+        then = _lines_then((self._root / path).read_text(encoding="utf-8"), text)
+        lines = [then[line] for line in _statement(text, text.count("\n", 0, start) + 1) if line in then]
+        found = {context.rpartition("|")[0] for line in lines for context in contexts.get(line, ())} - {""}
+        return sorted(found) or None
+
+    def among(self, reaching: list[str] | None, own: list[str]) -> list[str]:
+        """Those tests of a room that execute the statement, and the whole files that were changed since; all if none is known."""
+        if reaching is None:
+            return own
+        changed = [file for file in own if self._is_changed(file)]
+        order = {file: number for number, file in enumerate(own)}
+        known = [test for test in reaching if _file(test) in order and _file(test) not in changed]
+        return changed + sorted(_some(known), key=lambda test: order[_file(test)])
+
+    def elsewhere(self, reaching: list[str] | None, own: list[str]) -> list[str]:
+        """Those tests of other rooms that execute the statement; none if it is not known."""
+        others = [test for test in reaching or () if _file(test) not in own and (self._house / _file(test)).is_file()]
+        return list(dict.fromkeys(_file(test) if self._is_changed(_file(test)) else test for test in _some(others)))
+
+    def _is_changed(self, file: str) -> bool:
+        then = self._root / file
+        return not then.is_file() or then.read_bytes() != (self._house / file).read_bytes()
+
+
+def _file(test: str) -> str:
+    return test.partition("::")[0]
+
+
+def _some(tests: list[str]) -> list[str]:
+    return tests[:: -(-len(tests) // MOST)] if tests else []
+
+
+def _lines_then(then: str, now: str) -> dict[int, int]:
+    """The lines of a source that it had before, too, with their numbers then; both begin with 1."""
+    matcher = difflib.SequenceMatcher(None, then.splitlines(), now.splitlines(), autojunk=False)
+    return {one.b + count + 1: one.a + count + 1 for one in matcher.get_matching_blocks() for count in range(one.size)}
+
+
+def _statement(text: str, line: int) -> range:
+    """The lines of the innermost statement at a line; of one with a body, those in front of the body."""
+    best = range(line, line + 1)
+    least = len(text)
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.stmt) and node.end_lineno is not None:
+            body = getattr(node, "body", None)
+            end = body[0].lineno - 1 if isinstance(body, list) and body else node.end_lineno
+            if node.lineno <= line <= end and end - node.lineno < least:
+                best, least = range(node.lineno, end + 1), end - node.lineno
+    return best
