@@ -313,7 +313,7 @@ class _Names:
         return iter(())
 
     def caught(self, node: tree.Try) -> Iterator[Use]:
-        self.targets.add(node.code)
+        self.targets.update(() if node.code is None else (node.code,))
         return iter(())
 
     def enum_literal(self, node: tree.EnumLiteral) -> Iterator[Use]:

@@ -103,6 +103,8 @@ class Dialect:
     short_circuit_words: bool = False
     jumps_in_text: bool = False
     exceptions: bool = False
+    conditional_returns: bool = False
+    constant_in_outs_take_texts: bool = False
     functions_have_inputs: bool = False
     plain_names: bool = False
     locals_hide_results: bool = False
@@ -236,6 +238,10 @@ QUESTIONS = {
     "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
     "short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken, with a warning (S0195)", "taken"),
     "jumps_in_text": ("JMP in Structured Text", "taken, with a warning (S0195)", "taken"),
+    "conditional_returns": ("RETURN(done); with parentheses around the whole value", "the result is done, and the POU is left",
+                            "the POU is left if done is TRUE, with the result that it has"),
+    "constant_in_outs_take_texts": ("F('abc'), where F declares VAR_IN_OUT CONSTANT s : STRING", "an error (S0407)",
+                                    "a copy is passed; so it is with a text of another length"),
     "exceptions": ("__TRY .. __CATCH(code) .. __ENDTRY", "taken, with a warning (S0195)", "taken"),
     "functions_have_inputs": ("FUNCTION f : INT without an input", "taken", "taken, with a warning (S0195)"),
     "plain_names": ("names that begin with _ or P_", "taken", "taken, with a warning (S0195)"),
@@ -281,14 +287,15 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
-                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
+                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True, conditional_returns=True,
+                   constant_in_outs_take_texts=True,
                    short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (
     STANDARD,
     _CODESYS,
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
-            libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit"), unsigned_ltime=True,
+            libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit", "twincat/write_protected"), unsigned_ltime=True,
             large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
             libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True),

@@ -26,6 +26,20 @@ def check_body(context: Context, pou: Pou) -> None:
     _Statements(context, pou).block(pou.tree.body)
 
 
+def _is_enclosed(text: str, node: tree.Return) -> bool:
+    """True for `RETURN(condition);`, whose value stands in parentheses as a whole."""
+    assert node.value is not None
+    start = node.start + len("RETURN")
+    if "(" not in text[start:node.value.start]:
+        return False
+    depth = 0
+    for found in re.finditer(r"'[^']*'|[();]", text[start:]):
+        depth += {"(": 1, ")": -1}.get(found[0], 0)
+        if depth == 0:
+            return start + found.end() > node.value.end and not text[start + found.end():].lstrip()[:1].strip(";")
+    return False
+
+
 class _Statements:
     """The statements of one POU."""
 
@@ -298,8 +312,9 @@ class _Statements:
 
     def _try(self, node: tree.Try) -> None:
         self.block(node.body)
-        kind, wanted = self.target(node.code), self.scope.context.exception_codes()
-        if kind is not None and kind is not wanted:
+        wanted = self.scope.context.exception_codes()
+        kind = self.target(node.code) if node.code is not None else None
+        if node.code is not None and kind is not None and kind is not wanted:
             self.error("S0301", node.code, f"__CATCH gives an {wanted}, and this is {kind}",
                        f"declare it as __SYSTEM.{wanted}")
         self.block(node.handler)
@@ -312,6 +327,10 @@ class _Statements:
 
     def _return(self, node: tree.Return) -> None:
         if node.value is None:
+            return
+        if self.scope.dialect.conditional_returns and _is_enclosed(self.scope.source.text, node):
+            self.scope.facts.conditional.add(node)
+            self.scope.condition(node.value, "RETURN")
             return
         if self.pou.result is None:
             self.error("S0409", node.value, f"{self.pou.name} has no result to return")

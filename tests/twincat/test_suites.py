@@ -140,6 +140,34 @@ END_FUNCTION_BLOCK
 
 
 @pytest.mark.slow
+def test_arrays_are_compared_element_by_element_whatever_their_bounds() -> None:
+    made = compile_text("""FUNCTION_BLOCK FB_Arrays_Test EXTENDS TcUnit.FB_TestSuite
+VAR a : ARRAY[1..3] OF INT := [1, 2, 3]; b : ARRAY[0..2] OF INT := [1, 7, 3]; c : ARRAY[5..6] OF INT;
+p : ARRAY[-1..0, 1..3] OF LREAL := [1, 2, 3, 4, 5, 6]; q : ARRAY[0..1, 0..2] OF LREAL := [1, 2, 3.02, 4, 5.1, 6]; r : ARRAY[1..3, 1..2] OF LREAL;
+x : ARRAY[0..1, 0..1, 0..1] OF REAL := [8(1)]; y : ARRAY[1..2, 1..2, 1..2] OF REAL := [7(1), 2];
+n : INT; t : TON; END_VAR
+TEST('same'); AssertArrayEquals_INT(a, a, ''); AssertArray2dEquals_LREAL(p, q, 0.03, ''); AssertEquals_WSTRING("a", "a", '');
+WRITE_PROTECTED_TIME(ADR(t.PT), T#3s); AssertEquals_TIME(T#3s, t.PT, ''); AssertFalse(IS_TEST_FINISHED('same'), '');
+TEST_FINISHED();
+TEST('other'); AssertArrayEquals_INT(Expecteds := a, Actuals := b, Message := 'one');
+AssertArrayEquals_INT(a, c, 'two'); AssertArray2dEquals_LREAL(p, q, Delta := 0.01, 'three'); AssertArray2dEquals_LREAL(p, r, 0.01, '');
+AssertArray3dEquals_REAL(x, y, 0.5, ''); AssertEquals_WSTRING("a", "b", ''); AssertTrue(IS_TEST_FINISHED('same'), '');
+TEST_FINISHED();
+END_FUNCTION_BLOCK
+""" + PROGRAM.format("a : FB_Arrays_Test;"), dialect="twincat")
+    assert made.image is not None, [message.render() for message in made.errors]
+    found = run_suites(made.image, ["PRG_TEST.a"]).results
+    assert not found["PRG_TEST.a", "same"].failed and found["PRG_TEST.a", "same"].asserts == 5
+    assert [failure.text for failure in found["PRG_TEST.a", "other"].failures] == [
+        "EXP: ARRAY[2] = 2, ACT: ARRAY[1] = 7, MSG: one",
+        "EXP: SIZE = 3, ACT: SIZE = 2, MSG: two, size of arrays not matching.",
+        "EXP: ARRAY[0,2] = 5.0, ACT: ARRAY[1,1] = 5.1, MSG: three",
+        "EXP: SIZE = [-1..0,1..3] (2x3), ACT: SIZE = [1..3,1..2] (3x2), MSG: size of arrays not matching.",
+        "EXP: ARRAY[1,1,1] = 1.0, ACT: ARRAY[2,2,2] = 2.0",
+        "EXP: Not possible to print EXP unicode WSTRING value, ACT: Not possible to print ACT unicode WSTRING value"]
+
+
+@pytest.mark.slow
 def test_tests_of_one_cycle_and_of_several_ordered_and_disabled_ones() -> None:
     run = ran("a : FB_A_Test;", "PRG_TEST.a")
     seen = {name: (r.finished, r.failed, r.skipped, r.asserts, r.duration_s) for (_, name), r in run.results.items()}

@@ -173,6 +173,11 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
     kind, role = scope.infer(value), variable.role_of_parameter
     if kind is None:
         return False
+    if _takes_copy(scope, value, kind, variable):
+        if not scope.fit(value, variable.type, "S0405", variable.name):
+            return False
+        scope.facts.copies[value] = aggregates.in_frame(scope, value, variable.type, "copy of a text")
+        return True
     if not scope.is_variable(value):
         scope.error("S0407", value, f"the {role} {variable.name} needs a variable, not a value",
                     "it is read where it lies: assign the value to a variable, and pass that" if variable.by_reference else "")
@@ -185,6 +190,13 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
         scope.facts.copies[value] = aggregates.in_frame(scope, value, BOOL, "copy of a bit")
         return True
     return _has_its_type(scope, value, kind, variable)
+
+
+def _takes_copy(scope: Scope, value: tree.Expr, kind: Type, variable: Variable) -> bool:
+    """True for a text that a VAR_IN_OUT CONSTANT cannot read where it lies: a literal, or one of another length."""
+    return scope.dialect.constant_in_outs_take_texts and variable.constant and scope.pou is not None and \
+        isinstance(variable.type, StringType) and isinstance(kind, StringType) and variable.type.wide == kind.wide and \
+        not (scope.is_variable(value) and (same(kind, variable.type) or _long_enough(kind, variable)))
 
 
 def _is_read_bit(scope: Scope, value: tree.Expr, variable: Variable) -> bool:

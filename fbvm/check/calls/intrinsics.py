@@ -15,7 +15,7 @@ from fbvm.check.symbols.facts import UNTYPED_INT, StandardCall, is_block
 from fbvm.syntax import tree
 
 _PARAMETERS = {"SIZEOF": ["IN"], "XSIZEOF": ["IN"], "LOWER_BOUND": ["ARR", "DIM"], "UPPER_BOUND": ["ARR", "DIM"],
-               "__ISVALIDREF": ["REF"], "__POUNAME": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"],
+               "__ISVALIDREF": ["REF"], "__POUNAME": [], "__POSITION": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"],
                "__QUERYINTERFACE": ["ITFOBJECT", "ITFDST"], "__QUERYPOINTER": ["ITFOBJECT", "PDST"]}
 _NO_HEAP = "makes and ends variables while the program runs, and here each has its place before that"
 REFUSED = {
@@ -25,7 +25,6 @@ REFUSED = {
     "ADRINST": ("S0901", "gives the place of the own instance", "pass the instance as VAR_IN_OUT"),
     "INI": ("S0901", "gives RETAIN variables of an instance their first values again", "assign these in the program"),
     "__VARINFO": ("S0901", "asks for a description that CODESYS keeps of a variable", "SIZEOF and ADR tell size and place"),
-    "__POSITION": ("S0901", "gives a line number as a text", "__POUNAME() gives the name of the POU"),
     "__CURRENTTASK": ("S0901", "asks for a task of the runtime system of CODESYS", "declare a program for each task"),
 }
 """Operators of CODESYS that are refused: the code, what each does, and what to do here."""
@@ -47,6 +46,8 @@ def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | None:
         shown = scope.pou.name.encode("latin-1", "replace") if scope.pou is not None else b""
         scope.facts.constants[call] = shown
         return string(max(1, len(shown)))
+    if name == "__POSITION":
+        return _position(scope, call)
     if name == "__ISVALIDREF":
         return _is_bound(scope, call, values[0])
     if name in ("__QUERYINTERFACE", "__QUERYPOINTER"):
@@ -58,6 +59,18 @@ def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | None:
     if name in ("SIZEOF", "XSIZEOF"):
         return _size(scope, call, values[0])
     return _bound(scope, call, name, values[0], values[1])
+
+
+def _position(scope: Scope, call: tree.Call) -> Type:
+    """Where a statement or declaration stands, as a text (CODESYS online help, __POSITION).
+
+    Lines and columns are those of the whole file, which diagnostics name, too; CODESYS counts them in each of its editors."""
+    line, column = scope.source.place(call.start)
+    statements = scope.pou.tree.body if scope.pou is not None else ()
+    is_executed = any(statement.start <= call.start < statement.end for statement in statements)
+    shown = f"Line {line}, Column {column} (Impl)" if is_executed else f"Line {line} (Decl)"
+    scope.facts.constants[call] = shown.encode("ascii")
+    return string(len(shown))
 
 
 def _is_bound(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:

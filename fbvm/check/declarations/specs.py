@@ -59,6 +59,8 @@ def type_declaration(context: Context, entry: TypeEntry) -> Resolved | None:
     if resolved is None or declared.initial is None:
         return resolved
     kind, initial = resolved
+    if isinstance(kind, EnumType) and isinstance(declared.initial, tree.NameRef) and fold(declared.initial.text) in kind.members:
+        scope.facts.types[declared.initial], scope.facts.constants[declared.initial] = kind, kind.members[fold(declared.initial.text)]
     return kind, initial_bytes(scope, kind, declared.initial, initial)
 
 
@@ -207,7 +209,9 @@ def _subrange(scope: Scope, spec: tree.SubrangeSpec, name: str) -> Resolved | No
     if resolved is None or low is None or high is None:
         return None
     kind = resolved[0]
-    if not isinstance(kind, Elementary) or "ANY_INT" not in kind.families:
+    counts = isinstance(kind, Elementary) and ("ANY_INT" in kind.families or "ANY_BIT" in kind.families and kind is not BOOL and
+                                               scope.dialect.integers_and_bits)
+    if not isinstance(kind, Elementary) or not counts:
         scope.error("S0704", spec.base, f"a subrange needs an integer type, not {kind}")
         return None
     if not kind.low <= low <= high <= kind.high:

@@ -103,7 +103,7 @@ _BELOW: dict[type, Callable[[Any], Nodes]] = {
     tree.For: lambda n: (n.variable, n.first, n.last, n.step, *n.body),
     tree.While: lambda n: (n.condition, *n.body),
     tree.Repeat: lambda n: (*n.body, n.until),
-    tree.Try: lambda n: (*n.body, n.code, *n.handler, *(n.final or ())),
+    tree.Try: lambda n: (*n.body, *(() if n.code is None else (n.code,)), *n.handler, *(n.final or ())),
     tree.Return: lambda n: (n.value,),
     tree.Exit: _nothing, tree.Continue: _nothing, tree.Empty: _nothing, tree.RefusedStatement: _nothing,
     tree.Binary: lambda n: (n.left, n.right),

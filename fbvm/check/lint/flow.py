@@ -43,7 +43,7 @@ class _Flow:
 
     def ends(self, statement: tree.Statement) -> bool:
         """Check a statement; True if the next one is never reached."""
-        if isinstance(statement, _GOES_ON):
+        if isinstance(statement, _GOES_ON) or statement in self.body.facts.conditional:
             return False
         if isinstance(statement, tree.If):
             return self.choice(statement)

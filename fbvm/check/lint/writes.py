@@ -184,7 +184,8 @@ class _Order:
         for statement in node.body:
             definite.update(self.block((statement,)))
             self.stores.clear()
-        self.steps(node.code)
+        if node.code is not None:
+            self.steps(node.code)
         self.block(node.handler)
         definite.update(self.block(node.final or ()))
 

@@ -377,7 +377,8 @@ class Facts:
     reversed_bytes: set[tree.Call] = field(default_factory=set)
     """Calls whose result is the argument with its bytes in another order."""
     copies: dict[tree.Expr, Variable] = field(default_factory=dict)
-    """Arguments on single bits for an ANY input, which reads a copy that fills a byte: the variable with the copy."""
+    """Arguments on single bits for an ANY input, which reads a copy that fills a byte, and texts that a VAR_IN_OUT CONSTANT
+    cannot read where they lie: the variable with the copy."""
     aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
     """Statements that name an ACTION without (), with the calls that they mean."""
@@ -391,6 +392,8 @@ class Facts:
     """Targets of assignments that name a property, with the calls of SET that they mean; those have no input yet."""
     text_cases: set[tree.Case] = field(default_factory=set)
     """CASE statements that choose by a STRING."""
+    conditional: set[tree.Statement] = field(default_factory=set)
+    """RETURN(condition), which leaves the POU if the condition holds."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)
     followed: dict[tree.Expr, RefType] = field(default_factory=dict)
     """Expressions that name a REFERENCE TO, and its type; they stand for what it is bound to."""

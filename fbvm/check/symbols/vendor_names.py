@@ -64,7 +64,8 @@ _LIBRARIES = (
     (r"FB_(?:EcSoE|EcCoE|EcGet|EcSet|EcMaster)\w*|ST_Ec\w+|Tc2_EtherCAT", "TwinCAT's Tc2_EtherCAT"),
     (r"FB_Json\w+|SJsonValue|SJsonAIterator", "TwinCAT's Tc3_JsonXml"),
     (r"FB_TcMessage|FB_TcAlarm|FB_TcEvent|TcEventSeverity|TcEventEntry|I_TcMessage|I_TcSourceInfo", "TwinCAT's Tc3_EventLogger"),
-    (r"TcUnit|FB_TestSuite|TEST|TEST_FINISHED|AssertEquals\w*|AssertTrue|AssertFalse", "TcUnit"),
+    (r"TcUnit|FB_TestSuite|TEST|TEST_FINISHED|Assert(?:Array[23d]*)?Equals\w*|AssertTrue|AssertFalse|WRITE_PROTECTED_\w+|GVL_TcUnit|"
+     r"F_AnyToUnionValue|U_ExpectedOrActual|F_GetCpuCounterAs64bit", "TcUnit"),
     (r"Sys(?:Time|File|Mem|Sock|Com|Task|Target|Process|Cpu|Dir|Event|Lib)\w+|RTS_IEC_\w+|CmpErrors2?|TimerSwitch",
      "CODESYS's system libraries"),
     (r"GEN|GEN_MODE|PD|PID|PID_FIXCYCLE|DERIVATIVE|BASE64|\w+_TO_GRAY|GRAY_TO_\w+|\w+HEXinASCII\w*|WORD_AS_STRING",

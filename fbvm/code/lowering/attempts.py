@@ -28,7 +28,8 @@ def _try(body: BodyContext, node: tree.Try, site: int) -> None:
     ended = _attempt(body, node.body, ways, True, site)
     with body.block() as handling:
         body.emit(*(("store", form, word, value) for form, word, value in before))
-        body.write(body.place(node.code), ended, site)
+        if node.code is not None:
+            body.write(body.place(node.code), ended, site)
         more = _ways_out(node.handler) if node.final is not None else {}
         if more:
             ended_again = _attempt(body, node.handler, more, False, site)

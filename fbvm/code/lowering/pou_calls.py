@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, base, followed, machine
+from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, StringType, base, followed, machine
 from fbvm.check.expressions.constants import default
 from fbvm.check.symbols.facts import PouCall, Variable
 from fbvm.code.builder.constants import FALSE, TRUE, zero
@@ -219,6 +219,9 @@ def _inputs(callee: Callee, site: int) -> None:
 
 def _argument(body: BodyContext, variable: Variable, expr: tree.Expr) -> Node:
     if (copy := body.facts.copies.get(expr)) is not None:
+        if isinstance(copy.type, StringType):
+            body.write(body.slot(copy), body.value(expr, copy.type), body.site(expr))
+            return body.slot(copy).reference()
         held = body.to_temporary(body.value(expr, BOOL))
         body.emit(body.slot(copy).store(held, body.site(expr)))
         return body.slot(copy).reference()

@@ -127,6 +127,13 @@ def _continue(body: BodyContext, node: tree.Continue, site: int) -> None:
 
 
 def _return(body: BodyContext, node: tree.Return, site: int) -> None:
+    if node in body.facts.conditional:
+        assert node.value is not None
+        condition = body.value(node.value, BOOL)
+        with body.block() as leaving:
+            body.leave(node, (*body.at_return, ("return",)), site)
+        body.emit(("if", ((condition, tuple(leaving)),), ()))
+        return
     if node.value is not None:
         assert body.pou.result is not None
         place = body.slot(body.pou.result)

@@ -224,9 +224,9 @@ class Empty(Statement):
 
 @_node
 class Try(Statement):
-    """`__TRY body __CATCH(code) handler __FINALLY final __ENDTRY`: `final` is None without __FINALLY."""
+    """`__TRY body __CATCH(code) handler __FINALLY final __ENDTRY`: `final` is None without __FINALLY, `code` without (code)."""
     body: Block
-    code: Expr
+    code: Expr | None
     handler: Block
     final: Block | None
 

@@ -31,7 +31,8 @@ MOST_AGAIN, MOST_TOGETHER, BEFORE = 10, 5, 20
 OWN = "TcUnit_Execute"
 """A function that only fbvm's own library of suites has."""
 _FAILED = re.compile(r"FAILED TEST '(.+)@(.*?)', (EXP: .*)", re.S)
-_ASSERTS, _FAILS = "FB_TESTSUITE.ASSERT", "FB_TESTSUITE.SETTESTFAILED"
+_ASSERTS = ("FB_TESTSUITE.ASSERT", "TCUNIT_VALUES.ASSERT")
+_FAILS = ("FB_TESTSUITE.SETTESTFAILED", "TCUNIT_SUITE.SETTESTFAILED")
 
 
 @dataclass
@@ -215,7 +216,7 @@ class _Assertions:
         self._sites = plc.image.sites
         names = {number: body.name.upper() for number, body in enumerate(plc.image.bodies)}
         self._asserting = {number for number, name in names.items() if name.startswith(_ASSERTS)}
-        self._failing = {number for number, name in names.items() if name == _FAILS}
+        self._failing = {number for number, name in names.items() if name in _FAILS}
         self._last: Site | None = None
         self.failed: list[Site | None] = []
 
