@@ -287,8 +287,8 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
-                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True, conditional_returns=True,
-                   constant_in_outs_take_texts=True,
+                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
+                   conditional_returns=True, constant_in_outs_take_texts=True,
                    short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (

@@ -143,14 +143,16 @@ END_FUNCTION_BLOCK
 def test_arrays_are_compared_element_by_element_whatever_their_bounds() -> None:
     made = compile_text("""FUNCTION_BLOCK FB_Arrays_Test EXTENDS TcUnit.FB_TestSuite
 VAR a : ARRAY[1..3] OF INT := [1, 2, 3]; b : ARRAY[0..2] OF INT := [1, 7, 3]; c : ARRAY[5..6] OF INT;
-p : ARRAY[-1..0, 1..3] OF LREAL := [1, 2, 3, 4, 5, 6]; q : ARRAY[0..1, 0..2] OF LREAL := [1, 2, 3.02, 4, 5.1, 6]; r : ARRAY[1..3, 1..2] OF LREAL;
+p : ARRAY[-1..0, 1..3] OF LREAL := [1, 2, 3, 4, 5, 6]; q : ARRAY[0..1, 0..2] OF LREAL := [1, 2, 3.02, 4, 5.1, 6];
+r : ARRAY[1..3, 1..2] OF LREAL;
 x : ARRAY[0..1, 0..1, 0..1] OF REAL := [8(1)]; y : ARRAY[1..2, 1..2, 1..2] OF REAL := [7(1), 2];
 n : INT; t : TON; END_VAR
 TEST('same'); AssertArrayEquals_INT(a, a, ''); AssertArray2dEquals_LREAL(p, q, 0.03, ''); AssertEquals_WSTRING("a", "a", '');
 WRITE_PROTECTED_TIME(ADR(t.PT), T#3s); AssertEquals_TIME(T#3s, t.PT, ''); AssertFalse(IS_TEST_FINISHED('same'), '');
 TEST_FINISHED();
 TEST('other'); AssertArrayEquals_INT(Expecteds := a, Actuals := b, Message := 'one');
-AssertArrayEquals_INT(a, c, 'two'); AssertArray2dEquals_LREAL(p, q, Delta := 0.01, 'three'); AssertArray2dEquals_LREAL(p, r, 0.01, '');
+AssertArrayEquals_INT(a, c, 'two'); AssertArray2dEquals_LREAL(p, q, Delta := 0.01, 'three');
+AssertArray2dEquals_LREAL(p, r, 0.01, '');
 AssertArray3dEquals_REAL(x, y, 0.5, ''); AssertEquals_WSTRING("a", "b", ''); AssertTrue(IS_TEST_FINISHED('same'), '');
 TEST_FINISHED();
 END_FUNCTION_BLOCK

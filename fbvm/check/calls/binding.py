@@ -158,7 +158,7 @@ def _pass(scope: Scope, argument: tree.Argument, variable: Variable, bound: PouC
             if _in_out(scope, value, variable):
                 bound.inputs.append((variable, value))
         elif isinstance(variable.type, RefType) and variable.type.follows:
-            if references.lend(scope, value, followed(variable.type), "S0405", f"the input {variable.name}"):
+            if references.lend(scope, value, followed(variable.type), "S0405", f"the input {variable.name}", variable.any_length):
                 bound.inputs.append((variable, value))
         elif scope.fit(value, variable.type, "S0405", variable.name):
             bound.inputs.append((variable, value))

@@ -267,7 +267,9 @@ class _Interface:
     def _place(self, variable: Variable, declared: tree.VarDecl) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
         self._check_bounds(variable, declared)
-        variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
+        spec = declared.spec.target if isinstance(declared.spec, tree.RefSpec) else declared.spec
+        variable.any_length = isinstance(spec, tree.StringSpec) and spec.length is None and (
+            variable.reference or isinstance(declared.spec, tree.RefSpec) and variable.kind == "VAR_INPUT")
         if variable.kind == "VAR_STAT":
             variable.place = "abs"  # one for all instances and calls
         elif variable.kind == "VAR_TEMP" or self.pou.is_routine:

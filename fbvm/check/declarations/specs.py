@@ -59,8 +59,9 @@ def type_declaration(context: Context, entry: TypeEntry) -> Resolved | None:
     if resolved is None or declared.initial is None:
         return resolved
     kind, initial = resolved
-    if isinstance(kind, EnumType) and isinstance(declared.initial, tree.NameRef) and fold(declared.initial.text) in kind.members:
-        scope.facts.types[declared.initial], scope.facts.constants[declared.initial] = kind, kind.members[fold(declared.initial.text)]
+    value = declared.initial
+    if isinstance(kind, EnumType) and isinstance(value, tree.NameRef) and fold(value.text) in kind.members:
+        scope.facts.types[value], scope.facts.constants[value] = kind, kind.members[fold(value.text)]
     return kind, initial_bytes(scope, kind, declared.initial, initial)
 
 

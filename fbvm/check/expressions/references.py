@@ -11,6 +11,7 @@ from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BYTE,
     ArrayType,
+    StringType,
     StructType,
     Type,
     derives,
@@ -180,8 +181,15 @@ def bind(scope: Scope, node: tree.Assign) -> None:
         lend(scope, node.value, kind, "S0301", scope.text(target))
 
 
-def lend(scope: Scope, value: tree.Expr, kind: Type, code: str, name: str) -> bool:
-    """True if a REFERENCE TO `kind` that is called `name` can be bound to a value; else a diagnostic."""
+def _is_wide(kind: Type) -> bool:
+    return isinstance(kind, StringType) and kind.wide
+
+
+def lend(scope: Scope, value: tree.Expr, kind: Type, code: str, name: str, any_length: bool = False) -> bool:
+    """True if a REFERENCE TO `kind` that is called `name` can be bound to a value; else a diagnostic.
+
+    any_length: True for one to a STRING without a length, which is bound to a text of any length.  What it reads or writes
+    behind the end of that is checked when the program runs."""
     if is_null(value):
         return True
     if named(value) is not value and value not in scope.facts.followed:
@@ -189,7 +197,7 @@ def lend(scope: Scope, value: tree.Expr, kind: Type, code: str, name: str) -> bo
                     f"name the variable alone: {scope.text(named(value))}")
         return False
     found = refer(scope, value, lasting=False)
-    if found is None or derives(found, kind):
+    if found is None or derives(found, kind) or any_length and isinstance(found, StringType) and found.wide is _is_wide(kind):
         return found is not None
     scope.error(code, value, f"{name} refers to {kind}, this is {found}")
     return False

@@ -101,7 +101,8 @@ def result(body: Body) -> None:
         return
     if pou.result is None or pou.result.written or not any(not isinstance(s, tree.Empty) for s in pou.tree.body):
         return
-    if not any(isinstance(node, tree.Return) and node.value is not None and node not in body.facts.conditional for node in body.nodes):
+    if not any(isinstance(node, tree.Return) and node.value is not None and node not in body.facts.conditional
+               for node in body.nodes):
         body.warn("S0292", pou.tree.name, f"{pou.name} never sets its result, which stays as it begins",
                   f"assign it: {pou.result.name} := ...")
 
