@@ -1,0 +1,137 @@
+"""What each move of a session answers and where it stands behind it, live and in a recording alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+
+import pytest
+from rows import each_of
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
+from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.scans import RecordedScans
+from fbvm.record.trace.events import Statement
+from fbvm.step.past_session import PastSession
+from fbvm.step.position import Position
+from fbvm.step.session import Session
+from fbvm.step.stepping import Stepping, reached_step
+
+TEXT = """\
+FUNCTION_BLOCK Twice
+VAR_INPUT A : INT; END_VAR
+VAR_OUTPUT Q : INT; END_VAR
+    Q := A;
+    Q := Q * 2;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR
+    N, R : INT;
+    T : Twice;
+    W : WORD;
+END_VAR
+    N := N + 1;
+    T(A := N);
+    W.0 := N > 2;
+END_PROGRAM
+"""
+STATEMENTS = 5
+"""Of one scan: 13, 14, 4, 5, 15."""
+
+
+@cache
+def image() -> Image:
+    made = compile_text(TEXT).image
+    assert made is not None
+    return made
+
+
+def live() -> Session:
+    return Session.of(lambda: Plc(image()))
+
+
+def past() -> PastSession:
+    plc = Plc(image())
+    recorded = Recording().add("plc", plc)
+    plc.run(scans=6)
+    return PastSession(RecordedScans(recorded, {}), "plc")
+
+
+SESSIONS: tuple[Callable[[], Stepping], ...] = (live, past)
+
+
+def line(session: Stepping) -> int | None:
+    return session.facts.sites[session.statement.site].line if session.statement else None
+
+
+def at_line(wanted: int, session: Stepping, statement: Statement | None) -> bool:
+    return statement is not None and session.facts.sites[statement.site].line == wanted
+
+
+@each_of("make", SESSIONS)
+def test_what_a_move_answers_and_where_it_stands(make: Callable[[], Stepping]) -> None:
+    session = make()
+    session.goto(1)
+    assert session.play(1, partial(reached_step, 2)) is True and line(session) == 4
+    assert session.play(1, partial(reached_step, STATEMENTS)) is False and line(session) is None
+    session.go_to(Position(1, 99))
+    assert session.here == Position(1, STATEMENTS)
+    for move, place in ((session.back, (1, 15)), (session.back, (1, 5)), (session.step_out, (1, 15)), (session.back_scan, (1, 13)),
+                        (session.step, (1, 14)), (session.step_over, (1, 15)), (session.step, (1, None)), (session.step, (2, 13)),
+                        (session.back, (1, None)), (session.step_over, (2, 13)), (session.back, (1, None)),
+                        (session.step_out, (2, 13)), (session.step, (2, 14)), (session.step, (2, 4)),
+                        (session.step_over, (2, 5)), (session.step_over, (2, 15))):  # fmt: skip
+        move()
+        assert (session.here.scan, line(session)) == place, move
+    session.back_scan(2)
+    assert session.here == Position(1), "of this scan the beginning counts as one"
+    session.back_scan(5)
+    assert session.here == Position(0)
+    session.back()
+    assert session.here == Position(0), "there is nothing before"
+    session.scan(3)
+    assert session.here == Position(3)
+
+
+@each_of("make", SESSIONS)
+def test_a_run_says_whether_it_got_there(make: Callable[[], Stepping]) -> None:
+    session = make()
+    session.goto(0)
+    stop = partial(at_line, 15, session)
+    assert session.run(stop, 1) is True and session.here == Position(0, 4)
+    assert session.run(stop, 1) is False and session.here == Position(1), "the statement that it stood at does not count"
+    assert session.run(stop, 2) is True and session.here == Position(1, 4)
+    assert session.run(lambda statement: statement is None, 1) is True and session.here == Position(1, STATEMENTS)
+    assert session.run(lambda statement: statement is None, 2) is True and session.here == Position(2, STATEMENTS)
+    assert session.run(lambda statement: False, 2) is False and session.here == Position(4)
+    assert session.run_back(stop) is True and session.here == Position(3, 4)
+    assert session.run_back(stop) is True and session.here == Position(2, 4)
+    assert session.run_back(lambda statement: False) is False and session.here == Position(2, 4)
+
+
+@each_of("make", SESSIONS)
+def test_what_changed_since_the_mark(make: Callable[[], Stepping]) -> None:
+    session = make()
+    session.goto(2)
+    session.mark()
+    assert list(session.changes()) == []
+    session.go_to(Position(2, STATEMENTS))
+    changes = {(each.place.name, each.old, each.new) for each in session.changes()}
+    assert changes == {("Main.N", "2", "3"), ("Main.T.A", "2", "3"), ("Main.T.Q", "4", "6"), ("Main.W", "0", "1")}
+
+
+def test_a_session_begins_with_nothing_changed() -> None:
+    session = past()
+    assert session.here.scan == 5 and list(session.changes()) == []
+    with pytest.raises(ValueError, match="nothing is recorded"):
+        empty = Recording().add("plc", Plc(session.facts.image))
+        PastSession(RecordedScans(empty, {}), "plc")
+
+
+def test_scans_outside_of_a_recording_are_its_ends() -> None:
+    session = past()
+    assert [session.reachable(scan) for scan in (-1, 0, 3, 5, 6)] == [0, 0, 3, 5, 5]
+    session.goto(9)
+    assert session.here == Position(5, STATEMENTS)
