@@ -78,8 +78,9 @@ def test_what_a_move_answers_and_where_it_stands(make: Callable[[], Stepping]) -
     assert session.play(1, partial(reached_step, STATEMENTS)) is False and line(session) is None
     session.go_to(Position(1, 99))
     assert session.here == Position(1, STATEMENTS)
-    for move, place in ((session.back, (1, 15)), (session.back, (1, 5)), (session.step_out, (1, 15)), (session.back_scan, (1, 13)),
-                        (session.step, (1, 14)), (session.step_over, (1, 15)), (session.step, (1, None)), (session.step, (2, 13)),
+    for move, place in ((session.back, (1, 15)), (session.back, (1, 5)), (session.step_out, (1, 15)),
+                        (session.back_scan, (1, 13)), (session.step, (1, 14)), (session.step_over, (1, 15)),
+                        (session.step, (1, None)), (session.step, (2, 13)),
                         (session.back, (1, None)), (session.step_over, (2, 13)), (session.back, (1, None)),
                         (session.step_out, (2, 13)), (session.step, (2, 14)), (session.step, (2, 4)),
                         (session.step_over, (2, 5)), (session.step_over, (2, 15))):  # fmt: skip
