@@ -79,3 +79,45 @@ def test_who_came_beside_the_last_caller_is_let_in_by_the_next_socket_unless_gon
             with socket.create_connection((where.host, where.port), 5):
                 assert opened(3 * MS) == [2]
     network.close()
+
+
+class Left:
+    """A connection that its unit has closed; `given_up` when that was."""
+
+    def __init__(self) -> None:
+        self.sock: socket.socket | None = None
+        self.given_up: list[int] = []
+
+    def give_up(self, now_ns: int) -> None:
+        self.given_up.append(now_ns)
+
+    def end(self) -> None:
+        self.given_up.append(-1)
+
+
+def test_a_closed_connection_has_ten_seconds_for_its_data() -> None:
+    network = TcpNetwork()
+    first, second, third = Left(), Left(), Left()
+    with socket.socket() as kept:
+        first.sock = third.sock = kept
+        for left, now_ns in ((first, 5), (second, 6), (third, 7)):
+            network.adopt(left, now_ns)
+        network.serve(10_000 * MS + 4)
+        assert (first.given_up, second.given_up) == ([], []), "one that has ended waits behind those before it"
+        network.serve(10_000 * MS + 5)
+        assert (first.given_up, second.given_up, third.given_up) == ([10_000 * MS + 5], [10_000 * MS + 5], [])
+    network.close()
+    assert third.given_up == [-1]
+
+
+def test_calls_are_made_when_they_are_due() -> None:
+    network, made = TcpNetwork(), list[int]()
+    for due_ns in (5, 6):
+        network.call_at(due_ns, lambda due_ns=due_ns: made.append(due_ns))  # type: ignore[misc]
+    network.serve(4)
+    assert made == []
+    network.serve(5)
+    assert made == [5]
+    network.serve(9)
+    assert made == [5, 6]
+    network.close()

@@ -63,3 +63,32 @@ def test_the_shortest_difference_is_found() -> None:
 def test_blocks_that_cannot_be_compared_are_refused(left: str, right: str, said: str) -> None:
     with pytest.raises(Unlike, match=said):
         compared(left, right)
+
+
+def test_the_program_that_calls_both_sides() -> None:
+    blocks = """FUNCTION_BLOCK One VAR_INPUT i : INT; j : BOOL; END_VAR VAR_OUTPUT q : BOOL; END_VAR VAR_IN_OUT io : INT; END_VAR
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Two VAR_INPUT I, J : SINT; END_VAR VAR_OUTPUT Q : BOOL; END_VAR VAR_IN_OUT IO : DINT; END_VAR END_FUNCTION_BLOCK
+FUNCTION F : INT VAR_INPUT i : INT; END_VAR VAR_OUTPUT q : BOOL; END_VAR VAR_IN_OUT io : REAL; END_VAR END_FUNCTION
+FUNCTION G : DINT VAR_INPUT i : INT; END_VAR VAR_OUTPUT q : BYTE; END_VAR VAR_IN_OUT io : LREAL; END_VAR END_FUNCTION
+FUNCTION H VAR_INPUT i : INT; END_VAR VAR_OUTPUT q : BOOL; END_VAR END_FUNCTION
+PROGRAM P END_PROGRAM"""
+    sources = [Source("blocks.st", blocks)]
+    assert pair(sources, ("One", "Two")).text.split("\n") == [
+        "PROGRAM Equal", "VAR_INPUT", "    i : INT;", "    j : BOOL;", "END_VAR", "VAR", "    Left_io : INT;", "    Left : One;",
+        "    Right_IO : DINT;", "    Right : Two;", "END_VAR", "    Left(i := i, j := j, io := Left_io);",
+        "    Right(I := I, J := J, IO := Right_IO);", "END_PROGRAM", ""]  # fmt: skip
+    assert pair(sources, ("F", "G")).text.split("\n") == [
+        "PROGRAM Equal", "VAR_INPUT", "    i : INT;", "END_VAR", "VAR", "    Left_io : REAL;", "    Left_q : BOOL;",
+        "    Left_Result : INT;", "    Right_io : LREAL;", "    Right_q : BYTE;", "    Right_Result : DINT;", "END_VAR",
+        "    Left_Result := F(i := i, io := Left_io, q => Left_q);",
+        "    Right_Result := G(i := i, io := Right_io, q => Right_q);", "END_PROGRAM", ""]  # fmt: skip
+    assert "    Left_Result : BOOL;\n" in pair(sources, ("H", "H")).text
+    assert "    H(i := i, q => Left_q);\n" in pair(sources, ("H", "H")).text
+    for names, said in ((("One", "F"), "One and F have other inputs: i, j; i"),
+                        (("F", "H"), "F and H have other in-outs: io; none"),
+                        (("P", "One"), "P is a PROGRAM: --equal compares function blocks and functions"),
+                        (("One", "Nobody"), "there is no Nobody in the files, nor in a library")):  # fmt: skip
+        with pytest.raises(Unlike) as refused:
+            pair(sources, names)
+        assert str(refused.value) == said

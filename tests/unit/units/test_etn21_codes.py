@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from etn21_rig import CIO, E2, SERVER, A, D, H, Rig, W
 from rows import each_of
@@ -343,3 +345,14 @@ def test_every_code_has_a_meaning() -> None:
     assert meaning_of(0x2607) == "parameter area is bound to another socket"
     assert meaning_of(0x004A) == "ECONNREFUSED"
     assert meaning_of(0x7777) == "unknown code"
+
+
+def test_the_errors_of_the_troubleshooting_table() -> None:
+    """Those of W420 8-6 p227 and W343 10-7 p210 by name; what only the host says is given the code of its BSD name."""
+    table = """ESRCH 0003  ENXIO 0006  EBADF 0009  EFAULT 000E  EEXIST 0011  EINVAL 0016  EMFILE 0018  EPROTONOSUPPORT 003C
+    EPROTOTYPE 003D  EISCONN 003F  ENOTCONN 0040  EALREADY 0041  EPIPE 0020  EACCES 000D  ENOBUFS 003E  ENOMEM 003E
+    EMSGSIZE 0042  ENOPROTOOPT 0044  ECONNABORTED 0045  EADDRINUSE 0049  ECONNREFUSED 004A  ECONNRESET 004B
+    EADDRNOTAVAIL 004C  ENETUNREACH 004E  EHOSTDOWN 004F  EHOSTUNREACH 0051  ETIMEDOUT 0053"""
+    expected = dict(re.findall(r"(\w+) (\w{4})", table))
+    assert {name: f"{code:04X}" for name, code in ERRNO.items()} == expected
+    assert code_of("ENOSYS") == 0x45 and meaning_of(0x3C) == "EPROTONOSUPPORT" and meaning_of(0x7777) == "unknown code"
