@@ -308,6 +308,14 @@ PROGRAM Main VAR p : Pair; r : REF_TO Pair; n, none : REF_TO INT; END_VAR r := R
         "Main.p = Pair (a := 3, b := FALSE)", "Main.r^.a = 3", "Main.r = -> Main.p", "Main.n = -> Main.p.a", "Main.none = NULL"]
 
 
+def test_an_empty_line_steps_and_later_moves_again() -> None:
+    commands = made()
+    said(commands, "", "print Main.N", "")
+    assert commands.session.here == Position(0, 2)
+    said(commands, "scan 2", "// a comment", "force Main.R = 3", "")
+    assert commands.session.here == Position(4)
+
+
 def test_mode_and_power_between_scans_only() -> None:
     commands = made()
     said(commands, "scan 2", "mode PROGRAM", "scan 2")

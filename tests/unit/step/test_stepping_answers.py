@@ -10,14 +10,17 @@ from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.machine.plc import Plc
+from fbvm.machine.plc import Phase, Plc
 from fbvm.record.recording.recording import Recording
 from fbvm.record.recording.scans import RecordedScans
-from fbvm.record.trace.events import Statement
+from fbvm.record.trace.events import Event, Statement
 from fbvm.step.past_session import PastSession
 from fbvm.step.position import Position
+from fbvm.step.scan_replay import Moment
 from fbvm.step.session import Session
+from fbvm.step.session_events import SessionEvents
 from fbvm.step.stepping import Stepping, reached_step
+from fbvm.step.stop_report import StopReport
 
 TEXT = """\
 FUNCTION_BLOCK Twice
@@ -136,3 +139,35 @@ def test_scans_outside_of_a_recording_are_its_ends() -> None:
     assert [session.reachable(scan) for scan in (-1, 0, 3, 5, 6)] == [0, 0, 3, 5, 5]
     session.goto(9)
     assert session.here == Position(5, STATEMENTS)
+
+
+@each_of("make", SESSIONS)
+def test_what_changed_is_counted_from_the_beginning_on(make: Callable[[], Stepping]) -> None:
+    session = make()
+    session.goto(1)
+    assert ("Main.N", "0" if isinstance(session, Session) else "6", "1") in {
+        (each.place.name, each.old, each.new) for each in session.changes()}
+
+
+@each_of("make", SESSIONS)
+def test_events_are_those_of_the_scans_that_are_asked_for(make: Callable[[], Stepping]) -> None:
+    session = make()
+    session.go_to(Position(2, 2))
+    seen: list[tuple[str, int]] = []
+
+    class Follower:
+        def phase(self, moment: Moment, phase: Phase) -> None:
+            seen.append((phase.name, moment.scans))
+
+        def event(self, moment: Moment, event: Event) -> None:
+            if isinstance(event, Statement):
+                seen.append(("", moment.scans))
+
+    events = SessionEvents(session, StopReport(session, {"text.st": TEXT}))  # type: ignore[arg-type]
+    events.follow(Follower(), range(1, 3))  # type: ignore[arg-type]
+    scan = ["INPUTS", "", "", "", "", "", "PROGRAM", "REFRESH"]
+    assert seen == [*((name, 1) for name in scan), ("INPUTS", 2), ("", 2), ("", 2)] and session.here == Position(2, 2)
+    seen.clear()
+    events.follow(Follower())  # type: ignore[arg-type]
+    assert events.scans == range(3) and [row for row in seen if row[1] == 0] == [(name, 0) for name in scan] and len(seen) == 19
+    assert events.line(session.facts.sites[0]) == TEXT.splitlines()[session.facts.sites[0].line - 1].strip()
