@@ -191,7 +191,6 @@ class Debugger:
         if found >= 0:
             session.go_to(Position(here.scan, found))
         else:
-            session.go_to(here)
             session.back()
         self.follow_focus()
 
@@ -327,7 +326,6 @@ class Debugger:
     def _end_run(self) -> None:
         for runner in self._runners.values():
             if isinstance(runner, LiveRunner):
-                runner.undo()
                 runner.end()
         self._runners = {}
 

@@ -223,6 +223,8 @@ def test_commands_that_cannot_be() -> None:
     rig.plc.write("Main.Command", False)
     rig.scan()
     assert rig.peer.received == []
+    rig.command(bytes.fromhex("03 00 00 00 01"))
+    assert (rig.plc.read("Main.Client.Error"), rig.plc.read("Main.Client.Error_Code")) == (False, 0)
 
 
 def test_a_command_while_one_runs() -> None:

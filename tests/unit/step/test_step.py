@@ -397,6 +397,17 @@ def test_where_power_flows_in_rungs() -> None:
     assert [row.split()[1] for row in said(commands, "rung").splitlines() if row.startswith("RUNG")] == ["1", "2"]
     assert [row.split()[1] for row in said(commands, "goto 1", "rung").splitlines() if row.startswith("RUNG")] == ["1"]
     assert not [row for row in said(commands, "goto 1", "list 10").splitlines() if row.endswith(("ON", "off"))]
+    with pytest.raises(CommandError, match="there are no rungs here"):
+        said(commands, "run 12", "scan", "back", "rung")
+
+
+def test_the_rungs_that_are_shown_are_those_of_the_pou() -> None:
+    block = LADDER.replace("PROGRAM", "FUNCTION_BLOCK").replace(" Main", " Lamp", 1).replace("RUNG 1", "RUNG 7")
+    commands = made(block + LADDER.replace("END_VAR", "l : Lamp; END_VAR l();", 1))
+    said(commands, "step")
+    with pytest.raises(CommandError, match="there is no rung 1; rungs are 7 to "):
+        said(commands, "rung 1")
+    assert said(commands, "rung 7") and [row for row in said(commands, "rung").splitlines() if row.startswith("RUNG")]
 
 
 @pytest.mark.slow
