@@ -25,7 +25,7 @@ ANY = [path for path in BLOCKS if re.search(r": ANY;", path.read_text(encoding="
 
 
 DIALECTS = {"matiec": [data_folder("fblib") / "matiec" / folder for folder in ("additional", "beremiz")],
-            "twincat": [data_folder("fblib") / "twincat" / "tcunit"]}
+            "twincat": [data_folder("fblib") / "twincat" / folder for folder in ("tcunit", "motion")]}
 """By dialect the folders of blocks that only this one has, or has in another way."""
 NEEDED = {name: {"Socket": 1} for name in ("ETN_Modbus_Line", "ETN_Modbus_Session")}
 """Parts of other blocks that are never without these."""

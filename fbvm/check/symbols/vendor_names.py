@@ -44,6 +44,8 @@ _BY_DIALECT = (
     (r"(?:LEFT|RIGHT|MID|INSERT|DELETE|REPLACE|CONCAT)_EXT", "a function of RuSTy: --dialect rusty brings it"),
     (r"ROUND", "a function of RuSTy, which --dialect rusty brings; a conversion rounds, too: REAL_TO_DINT(x)"),
     (r"FRAC|LTRUNC|LMOD|MODABS|MODTURNS|(?:GET|SET|CSET|CLEAR)BIT32", "a function of TwinCAT: --dialect twincat brings it"),
+    (r"AXIS_REF|ST_AxisStatus|MC_(?:Power|Reset|Move\w+|Home|Stop|Halt|Jog|Gear(?:In|InDyn|Out)|SetPosition|Direction|BufferMode)",
+     "a name of TwinCAT's Tc2_MC2: --dialect twincat brings it, with axes that do not move"),
     (r"TIME_TO_(?:[NUM]?S|[MHD])", "a function of STruC++: --dialect strucpp brings it"),
 )
 """Patterns of the names of types, blocks and functions that only a dialect brings, and what they are."""
