@@ -379,14 +379,13 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
 
 def _show_aggregate(plain: Type, value: list[Value] | dict[str, Value], hexadecimal: bool) -> str:
     """The elements of an array in brackets, the members of a structure or an instance in parentheses."""
-    if isinstance(plain, ArrayType) and isinstance(value, list):
+    if isinstance(value, list):
+        assert isinstance(plain, ArrayType)
         return "[" + ", ".join(show(plain.element, item, hexadecimal) for item in value) + "]"
-    if isinstance(plain, StructType) and isinstance(value, dict):
-        members = [f for f in plain.fields.values()
-                   if f.name in value and "$" not in f.name and not (plain.block and f.constant)]
-        members.sort(key=lambda f: _PINS.get(f.kind, len(_PINS)))
-        return "(" + ", ".join(f"{f.name} := {_member(f, value[f.name], hexadecimal)}" for f in members) + ")"
-    return str(value)
+    assert isinstance(plain, StructType)
+    members = [f for f in plain.fields.values() if f.name in value and "$" not in f.name and not (plain.block and f.constant)]
+    members.sort(key=lambda f: _PINS.get(f.kind, len(_PINS)))
+    return "(" + ", ".join(f"{f.name} := {_member(f, value[f.name], hexadecimal)}" for f in members) + ")"
 
 
 def _show_integer(plain: Type, value: int, hexadecimal: bool) -> str:

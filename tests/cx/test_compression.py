@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from fbvm.interchange.cx.compression import LONGEST, CompressionError, compress, decompress
+from fbvm.interchange.cx.compression import LONGEST, CompressionError, _matches, compress, decompress
 
 VECTORS = (("00 06 82 02 FE 01", b"A"), ("01 04 E2 80 7F", b"A"), ("00 06 82 08 D5 83 80 7F", b"ABABABAB"),
            ("01 04 62 D4 7A 04 FC 03", b"ABABABAB"))  # fmt: skip
@@ -15,6 +15,29 @@ VECTORS = (("00 06 82 02 FE 01", b"A"), ("01 04 E2 80 7F", b"A"), ("00 06 82 08 
 def test_plain_and_coded_literals_and_copies_that_overlap() -> None:
     for stream, plain in VECTORS:
         assert decompress(bytes.fromhex(stream)) == plain, stream
+    for stream, plain in VECTORS[::2]:
+        assert compress(plain) == bytes.fromhex(stream)
+
+
+def test_copies_of_all_lengths_and_literals_of_all_values_come_back() -> None:
+    lengths = [*range(1, 13), 15, 16, 23, 24, 39, 40, 71, 72, 135, 136, 263, 264, LONGEST]
+    for text in [bytes(range(256)), *(bytes(length + 1) for length in lengths)]:
+        assert decompress(compress(text)) == text
+    assert [length for _, length, _ in _matches(bytes(2 * LONGEST + 64))] == [0, LONGEST, LONGEST, 63]
+    assert [len(compress(b"ABCDEFGH"[:length])) for length in (0, 6, 7, 8)] == [4, 11, 12, 13]  # 9 bits each, and 16
+
+
+def test_what_stands_4096_bytes_before_is_copied_and_not_what_stands_one_more() -> None:
+    between = b"".join(bytes((n >> 7, 128 | n & 127)) for n in range(2050))
+    for distance, copies in ((4096, [(3, 4096)]), (4097, [])):
+        text = b"xyz" + between[: distance - 3] + b"xyz"
+        assert [(length, behind) for _, length, behind in _matches(text) if length] == copies
+
+
+def test_a_stream_is_as_long_as_it_may_be() -> None:
+    assert decompress(compress(b"abcd"), 4) == b"abcd"
+    with pytest.raises(CompressionError, match="longer than 3 bytes"):
+        decompress(compress(b"abcd"), 3)
 
 
 @pytest.mark.slow

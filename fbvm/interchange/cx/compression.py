@@ -161,11 +161,10 @@ def compress(data: bytes) -> bytes:
             writer.put(literal, 8)
             continue
         _put_length(writer, length_words, length)
-        low = 2 if length == 2 else 6
-        writer.put_symbol(distance_words[distance - 1 >> low])
-        writer.put((distance - 1) & (1 << low) - 1, low)
+        writer.put_symbol(distance_words[distance - 1 >> 6])
+        writer.put((distance - 1) & (1 << 6) - 1, 6)
     _put_length(writer, length_words, END)
-    writer.put(0, -writer.count % 8)
+    writer.put(0, 7)  # fills the last byte
     return bytes(writer.made)
 
 

@@ -42,6 +42,10 @@ def test_holds(text: str) -> None:
     assert holds(text)
 
 
+def test_a_condition_knows_the_places_that_it_reads() -> None:
+    assert [place.name for place in parse_condition("n > 1 AND (done OR NOT W 0.00)", resolve).places] == ["n", "done", "W0.00"]
+
+
 @each_of("text", [
     "tenth = 0.1", "0.1 = tenth", "tenth + 0.1 = 0.2", "long = 0.1", "tenth = REAL#0.1", "tenth > -0.1", "tenth * 10 = 1",
 ])  # fmt: skip

@@ -100,6 +100,7 @@ def test_a_range_is_its_places(text: str, names: list[str]) -> None:
     ("Main.a[4, 0].x", "Main.a[4, 0]: 4 is outside 1..3"),
     ("Main.a[1].x", "Main.a has 2 subscripts, 1 given"),
     ("Main.a[i, 0]", "a subscript is a whole number"),
+    ("Chart.fill.y", "Chart.fill is INT and has no member y"), ("HR99999", "is not an address"),
     ("Main.flags[0]", "Main.flags is WORD, not an array"),
     ("Main.flags.16", "Main.flags has bits 0..15; 16 does not exist"),
     ("Main.flags.bit", "Main.flags is WORD and has no member bit"),

@@ -20,6 +20,7 @@ from fbvm.watch.scanner import listed_places
 
 TEXT = """
 TYPE Pair : STRUCT a : INT; b : DINT; END_STRUCT END_TYPE
+TYPE Link : STRUCT there : REF_TO INT; n : INT; END_STRUCT END_TYPE
 FUNCTION_BLOCK Pump
 VAR n : INT; level AT D50 : INT; last : BOOL; pair : Pair; END_VAR
 VAR_IN_OUT io : INT; END_VAR
@@ -29,8 +30,9 @@ VAR
     pumps : ARRAY[1..2, 0..1] OF Pump; pair : Pair; wide AT CIO 30 : ARRAY[0..3] OF WORD; word AT CIO 31 : WORD;
     bit AT CIO 31.04 : BOOL; b AT %MX5.3 : BOOL; m AT %MW2 : WORD; r : REF_TO BOOL; t : STRING[4]; c : CHAR; d : DATE; l : LREAL;
     flag : BOOL; e : ARRAY[0..1] OF Pair; bits AT CIO 40.06 : ARRAY[0..11] OF BOOL; w : REF_TO WORD;
+    links : ARRAY[0..1] OF Link;
 END_VAR
-    r := REF(bit); w := REF(%MW20);
+    r := REF(bit); w := REF(%MW20); links[1].there := REF(pair.a);
 END_PROGRAM
 """.replace("word AT", "one AT")
 
@@ -75,6 +77,15 @@ def test_a_byte_belongs_to_the_smallest_variable_that_has_it(
         where = Place("", where.type, where.offset)
     found = names.at(where.offset + behind)
     assert (found and found.name) == name
+    if inside.endswith(".io"):
+        assert found is not None and isinstance(found.type, t.RefType) and found.type.target is t.INT
+
+
+def test_a_global_reference_is_known_by_its_own_eight_bytes() -> None:
+    names = Names({"R": Field("r", t.INT, SLOTS_OFFSET + 16, reference=True)}, AREAS)
+    found = names.at(SLOTS_OFFSET + 23)
+    assert found is not None and isinstance(found.type, t.RefType) and (found.name, found.type.target) == ("r", t.INT)
+    assert names.at(SLOTS_OFFSET + 24) is None
 
 
 @each_of(("address", "name"), [
@@ -143,6 +154,8 @@ def test_instances_are_known_by_where_they_begin(plc: Plc, names: Names) -> None
 def test_references_are_read_as_names(plc: Plc, names: Names) -> None:
     assert names.read(plc.read, place(plc, "Main.r")) == "-> Main.bit"
     assert names.read(plc.read, place(plc, "Main.w")) == "-> %MW20"
+    links = [{"there": None, "n": 0}, {"there": "-> Main.pair.a", "n": 0}]
+    assert names.read(plc.read, place(plc, "Main.links")) == links
     assert names.read(plc.read, place(plc, "Main.pair")) == {"a": 0, "b": 0}
     assert names.read(plc.read, place(plc, "Main.flag")) is False
 

@@ -7,7 +7,7 @@ from rows import each_of
 
 from fbvm import Plc, compile_text
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.base.types import INT
+from fbvm.base.types import INT, Field
 from fbvm.code.image import Image
 from fbvm.code.operations import FIRST_OBJECT, OBJECT_SHIFT, OFFSET_SHIFT
 from fbvm.watch.bits import bits_of, meet, written_bits, written_twice
@@ -65,6 +65,14 @@ def test_outside_of_instances_there_is_no_this(plc: Plc) -> None:
         Scope(plc.find).find("THIS.n")
     assert (place_of(plc.find, ""), place_of(plc.find, "Main.nobody"), place_of(plc.find, "D1..D3")) == (None, None, None)
     assert place_of(plc.find, "Main.one") == place(plc, "Main.one")
+
+
+def test_what_lives_in_the_body_alone_is_found_in_front_of_the_instance(plc: Plc) -> None:
+    local = {"N": Field("n", INT, 96), "PAIR": Field("pair", place(plc, "Main.pair").type, 104)}
+    scope = Scope(plc.find, place(plc, "Main.one"), local)
+    assert [found.offset for found in map(scope.find, ("n", "Pair.b")) if isinstance(found, Place)] == [96, 108]
+    with pytest.raises(UnknownPlace, match="n is INT and has no member a"):
+        scope.find("n.a")
 
 
 @each_of(("pou", "most", "found"), [

@@ -21,6 +21,7 @@ from fbvm.watch.values import (
     plain_value,
     show,
     show_time,
+    sort_of,
 )
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
@@ -29,6 +30,8 @@ CHAR, WCHAR, WIDE = t.ELEMENTARY["CHAR"], t.ELEMENTARY["WCHAR"], t.string(3, wid
 PINS = StructType("Block", 16, 8, {name.upper(): Field(name, t.INT, at, section) for at, (name, section) in enumerate(
     [("out", "VAR_OUTPUT"), ("own", "VAR"), ("both", "VAR_IN_OUT"), ("in", "VAR_INPUT")])}, block=True)
 PAIR = StructType("Pair", 16, 8, {"N": Field("n", t.INT, 0), "S": Field("s", t.string(5), 2)})
+WITH_CONSTANT = {"N": Field("n", t.INT, 0), "LIMIT": Field("limit", t.INT, 2, constant=True), "$EDGE": Field("$edge", t.INT, 4)}
+BLOCK, RECORD = (StructType("Kept", 8, 8, WITH_CONSTANT, block=block) for block in (True, False))
 
 
 @each_of(("text", "time_ns"), [
@@ -44,6 +47,19 @@ def test_times_are_read(text: str, time_ns: int) -> None:
 def test_what_is_no_time_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is no time; write 10ms"):
         parse_time_ns(text)
+
+
+def test_a_time_with_thousands_of_digits_behind_its_point_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"5000 digits behind its point is finer than any clock"):
+        parse_time_ns(f"1.{'0' * 5000}s")
+
+
+@each_of(("kind", "sort"), [
+    (PAIR, ""), (t.array(((0, 1),), t.INT), ""), (COLOUR, "enumeration"), (CHAR, "text"), (t.string(), "text"), (t.BOOL, "BOOL"),
+    (t.ELEMENTARY["LDATE"], "DATE"), (t.ELEMENTARY["LTIME"], "time"), (LEVEL, "number"), (t.WORD, "number"),
+])  # fmt: skip
+def test_values_of_one_sort_can_be_compared(kind: Type, sort: str) -> None:
+    assert sort_of(kind) == sort
 
 
 @each_of(("time_ns", "text"), [
@@ -147,6 +163,8 @@ def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) ->
     (t.BOOL, True, "TRUE"), (t.INT, -5, "-5"), (t.WORD, 255, "255"), (t.TIME, 1_500_000_000, "T#1s500ms"),
     (t.string(), "a", "'a'"), (COLOUR, 5, "Green (5)"), (COLOUR, 3, "? (3)"), (t.REAL, math.inf, "inf"),
     (t.array(((0, 1),), t.BOOL), [True, False], "[TRUE, FALSE]"), (PAIR, {"n": 1, "s": "x"}, "(n := 1, s := 'x')"),
+    (BLOCK, {"n": 1, "limit": 2, "$edge": 3}, "(n := 1)"), (RECORD, {"n": 1, "limit": 2}, "(n := 1, limit := 2)"),
+    (PAIR, {"s": "x"}, "(s := 'x')"),
     (t.NULL, None, "NULL"), (t.string(), "it's $5\n\x01", "'it$'s $$5$L$01'"), (CHAR, "a", "'a'"), (CHAR, "\0", "'$00'"),
     (t.DATE, 1_749_686_400_000_000_000, "D#2025-06-12"), (t.DT, 1_749_738_615_000_000_000, "DT#2025-06-12-14:30:15"),
     (t.TOD, 52_215_000_000_000, "TOD#14:30:15"),
@@ -209,6 +227,19 @@ def test_an_array_takes_as_many_as_it_has(memory: Memory) -> None:
         places.write(memory, Place("x", t.array(((0, 2),), t.INT), SLOTS_OFFSET), [1])
 
 
+def test_several_values_are_written_each_to_its_place(memory: Memory) -> None:
+    one, other = Place("one", t.INT, SLOTS_OFFSET), Place("other", t.BOOL, SLOTS_OFFSET + 8, 3)
+    places.write_all(memory, {one: -5, other: True})
+    assert (places.read(memory, one), memory.u8[SLOTS_OFFSET + 8]) == (-5, 8)
+
+
+def test_an_array_of_bits_goes_on_in_the_next_byte(memory: Memory) -> None:
+    bits = Place("bits", t.array(((0, 11),), t.BOOL), SLOTS_OFFSET, 6)
+    places.write(memory, bits, [True, False, True, *[False] * 8, True])
+    assert list(memory.u8[SLOTS_OFFSET : SLOTS_OFFSET + 3]) == [0x40, 0x01, 0x02]
+    assert places.read(memory, bits) == [True, False, True, *[False] * 8, True]
+
+
 def test_a_structure_takes_some_of_its_members(memory: Memory) -> None:
     place = Place("x", PAIR, SLOTS_OFFSET)
     places.write(memory, place, {"s": "ab"})
@@ -222,6 +253,7 @@ def test_a_reference_is_followed(memory: Memory) -> None:
     place = Place("x", t.INT, SLOTS_OFFSET, hops=(4,))
     places.write(memory, place, -7)
     assert memory.read(SLOTS_OFFSET + 36, "i16") == -7
+    assert places.dereferenced(memory, place) == Place("x", t.INT, SLOTS_OFFSET + 36)
     assert places.read(memory, place) == -7
 
 
@@ -233,7 +265,7 @@ def test_a_reference_to_a_bit_is_followed(memory: Memory) -> None:
 
 def test_a_null_reference_reads_as_none_and_takes_nothing(memory: Memory) -> None:
     place = Place("x", t.INT, SLOTS_OFFSET, hops=(0,))
-    assert places.read(memory, place) is None
+    assert places.read(memory, place) is None and places.dereferenced(memory, place) is None
     with pytest.raises(ValueError, match="behind a reference that is null"):
         places.write(memory, place, 1)
 
