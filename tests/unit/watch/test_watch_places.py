@@ -88,6 +88,19 @@ def test_a_global_reference_is_known_by_its_own_eight_bytes() -> None:
     assert names.at(SLOTS_OFFSET + 24) is None
 
 
+def test_bytes_without_a_name_are_passed_over_one_by_one() -> None:
+    block = t.StructType("Block", 16, 8, {"R": Field("r", t.INT, 0, reference=True), "N": Field("n", t.BOOL, 8)}, block=True)
+    names = Names({"X": Field("x", t.BOOL, SLOTS_OFFSET + 17), "B": Field("b", block, SLOTS_OFFSET + 24)}, AREAS)
+    assert [found.name for found in names.within(SLOTS_OFFSET + 16, 17)] == ["x", "b.r", "b.n"]
+
+
+def test_a_pointer_is_outside_of_the_variable_that_fills_its_object_or_of_what_begins_there() -> None:
+    start = SLOTS_OFFSET + 16
+    names = Names({"A": Field("a", t.array(((0, 2),), t.INT), start)}, AREAS, [(start, start + 6), (start, start + 4), (4, 8)])
+    told = [names.reference_name(FIRST_OBJECT + row << OBJECT_SHIFT | 9 << OFFSET_SHIFT | WHOLE_BYTES, t.INT) for row in range(3)]
+    assert told == ["outside of a", "outside of a[0]", "outside of its variable"]
+
+
 @each_of(("address", "name"), [
     ("CIO 31.04", "Main.bit"), ("CIO 31.05", "CIO 31.05"), ("CIO 33.15", "CIO 33.15"), ("%MX5.3", "Main.b"), ("%MX5.4", "%MX5.4"),
     ("D51.09", "D51.09"), ("CIO 40.06", "Main.bits[0]"), ("CIO 40.15", "Main.bits[9]"), ("TF5", "T0005"), ("W3.08", "W3.08"),
@@ -278,6 +291,8 @@ def test_parentheses_go_so_deep_and_not_deeper(plc: Plc) -> None:
     assert parse_condition(deep, plc.find).holds(plc.read)
     with pytest.raises(ConditionError):
         parse_condition(f"({deep})", plc.find)
+    with pytest.raises(ConditionError):
+        parse_condition("(TRUE) AND " * most + f"({deep})", plc.find)
 
 
 APART = """PROGRAM Main

@@ -145,4 +145,5 @@ def test_writes_by_two_statements_that_share_a_watched_bit() -> None:
         (writes[0], writes[1]), (writes[0], writes[2]), (writes[1], writes[3])]
     assert list(written_twice(writes, [range(32, 40)])) == [(writes[0], writes[2])]
     assert list(written_twice(writes, [])) == []
+    assert (written_bits(5, 2), written_bits(5, 2, 3)) == (range(40, 56), range(43, 44))
     assert meet(range(5), range(4, 9)) and not meet(range(4), range(4, 9))

@@ -7,6 +7,7 @@ from rows import each_of
 
 from fbvm.base import types as t
 from fbvm.base.areas import AREAS, SLOTS_OFFSET
+from fbvm.base.digits import MOST_DIGITS
 from fbvm.base.memory import Memory
 from fbvm.base.types import EnumType, Field, StructType, SubrangeType, Type
 from fbvm.watch import places
@@ -25,7 +26,7 @@ from fbvm.watch.values import (
 )
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
-LEVEL = SubrangeType("Level", 2, 2, t.INT, 0, 100)
+LEVEL, FEW = SubrangeType("Level", 2, 2, t.INT, 0, 100), SubrangeType("Few", 2, 2, t.WORD, 1, 5)
 CHAR, WCHAR, WIDE = t.ELEMENTARY["CHAR"], t.ELEMENTARY["WCHAR"], t.string(3, wide=True)
 PINS = StructType("Block", 16, 8, {name.upper(): Field(name, t.INT, at, section) for at, (name, section) in enumerate(
     [("out", "VAR_OUTPUT"), ("own", "VAR"), ("both", "VAR_IN_OUT"), ("in", "VAR_INPUT")])}, block=True)
@@ -50,8 +51,9 @@ def test_what_is_no_time_is_refused(text: str) -> None:
 
 
 def test_a_time_with_thousands_of_digits_behind_its_point_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"5000 digits behind its point is finer than any clock"):
-        parse_time_ns(f"1.{'0' * 5000}s")
+    assert parse_time_ns(f"1.{'0' * MOST_DIGITS}s") == 1_000_000_000
+    with pytest.raises(ValueError, match="digits behind its point is finer than any clock"):
+        parse_time_ns(f"1.{'0' * (MOST_DIGITS + 1)}s")
 
 
 @each_of(("kind", "sort"), [
@@ -81,7 +83,8 @@ def test_literals(text: str, value: object) -> None:
 
 
 @each_of(("kind", "text", "value"), [
-    (t.INT, "-5", -5), (t.WORD, "16#FFFF", 65535), (t.BOOL, "TRUE", True), (t.BOOL, "1", True), (t.REAL, "2", 2.0),
+    (t.INT, "-5", -5), (t.WORD, "16#FFFF", 65535), (t.BOOL, "TRUE", True), (t.BOOL, "1", True), (t.BOOL, "0", False),
+    (t.REAL, "2", 2.0),
     (t.TIME, "10ms", 10_000_000), (t.string(), "a, b", "a, b"), (t.string(), "'x'", "x"), (COLOUR, "green", 5),
     (COLOUR, "Colour#Red", 0), (COLOUR, "Colour.Red", 0), (t.BOOL, "on", True), (t.BOOL, "OFF", False),
     (t.DT, "DT#2024-01-01-00:00:00", 1_704_067_200_000_000_000), (t.DATE, "2024-01-01", 1_704_067_200_000_000_000),
@@ -145,6 +148,7 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
     (t.WORD, "-1", "x: -1 is out of range of WORD, which holds 0..65535; for these bits write 65535 or 16#FFFF"),
     (t.BOOL, "2", "x is BOOL and takes TRUE or FALSE, not 2"), (t.INT, "1e3", "x is INT and takes a whole number, not 1e3"),
     (t.BYTE, "-129", "x: -129 is out of range of BYTE, which holds 0..255"),
+    (FEW, "0", "x: 0 is out of range of Few, which holds 1..5"),
     (t.INT, "noon", "x: 'noon' is no literal; INT takes a whole number"),
     (t.INT, "'", "x: \"'\" is no literal; INT takes a whole number"),
     (t.DATE, "DT#2024-01-01-00:00:00",
