@@ -7,10 +7,13 @@ import os
 from pathlib import Path
 
 import pytest
+from lang_corpus import HERE as CORPUS
+from lang_corpus import read
 from rows import each_of
 
-from fbvm.base.diagnostics import Source
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.parser import parse
+from fbvm.syntax.tree.node import walk
 from fbvm.syntax.tree.outline import dump
 
 HERE = Path(__file__).resolve().parent
@@ -36,3 +39,26 @@ def test_messages_of_a_wrong_source(path: Path) -> None:
     tree, diagnostics = parse(Source(path.name, path.read_text(encoding="utf-8")))
     assert diagnostics and tree.end == path.stat().st_size - sum(len(c.encode()) - 1 for c in path.read_text("utf-8"))
     check_golden(path.with_suffix(".messages"), "".join(d.render() + "\n\n" for d in diagnostics))
+
+
+WRONG = [path for path in sorted(CORPUS.glob("**/*.st")) if "error S01" in path.read_text(encoding="utf-8")]
+
+
+def told(found: Diagnostic) -> str:
+    """A message on one line: `line:column: code ! what is marked ! message ! hint`; `~` if some text was passed over."""
+    line, column = found.source.place(found.start)
+    marked = found.source.text[found.start : found.end]
+    lost = "" if found.lossless else "~"
+    parts = [f"{line}:{column}: {lost}{found.code}", marked, found.message, found.hint]
+    return " ! ".join(parts).rstrip(" !").replace("\n", "$L")
+
+
+@pytest.mark.slow
+@each_of("path", WRONG, ids=lambda p: f"{p.parent.name}/{p.stem}")
+def test_places_of_mistakes_and_how_much_is_read(path: Path) -> None:
+    lines = []
+    for program in (each for each in read(path) if any(message.code < "S02" for message in each.diagnostics)):
+        tree, diagnostics = parse(Source(path.name, program.text))
+        if wrong := [told(found) for found in diagnostics]:
+            lines += [f"--- {program.title}", *wrong, f"{sum(1 for _ in walk(tree))} nodes"]
+    check_golden(HERE / "places" / f"{path.parent.name}.{path.stem}", "\n".join([*lines, ""]))

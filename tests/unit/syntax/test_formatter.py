@@ -169,6 +169,21 @@ def test_a_long_condition_is_broken_at_its_weakest_operator() -> None:
         """)
 
 
+def test_a_part_that_is_broken_itself_stands_further_in() -> None:
+    words = [f"Condition_Number_{n}" for n in range(7)]
+    assert body(f"IF {' AND '.join(words[:6])} OR {words[6]} THEN a; END_IF") == text("""
+        IF Condition_Number_0
+               AND Condition_Number_1
+               AND Condition_Number_2
+               AND Condition_Number_3
+               AND Condition_Number_4
+               AND Condition_Number_5
+           OR Condition_Number_6 THEN
+            a;
+        END_IF;
+        """)
+
+
 def test_where_no_room_is_left_arguments_begin_on_a_line_of_their_own() -> None:
     name = "Somewhere_In_A_Plant.Some_Machine.Some_Group.Some_Member_Of_It.Move_To_A_Place"
     assert body(f"{name}(First_Argument := 1234567, Second := 2345678);") == (
@@ -279,6 +294,11 @@ def test_names_are_written_as_declared() -> None:
         END_PROGRAM""").split("\n")[-7:] == [
             "    m[1](Go := TRUE, Place => Origin);", "    small := N[2].Place.X;", "    k := Kind#Large;",
             "    unknown := Unknown;", "    k := Large;", "END_PROGRAM", ""]
+
+
+def test_an_external_variable_without_its_global_one_is_spelt_as_it_is_declared() -> None:
+    given = "PROGRAM p VAR_EXTERNAL Pump, Valve : INT; END_VAR pump := VALVE; END_PROGRAM VAR_GLOBAL VaLve : INT; END_VAR"
+    assert "    Pump, VaLve : INT;" in written(given) and "    Pump := VaLve;" in written(given)
 
 
 # --- the text as a whole ---

@@ -33,3 +33,10 @@ def test_charts(action: str, condition: str, message: str) -> None:
 def test_a_comment_behind_a_comment_is_a_mistake_with_its_place() -> None:
     (diagnostic,) = said("LADDER\n' a note // and another\nLD A\nOUT M\nEND_LADDER")
     assert ":4:1: error S0109: this is no instruction" in diagnostic
+
+
+@each_of(("constant", "fits"), [("+32767", True), ("+32768", False), ("-32768", True), ("-32769", False), ("&65535", True),
+                                ("&65536", False), ("#FFFF", True), ("#10000", False)])
+def test_a_constant_has_sixteen_bits_in_a_word(constant: str, fits: bool) -> None:
+    messages = said(f"LADDER\nLD A\nMOV {constant} D0\nOUT M\nEND_LADDER")
+    assert [f"{constant} does not fit in 16 bits" in message for message in messages] == ([] if fits else [True])

@@ -68,6 +68,7 @@ ONE_ERROR = [
     ("VAR_IN a : INT; END_VAR y := 1;", "`VAR_IN` is no word of Structured Text", 1),
     ("VAR END, VAR_X : INT; END_VAR END := VAR_X; VAR_X := END + VAR_X;", "", 2),
     ("(a : INT) y := 1;", "`(` behind the name `f` of a POU", 1),
+    ("a : INT; y := 1;", "a declaration stands in front of all statements", 2),
     ("1: x := 1;", "label of CASE outside of a CASE statement", 2),
 ]
 

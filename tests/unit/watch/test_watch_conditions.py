@@ -37,6 +37,7 @@ def holds(text: str) -> bool:
     "c = 5", "list[1] = 3", "n / 2 = -3", "n MOD 2 = -1", "D200 - 13 = 5 * 10 * 10",
     "(1 + 2) * 3 = 9", "1 + 2 * 3 = 7", "TRUE OR FALSE AND FALSE", "NOT done OR n < 0", "done = TRUE", "done XOR FALSE",
     "-n = 7", "+n = -7", "n.0", "%D200 <= 513", "done = 1", "done = 2 - 1", "INT#5 > 4", "n < 1e3",
+    "7 / 2.0 = 3.5", "0 MOD 5 = 0", "7.0 / 2 = 3.5",
 ])  # fmt: skip
 def test_holds(text: str) -> None:
     assert holds(text)

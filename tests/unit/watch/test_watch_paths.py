@@ -69,6 +69,11 @@ def test_a_way_through_a_reference_is_kept() -> None:
     assert (found.offset, found.hops, found.type.name) == (180224 + 88, (4,), "DINT")
 
 
+def test_what_lies_in_an_older_frame_is_found_through_the_links() -> None:
+    found = find_place({"OLD": Field("old", t.INT, 4, frame_at=(190100, 8, 16))}, AREAS, "old")
+    assert (found.offset, found.hops) == (190100, (8, 16, 4))
+
+
 def test_what_the_compiler_has_added_is_known() -> None:
     added = {"Main.conn.ENO": False, "CIO 1509.15": False, "Main.a[1, 0].y": False}
     assert {text: place(text).is_generated for text in added} == added

@@ -183,9 +183,12 @@ def test_a_reference_that_has_left_an_area_is_outside_of_it() -> None:
 
 def test_an_array_in_out_that_is_bound_to_nothing_yet_is_read_as_none() -> None:
     image = compile_text("""FUNCTION_BLOCK Low VAR_IN_OUT all : ARRAY[0..1] OF REF_TO INT; one : INT; END_VAR END_FUNCTION_BLOCK
-PROGRAM Main VAR low : Low; END_VAR ; END_PROGRAM""", lint=False).image
+FUNCTION_BLOCK Near VAR_IN_OUT one : INT; END_VAR END_FUNCTION_BLOCK
+PROGRAM Main VAR low : Low; near : Near; x : INT := 300; END_VAR near(one := x); END_PROGRAM""", lint=False).image
     assert image is not None
     plc = Plc(image)
+    plc.scan()
+    assert plc.read("Main.near") == {"one": 300}
     assert Names.of(image, plc.memory.areas).read(plc.read, place(plc, "Main.low")) == {"all": None, "one": None}
 
 
