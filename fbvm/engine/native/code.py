@@ -77,9 +77,13 @@ class Code:
         """Has the helper process compile fast code, unless it does already."""
         if not self._waiting:
             self._waiting = True
-            worker.compile(lambda: self.translation.text, self._improve)
+            worker.compile(self)
 
-    def _improve(self, compiled: bytes) -> None:
+    def job_text(self) -> str:
+        """Called in the worker's thread: what is to be compiled."""
+        return self.translation.text
+
+    def improve(self, compiled: bytes) -> None:
         """Called in the worker's thread with the object of fast code: loads it, and points the entry points that follow to it."""
         stored = Stored(_facts(self.translation), compiled)
         native_cache.write(self._name(FAST), stored)

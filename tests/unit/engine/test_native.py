@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,7 @@ def test_every_operation_has_a_row() -> None:
 
 
 def test_an_engine_is_made_while_fast_code_is_compiled_for_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worker, "compile", lambda text, ready: None)  # it never gets ready
+    monkeypatch.setattr(worker, "compile", lambda job: None)  # it never gets ready
     program = image((store("i16", 0, ("add", "i16", load("i16", 0), const("i16", 77))),))
     code = code_of(program)  # which lives as long as somebody holds it
     code.request()
@@ -148,13 +149,13 @@ def test_many_scans_of_nothing() -> None:
 def test_fast_code_follows_quick_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FBVM_CACHE", str(tmp_path))
     asked: list[Any] = []
-    monkeypatch.setattr(worker, "compile", lambda text, done: asked.append((text, done)))
+    monkeypatch.setattr(worker, "compile", asked.append)
     program = image((*COUNT, store("i16", 2, ONE)))
     engines = [NativeEngine(program, power_on(program)) for _ in range(2)]
     assert not engines[0].optimised and len(asked) == 1
     engines[0].run(0)
-    (text, done), = asked
-    done(native_compiler.compile_text(text(), 2))
+    [job] = asked
+    job.improve(native_compiler.compile_text(job.job_text(), 2))
     engines[0].run(0)
     assert engines[0].optimised and slot(engines[0]) == 2
     again = NativeEngine(image((*COUNT, store("i16", 2, ONE))), power_on(program))
@@ -170,6 +171,38 @@ def test_the_helper_process_optimises() -> None:
         assert ctypes.CFUNCTYPE(ctypes.c_int32)(linked.address("f"))() == 7
     finally:
         helper.stop()
+
+
+class Job:
+    """What wants a module with this text, and tells when it has it."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.done = text, threading.Event()
+
+    def job_text(self) -> str:
+        return self.text
+
+    def improve(self, compiled: bytes) -> None:
+        assert compiled == self.text.encode()
+        self.done.set()
+
+
+def test_what_nobody_waits_for_any_more_is_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    helper, asked, go_on = type(worker)(), [], threading.Event()
+
+    def answer(text: bytes) -> bytes:
+        asked.append(text)
+        assert go_on.wait(10)
+        return text
+
+    monkeypatch.setattr(helper, "_answer", answer)
+    first, gone, last = Job("first"), Job("gone"), Job("last")
+    for job in (first, gone, last):
+        helper.compile(job)
+    del job, gone
+    go_on.set()
+    assert last.done.wait(10) and first.done.is_set()
+    assert asked == [b"first", b"last"]
 
 
 def test_a_helper_process_that_is_ended_while_it_is_told_something() -> None:

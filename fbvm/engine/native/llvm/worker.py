@@ -11,9 +11,9 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
-from typing import IO
+from typing import IO, Protocol
+from weakref import ref
 
 from fbvm.engine.apart import DEAF, run_apart
 from fbvm.engine.native.llvm.compiler import compile_text
@@ -57,22 +57,32 @@ def serve_one(job: IO[bytes], answer: IO[bytes], level: int) -> None:
     answer.write(compile_text(job.read().decode(), level))
 
 
+class Job(Protocol):
+    """What wants a module optimised; both are called in the thread."""
+
+    def job_text(self) -> str:
+        """The text of the module."""
+
+    def improve(self, compiled: bytes) -> None:
+        """Takes the object file."""
+
+
 class Worker:
-    """Gives jobs to the helper process, which is started with the first job."""
+    """Gives jobs to the helper process, which is started with the first job.
+
+    A job that nobody holds any more when its turn comes is left out: programs whose PLCs are gone keep no other waiting."""
 
     def __init__(self) -> None:
-        self._jobs: deque[tuple[Callable[[], str], Callable[[bytes], None]]] = deque()
+        self._jobs: deque[ref[Job]] = deque()
         self._lock = threading.Lock()
         self._busy = False
         self._process: subprocess.Popen[bytes] | None = None
         self._owner = os.getpid()
 
-    def compile(self, text: Callable[[], str], done: Callable[[bytes], None]) -> None:
-        """Has a module optimised.  `text` returns its text and `done` takes its object file; both are called in the thread.
-
-        If the helper process cannot be started or dies, `done` is never called."""
+    def compile(self, job: Job) -> None:
+        """Has a module optimised.  If the helper process cannot be started or dies, the job is never told."""
         with self._lock:
-            self._jobs.append((text, done))
+            self._jobs.append(ref(job))
             if not self._busy:
                 self._busy = True
                 threading.Thread(target=self._work, name="fbvm compiler", daemon=True).start()
@@ -83,10 +93,12 @@ class Worker:
                 if not self._jobs:
                     self._busy = False
                     return
-                text, done = self._jobs.popleft()
-            compiled = self._answer(text().encode())
-            if compiled:
-                done(compiled)
+                job = self._jobs.popleft()()
+            if job:
+                compiled = self._answer(job.job_text().encode())
+                if compiled:
+                    job.improve(compiled)
+            del job
 
     def _answer(self, text: bytes) -> bytes:
         try:
