@@ -124,6 +124,7 @@ CODES: dict[str, Code] = {
         "S0293": "input is never read",
         "S0294": "output is never written",
         "S0295": "variable of a block is used from outside",
+        "S0296": "address of a temporary variable is kept",
         "S0390": "reals compared for equality",
         "S0391": "fraction of an integer division is lost",
         "S0392": "sign in front of a power",

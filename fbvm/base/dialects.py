@@ -98,6 +98,7 @@ class Dialect:
     dates_take_durations: bool = False
     callables_apart: bool = False
     sizes_apart: bool = False
+    integers_are_conditions: bool = False
     short_names: bool = False
     own_time: bool = False
     short_circuit_words: bool = False
@@ -229,6 +230,8 @@ QUESTIONS = {
                         "pointer"),
     "dates_take_durations": ("D#2024-12-31 + T#1d: a DATE and a TIME", "an error",
                              "the DATE so much later or earlier, which may have hours in it"),
+    "integers_are_conditions": ("IF n THEN, WHILE n DO, UNTIL n, where n is an integer or a bit string", "an error: n <> 0",
+                                "TRUE unless n is 0, with a warning (S0193)"),
     "sizes_apart": ("a AT %QX0.0 beside b AT %QW0: addresses of two sizes", "a is a bit of b: one memory for all sizes",
                     "a is no part of b: each of %QX, %QB, %QW, %QD and %QL has memory of its own, as on a PLC of OpenPLC or "
                     "Beremiz, and so have those of %I and %M"),
@@ -314,6 +317,7 @@ _ROWS = (
             constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True,
             sizes_apart=True, short_references=True, doubled_quotes=True),
     Dialect("rusty", "programs for RuSTy", ("rusty",), reals_of_other_widths=True, loop_ends_each_pass=True,
+            integers_are_conditions=True,
             loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,

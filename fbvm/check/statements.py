@@ -183,8 +183,9 @@ class _Statements:
     # --- choices ----------------------------------------------------------------------------------------------------
 
     def _if(self, node: tree.If) -> None:
+        word = self._conditional(node)
         for condition, body in node.branches:
-            self.scope.condition(condition, self._conditional(node))
+            self.scope.condition(condition, word, statement=word == "IF")
             self.block(body)
         self.block(node.otherwise or ())
 
@@ -303,12 +304,12 @@ class _Statements:
         self._loops -= 1
 
     def _while(self, node: tree.While) -> None:
-        self.scope.condition(node.condition, "WHILE")
+        self.scope.condition(node.condition, "WHILE", statement=True)
         self._body(node.body)
 
     def _repeat(self, node: tree.Repeat) -> None:
         self._body(node.body)
-        self.scope.condition(node.until, "UNTIL")
+        self.scope.condition(node.until, "UNTIL", statement=True)
 
     def _try(self, node: tree.Try) -> None:
         self.block(node.body)

@@ -19,7 +19,7 @@ from fbvm.check.symbols.elementary_types import elementary_type
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
 from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
-from fbvm.syntax.tree.node import copied, walk
+from fbvm.syntax.tree.node import changed, copied, walk
 
 
 def variables(declared: tree.Pou) -> dict[str, str]:
@@ -86,12 +86,25 @@ def function(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> Pou 
         return None
     key = pou, tuple(sorted((name, kind.name) for name, kind in types.items()))
     if key not in scope.project.instantiated:
-        made = Pou(pou.name, pou.kind, pou.source, copied(pou.tree), types=types, as_written=False)
+        made = Pou(pou.name, pou.kind, pou.source, _with_wide_texts(copied(pou.tree), types), types=types, as_written=False)
         scope.project.instantiated[key] = made
         if not scope.context.interface(made, pou.source, call):
             return None
         scope.context.check_body(made)
     return scope.project.instantiated[key]
+
+
+def _with_wide_texts(declared: tree.Pou, types: dict[str, Type]) -> tree.Pou:
+    """A function with "" in place of '', the initial value of a parameter of generic type that stands for WSTRING."""
+    wide = {name for name, kind in types.items() if isinstance(kind, StringType) and kind.wide}
+    if not wide:
+        return declared
+    sections = tuple(changed(section, variables=tuple(
+        changed(variable, initial=changed(variable.initial, kind="wstring"))
+        if isinstance(variable.spec, tree.NamedType) and fold(variable.spec.text) in wide
+        and isinstance(variable.initial, tree.Literal) and (variable.initial.kind, variable.initial.value) == ("string", "")
+        else variable for variable in section.variables)) for section in declared.sections)
+    return changed(declared, sections=sections)
 
 
 def _types(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> dict[str, Type] | None:

@@ -168,15 +168,23 @@ class Scope:
             self.loses(expr, "S0792", "this is no number (NAN)" if value != value else
                        f"this is infinite ({'-' if value < 0 else ''}INF)")
 
-    def condition(self, expr: tree.Expr, what: str) -> None:
-        """Infer an expression that must be BOOL; `what` names the statement in the message."""
+    def condition(self, expr: tree.Expr, what: str, statement: bool = False) -> None:
+        """Infer an expression that must be BOOL; `what` names the statement in the message.
+
+        For a `statement`, IF, WHILE or REPEAT, some dialects take a number, too."""
         kind = self.infer(expr, BOOL)
         if is_untyped(kind):
             kind = self.adopt(expr, BOOL, "S0303")
         if kind is not None and base(kind) != BOOL:
+            number = statement and is_any(kind, "ANY_INT", "ANY_BIT")
+            if number and self.dialect.integers_are_conditions:
+                self.context.report.add("S0193", self.source, expr, f"the condition of {what} is {kind}: TRUE unless it is 0",
+                                f"write {self.text(expr)} <> 0")
+                return
             step = isinstance(kind, StructType) and not kind.block and set(kind.fields) == {fold("X"), fold("T")}
             self.error("S0303", expr, f"the condition of {what} is {'a step' if step else kind}, not BOOL",
-                       f"write {self.text(expr)}.X" if step else conversion_hint(kind, BOOL))
+                       f"write {self.text(expr)}.X" if step else
+                       conversion_hint(kind, BOOL) + (f", or take {takers('integers_are_conditions')}" if number else ""))
 
     def adopt(self, expr: tree.Expr, target: Type, code: str = "S0301") -> Type | None:
         """Give an expression of untyped literals the type `target`, and convert its constant; None after a diagnostic."""

@@ -107,6 +107,7 @@ def _assign(body: Body, node: tree.Assign) -> None:
     kind = facts.types.get(node.targets[-1])
     if kind is not None:
         _fraction(body, node.value, kind)
+    _kept_address(body, node)
     if node.op != ":=" or len(node.targets) > 1:
         return
     if isinstance(node.value, _NO_PLACES):
@@ -170,6 +171,30 @@ def _own(variable: Variable | None, pou: Pou) -> bool:
 
 
 _EXACT: dict[str, Callable[[int, int], int]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
+def _kept_address(body: Body, node: tree.Assign) -> None:
+    """Warn of a reference to a variable that ends with the call, in one that lasts longer (SA0021 of CODESYS)."""
+    made = body.facts.calls.get(node.value) if isinstance(node.value, tree.Call) else None
+    if not isinstance(made, StandardCall) or made.key != "REF":
+        return
+    place = made.arguments[0][0]
+    referred = _temporary(body, place)
+    kept = [target for target in node.targets if _temporary(body, target) is None]
+    if referred is not None and kept:
+        body.warn("S0296", node.value, f"{referred.name} ends with the call, and {body.text(kept[0])} keeps its address",
+                  f"keep the value, or make {referred.name} a VAR of a block or program")
+
+
+def _temporary(body: Body, expr: tree.Expr) -> Variable | None:
+    """The variable of which a place is a part, if it ends with the call; None for others and for what a pointer points to."""
+    root = body.facts.root(expr)
+    variable = body.facts.variables.get(root) if root not in body.facts.followed else None
+    if variable is None or variable.reference or variable is body.pou.result or variable.kind in ("VAR_OUTPUT", "VAR_STAT"):
+        return None
+    ends = variable.kind == "VAR_TEMP" or variable.owner is not None and (
+        variable.owner.is_function or variable.owner.kind == "METHOD")
+    return variable if ends else None
+
+
 def _member(body: Body, node: tree.Member) -> None:
     """Warn of a VAR of a function block that is used through an instance, which the standard forbids (6.5.2)."""
     field, whole = body.facts.fields.get(node), body.facts.types.get(node.of)

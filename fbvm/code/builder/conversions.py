@@ -27,6 +27,8 @@ def implicit(emitter: Emitter, node: Node, kind: Type, target: Type) -> Node:
         return ("character", wanted, node)
     if source == "ref":
         return ("bits", wanted, "ref", node) if SIZES[wanted] == SIZES["ref"] else _byte_number(node, wanted)
+    if wanted == "b":  # a number as the condition of a statement
+        return ("ne", "b", source, node, ("const", source, 0))
     if source in FLOATS and wanted not in FLOATS:
         return saturated(emitter, "truncate", node, wanted)
     return ("convert", wanted, source, node)

@@ -90,6 +90,18 @@ def sized_text(automaton: Automaton, token: Token, following: list[Token]) -> Re
                   f"write {word.type}[{token.text}]", lossless=False)
 
 
+def variadic(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """`args : DINT...;`, `args : ...;`, the inputs of any number that RuSTy has for functions of other languages"""
+    if token.type != "RANGE" or automaton.before.type not in (*TYPES, "NAME", "COLON", "RSQB") or len(following) < 2 or \
+            following[1].type not in ("DOT", "RANGE") or not automaton.text.startswith("...", token.start):
+        return None
+    automaton.next()
+    bare = automaton.before.type == "COLON"
+    return Repair([Token("NAME", "INT", token.start, token.start)] if bare else [], token.start, token.start + 3,
+                  "`...` makes a variadic input, which RuSTy has for functions in another language, and fbvm calls none of these",
+                  "declare each input, or one of ARRAY [*] OF a type", lossless=False)
+
+
 def function_head(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`FUNCTION INT f`, `FUNCTION BLOCK f`"""
     open_ = frames(automaton.states, automaton.values)

@@ -10,7 +10,16 @@ import re
 from collections.abc import Callable
 
 from fbvm.syntax.ladder.instructions.pasted import INSTRUCTION_LIST, ladder_lines
-from fbvm.syntax.recovery.declaration_mistakes import alias, braces, function_head, misnamed, sized_text, two_names, written_type
+from fbvm.syntax.recovery.declaration_mistakes import (
+    alias,
+    braces,
+    function_head,
+    misnamed,
+    sized_text,
+    two_names,
+    variadic,
+    written_type,
+)
 from fbvm.syntax.recovery.foreign_forms import bare_function, bare_point, decimal_comma, infix
 from fbvm.syntax.recovery.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
 from fbvm.syntax.recovery.repair import Repair
@@ -315,5 +324,5 @@ MISTAKES: tuple[Callable[[Automaton, Token, list[Token]], Repair | None], ...] =
     colon_behind, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
     _no_handler, _location_behind_type, _caret, _begin, infix, decimal_comma, bare_point, bare_function, _c_loop,
     _declared_in_body, _instruction_list, foreign_word, comment_signs, until, statement_as_value,
-    two_names, misnamed, sized_text, alias, written_type, braces)
+    two_names, misnamed, sized_text, variadic, alias, written_type, braces)
 """In the order in which they are asked; the first repair counts."""
