@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from drawings import block, document, imported, pou, result, value, variable
+from drawings import block, codes, document, imported, pou, result, value, variable
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -102,3 +102,14 @@ def test_the_difference_of_two_moments_is_a_duration_under_the_short_name_of_the
             + block(6, "LT", "EN=4.ENO IN1=4.OUT IN2=5", "ENO,OUT", at="180,0") + result(7, "6.OUT", "c", at="270,0"))
     made = imported(pou(body, variable("b") + variable("c") + variable("d", "DT") + variable("r", "RTC"), language="FBD"))
     assert "Result_4 : TIME;" in made.files["Main.st"]
+
+
+@pytest.mark.parametrize("written", ["ARRAY[1..Most] OF POINTER TO Kind", "REF_TO INT", "REFERENCE TO BOOL"])
+def test_a_type_in_the_place_of_a_name_is_taken_as_it_is(written: str) -> None:
+    made = imported(pou("", f'<variable name="r"><type><derived name="{written}"/></type></variable>'))
+    assert not made.errors and f"r : {written};" in made.files["Main.st"]
+
+
+def test_what_is_no_type_is_not_taken_for_one() -> None:
+    made = imported(pou("", '<variable name="r"><type><derived name="ARRAY[1..2; x : INT] OF INT"/></type></variable>'))
+    assert codes(made) == ["X0105"]

@@ -42,7 +42,7 @@ def _access(item: Object, scope: Scope) -> Access:
     connected = frozenset().union(*(scope.keys(wire.source.text) for pin in item.in_outs for wire in pin.wires
                                     if wire.source.kind in ("inVariable", "inOutVariable")),
                                   *(scope.keys(pin.expression) for pin in item.in_outs if pin.expression))
-    shared = scope.shared(item.text)
+    shared = scope.shared(item.text) | scope.keys(item.code)
     instance = frozenset((scope.key(item.instance),)) if item.instance else frozenset[str]()
     return Access(typed | connected | shared | instance, connected | shared | instance)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import dedent
+
 from fbvm.check.calls.functions import is_standard
 from fbvm.interchange.plcopen.read.context import NetworkContext
 from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
@@ -37,7 +39,9 @@ class Calls:
         row = instruction(item)
         if row is not None and row.kind != "?" and row.does != ".not":
             raise Unexecutable(item, f"the instruction {item.mnemonic} cannot stand outside of a rung", "")
-        if item.instance:
+        if item.code:
+            self._statements(item)
+        elif item.instance:
             self._instance(item)
         elif is_standard(item.text.upper()) and not item.in_outs:
             self._standard(item)
@@ -76,6 +80,22 @@ class Calls:
                     self.guards[item, pin.name] = eno
                 value = Value(f"{item.instance}.{pin.name}", ATOM, frozenset((root,)))
                 context.set_output(wire, context.modified(item, value, pin.negated, pin.edge))
+
+    def _statements(self, item: Object) -> None:
+        """The statements inside of a block EXECUTE, while its EN is TRUE."""
+        context = self.context
+        condition = self._enable(item)
+        eno = TRUE
+        lines = dedent(item.code).splitlines()
+        if condition is not None:
+            enabled = context.scope.new(f"Enable_{item.id}", "BOOL", context.apart)
+            context.write(f"{enabled} := {condition.text};", frozenset((enabled.upper(),)))
+            eno = variable(enabled)
+            lines = [f"IF {enabled} THEN", *lines, "END_IF;"]
+        first, *more = lines
+        context.write(first, frozenset((SHARED, *context.scope.roots(item.code))))
+        context.lines += more
+        context.set_output(Wire(item, "ENO"), eno)
 
     def _next_sinks(self, item: Object) -> list[tuple[Object, Wire]]:
         """The output variables that a call can write itself: those that directly follow the block in the order of evaluation."""

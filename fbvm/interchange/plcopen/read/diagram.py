@@ -72,6 +72,8 @@ class Object:
     outputs: list[Pin] = field(default_factory=list)
     mnemonic: str = ""
     """The mnemonic of the ladder instruction, if fbvm has drawn the block."""
+    code: str = ""
+    """The statements inside of a block EXECUTE (CODESYS)."""
     broken: bool = False
     """Whether something about it was not understood, and has a diagnostic."""
 
@@ -141,7 +143,7 @@ class _DiagramReader:
             if element.name in SFC_OBJECTS:
                 made.broken = True
                 self.reading.report("X0202", element, f"{element.name} stands in a body of {self.body.name}")
-            self.objects.append(made)
+            self.objects += [made, *_typed_outputs(made)]
             self._register(made)
 
     def _register(self, made: Object) -> None:
@@ -257,6 +259,7 @@ def _object(reading: Reading, element: Element, place: int) -> Object:
                 pins.append(_pin(variable, variable.one("connectionPointIn"), pin_name(variable.get("formalParameter"))))
         _merge_in_outs(made)
         made.mnemonic = own_text(element, MNEMONIC)
+        made.code = _code(element)
     elif element.name == "inOutVariable":
         made.inputs = [Pin("", _true(element, "negatedIn"), _word(element, "edgeIn"), _word(element, "storageIn"))]
         _wire_in(made.inputs[0], element.one("connectionPointIn"))
@@ -271,6 +274,25 @@ def _object(reading: Reading, element: Element, place: int) -> Object:
         for point in element.all("connectionPointIn"):
             _wire_in(made.inputs[0], point)
     return made
+
+
+def _typed_outputs(block: Object) -> list[Object]:
+    """Output variables for the operands that are typed at outputs of a block (CODESYS)."""
+    made = []
+    for element in block.element.walk():
+        point = element.one("connectionPointOut") if element.name == "variable" else None
+        typed = point.one("expression") if point is not None and block.kind == "block" else None
+        if typed is not None and typed.text.strip():
+            pin = Pin("", raw=[(block.id, pin_name(element.get("formalParameter")), element)])
+            made.append(Object("outVariable", block.id, block.place, block.x, block.y, block.order, typed.text.strip(), element,
+                               inputs=[pin]))
+    return made
+
+
+def _code(element: Element) -> str:
+    """The statements that a block EXECUTE of CODESYS keeps in `addData`; "" for another block."""
+    found = [inner for inner in element.walk() if inner.name == "STCode"]
+    return found[0].text.expandtabs(4).strip("\r\n").rstrip() if found else ""
 
 
 def _text(element: Element) -> str:

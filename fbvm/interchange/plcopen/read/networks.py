@@ -80,7 +80,7 @@ def _by_number(made: list[Network]) -> list[Network] | None:
     """The networks by executionOrderId, if all objects with an effect have one and no two networks mix theirs; else None."""
     spans = []
     for network in made:
-        numbers = [item.order for item in network.objects if item.kind in SINKS and item.kind != "label"]
+        numbers = [item.order for item in network.objects if _acts(item)]
         if not numbers or not all(numbers):
             return None
         spans.append((min(numbers), max(numbers), network))
@@ -88,6 +88,11 @@ def _by_number(made: list[Network]) -> list[Network] | None:
     if any(before[1] >= behind[0] for before, behind in pairwise(spans)):
         return None
     return [network for _, _, network in spans]
+
+
+def _acts(item: Object) -> bool:
+    """Whether an object has an effect of its own; a variable at an in-out of a block, to which no wire leads, has none."""
+    return item.kind in SINKS and item.kind != "label" and (item.kind != "inOutVariable" or item.inputs[0].connected)
 
 
 def _comment(made: list[Network], comments: list[Object], flat: bool) -> None:

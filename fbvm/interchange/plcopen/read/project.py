@@ -42,10 +42,10 @@ IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
 READ = {"pou", "element", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location",
         "action", "method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "inheritance",
-        "datatypeinheritance", "accessmodifiers", "attributes", "inputassignments"}
+        "datatypeinheritance", "accessmodifiers", "attributes", "inputassignments", "stcode"}
 """Last words of the names of `addData` whose contents are taken over."""
 SETTINGS = {"objectid", "tasksettings", "projectinformation", "projectstructure", "fbdcalltype", "fbdelementtype",
-            "interfaceasplaintext", "buildproperties"}
+            "interfaceasplaintext", "buildproperties", "inputparamtypes", "outputparamtypes"}
 """Last words of the names of `addData` that repeat what elements say, or concern the tool itself."""
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
 
@@ -87,7 +87,7 @@ def _parts(root: Element) -> Iterator[tuple[Element, Element]]:
                 yield element, element
         elif element.name in ("dataType", "pou", "globalVars", INTERFACE):
             yield element, parent
-        if element.name not in ("pou", "dataType", INTERFACE):
+        if element.name not in ("pou", "dataType", "globalVars", INTERFACE):
             todo.extend((child, element) for child in reversed(element.children))
 
 
@@ -114,11 +114,12 @@ def _data_type(reading: Reading, element: Element) -> Iterator[DataType]:
 
 
 def _var_list(reading: Reading, element: Element, name: str = "") -> Iterator[VarList]:
-    """The list of an element, and the lists with other qualifiers inside of it (CODESYS)."""
+    """The list of an element.  Where its parts have other qualifiers, CODESYS repeats its variables in lists inside of it."""
     name = element.get("name") or name
     inside = [inner for inner in element.walk() if inner is not element and inner.name == element.name]
     qualifiers = tuple(word for key, word in QUALIFIERS.items() if element.get(key) in ("true", "1"))
-    variables = tuple(v for inner in element.all("variable") for v in _variable(reading, inner))
+    again = {variable.get("name") for inner in inside for variable in inner.all("variable")}
+    variables = tuple(v for inner in element.all("variable") if inner.get("name") not in again for v in _variable(reading, inner))
     if variables:
         yield VarList(SECTIONS[element.name], qualifiers, variables, name, head(element).attributes)
     for inner in inside:

@@ -13,8 +13,10 @@ _LATER = frozenset(("LTIME", "LDATE", "LDT", "LTOD", "CHAR", "WCHAR"))
 _CONSTANT = re.compile(r"[^\W\d]\w*|W?STRING#.*")
 """What a text may begin with that is no literal: the name of a constant; or a literal that names its type."""
 _TEXT = re.compile(r"(HMI_)?STRING(\[.*\])?")
-_NAME = re.compile(r"((REFERENCE|POINTER)\s+TO\s+)*[^\W\d]\w*(\.[^\W\d]\w*)*", re.IGNORECASE)
-"""The name of a type; CODESYS writes a reference in its place, which the schema has no element for."""
+_NAME = re.compile(r"((REFERENCE|POINTER)\s+TO\s+|REF_TO\s+|ARRAY\s*\[[\w\s.,*+-]*\]\s*OF\s+)*"
+                   r"[^\W\d]\w*(\.[^\W\d]\w*)*", re.IGNORECASE)
+"""The name of a type.  CODESYS writes a reference in its place, which the schema has no element for; editors that take any text
+there also have arrays."""
 _TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})(\.\d{1,9})?")
 _DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
 
