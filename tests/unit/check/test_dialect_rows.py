@@ -18,7 +18,7 @@ from fbvm.watch.paths import UnknownPlace
 
 pytestmark = pytest.mark.slow
 TABLES = ("dialect_rows.txt", "contested_rows.txt")
-WARNINGS = ("S0190", "S0193", "S0195", "S0504", "S0590", "S0591", "S0791", "S0792", "S0793", "S0295", "S0392")
+WARNINGS = ("S0190", "S0193", "S0195", "S0296", "S0504", "S0590", "S0591", "S0791", "S0792", "S0793", "S0295", "S0392")
 """Warnings that say something of dialects, and so belong to what is expected."""
 
 
