@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import struct
 from functools import cache
 from typing import Any
@@ -16,8 +17,9 @@ from rows import each_of
 from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import Undefined, single
 from fbvm.base.memory import STRUCTS
-from fbvm.base.types import ELEMENTARY
+from fbvm.base.types import ELEMENTARY, SHORT_NAMES
 from fbvm.engine.native import engine as native
+from fbvm.engine.native.library import literals, reading, routines
 from fbvm.syntax.st import texts
 
 if not native.available():
@@ -76,6 +78,26 @@ SEEDS = [
     "7:5:3.25", "12:00:00.1234567891", "DT#2024-05-31-13:45:30", "2262-04-11-23:47:16.854775807",
     "2262-04-11-23:47:16.854775808", "LDT#1970-01-01-00:00", "STRING#'a'", "", " ", "#", "INT#", "INT#x", "_1", "1_",
 ]  # fmt: skip
+MORE = """
+    1. 1.e5 .5 1e 1e+ 1E-5x 1.5_0 1_ 1__0 1_.5 2.5e1_0 1e5_ +5 -5 + - +-1 --1 127 128 -129 256 32767 32768 -32768 -32769
+    65535 -2147483648 2147483648 -2147483649 4294967295 -1 9223372036854775807 16#7F 16#80 16#FF_FF 16#8000 16# 16#G 16#_F
+    16#F_ 2#2 2# 8#8 10#1 10#1_000 10# 10#_1 10#A 10#1.5 10#18446744073709551616 -10#5 REAL#10#5 1#0 +16#1 -16#1 26#1 3#1
+    16#7FFFFFFFFFFFFFFF 16#FFFFFFFFFFFFFFFF 16#10000000000000000 2#1_1 BOOL#1 BOOL#TRUE bool#2 2 TRUEX TRU REAL#1.0
+    REAL#16#10 LREAL#INF INT#INF DINT#5 ULINT#5 3.4028235677973365e38 3.4028235677973366e38 1.7976931348623157e308
+    1.7976931348623159e308 16#20000000000001 16#20000000000003 16#7FFFFFFFFFFFFC00 16#FFFFFFFFFFFFF800 0e0 00012 -0.0e5 NANX
+    +NAN 1d1d 1h1d 1s500ms 1.5m2s 1m2.5s 1us1ns 1ms1ms 5 1x 1ds 1msx d _1d 1_d 1d_2h 1d__2h -_5s 1.s 1._5s 1.5_0s 0.5ns
+    0.1ns 0.001us 1.0000000000000001s 0.3333333333333333d 106751d 106752d 2562047h 2562048h 9223372036854775808ns
+    18446744073709551616ns 9223372036854775807.5ns -9223372036854775808.5ns +5s T#5s TIME#5s LT#5s t#+5S 1M 1Ms 1Us 1NS T#
+    T#- LTIME#9223372036854775807ns D#1970-1-1 1970-01-1x 1970-13-01 1970-00-01 1970-01-00 1970-01-32 2000-02-29 1900-02-29
+    2100-02-28 2024-02-30 1970-04-31 1970-04-30 1970-06-31 1970-07-31 1970-08-31 1970-09-31 1970-11-31 1970-12-31
+    19700-01-01 1970-001-01 1970-01-001 1970 1970- 1970-01 1970-01- -1970-01-01 1970-1-1-0:0 LD#1970-01-02 9999-12-31
+    0001-01-01 1677-09-22 1677-09-20 1970-03-01 1970-02-28 1972-03-01 1969-03-01 1600-02-29 23:59 24:00:00 23:60 23:59:60
+    23:59:59 0:0:0 0:0:0.0 0:0: 0: :0 0:0:0. 0:0:0._1 0:0:0.1_0 0:0:0.000000001 0:0:0.0000000001 0:0:0.0000000010 123:0
+    0:123 0:0:123 0:0:5x 0:0x TOD#0:0 LTOD#12:34:56.789 DT#1970-01-01-00:00:00.5 1970-01-01- 1970-01-01-1 1970-01-01
+    1970-01-01-24:00 1970-02-30-00:00 -00:00 2262-04-11-23:47:16.854775806 1677-09-22-00:00:00 DT# 9999-01-01-00:00
+    1111111111111111111s 0.555555555555555555555555555555
+"""
+SEEDS += [*MORE.split(), "CHAR#'a'", "WSTRING#\"a\"", "a" * 401, "0" * 401]
 LETTERS = st.sampled_from("0123456789_.-+:#eEdhmsnuTDOLFAIR x\xff")
 EDITS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 2), LETTERS), max_size=3)
 
@@ -93,6 +115,93 @@ def edited(seed: str, edits: list[tuple[int, int, str]]) -> bytes:
 def test_every_seed_is_read(data_type: str) -> None:
     seen = {seed: read(data_type, seed.encode()) for seed in SEEDS}
     assert seen == {seed: wanted(data_type, seed.encode()) for seed in SEEDS}
+
+
+OUT = ctypes.create_string_buffer(reading.CLEANED + reading.LONGEST + 8)
+
+
+def by_routine(routine: Any, data_type: str, text: bytes, *options: int) -> tuple[int, int]:
+    """What a routine of machine code's library returns and writes to `OUT` as it runs in Python."""
+    place, kind = ctypes.create_string_buffer(text), reading.KINDS[SHORT_NAMES.get(data_type, data_type)]
+    status = routine(ctypes.addressof(OUT), kind, *options, ctypes.addressof(place), len(text))
+    return status, int.from_bytes(OUT.raw[:8], "little")
+
+
+def bits_of(data_type: str, value: float) -> int:
+    """The eight bytes with which the library hands over a value: a real as a double."""
+    machine = TYPES[data_type]
+    if machine[0] == "f":
+        return int.from_bytes(struct.pack("<d", value), "little")
+    return int(value) & (1 << 64) - 1
+
+
+def rounded(data_type: str, bits: int) -> int:
+    """The bits of a double behind the rounding to REAL, if that is the type."""
+    value: float = struct.unpack("<d", bits.to_bytes(8, "little"))[0]
+    return bits_of(data_type, single(value)) if data_type == "REAL" else bits
+
+
+ALIKE = {"USINT", "UINT", "UDINT", "BYTE", "WORD", "DWORD", "INT", "DINT", "LTIME", "LDATE", "LTIME_OF_DAY", "LTOD", "LDT", "DT",
+         "LDATE_AND_TIME", "TOD"}
+"""Types that the routines read as another one, but for the range: every third text will do."""
+
+
+@pytest.mark.slow
+@each_of("data_type", TYPES)
+def test_every_seed_is_read_by_the_routine_itself(data_type: str) -> None:
+    """As Python runs it: a value, or which of both mistakes it is."""
+    codes = {reading.MALFORMED: "R0111", reading.OUTSIDE: "R0105"}
+    differing = []
+    for seed in SEEDS[:: 3 if data_type in ALIKE else 1]:
+        text, expected = seed.encode(), wanted(data_type, seed.encode())
+        status, bits = by_routine(literals.read_value, data_type, text)
+        good = (codes.get(status) == expected[0] if isinstance(expected, tuple) else
+                status == reading.GOOD and rounded(data_type, bits) == bits_of(data_type, texts.from_text(data_type, text)))
+        if not good:
+            differing.append((seed, status, bits, expected))
+    assert differing == []
+
+
+@each_of("data_type, text, whole, value", [
+    ("INT", b"12abc", 0, 12), ("INT", b"12abc", 1, 0), ("INT", b"12", 1, 12), ("INT", b" 12 x", 0, 12), ("INT", b"x12", 0, 0),
+    ("INT", b"40000x", 0, 0), ("INT", b"40000", 1, 0), ("INT", b"", 0, 0), ("INT", b"", 1, 0), ("REAL", b"1.5e", 0, 1.5),
+    ("TIME", b"1s5", 0, 10**9), ("TIME", b"1s5m", 0, 10**9), ("INT", b"7" + b" " * 63 + b"8", 0, 7),
+    ("INT", b"7" + b" " * 64, 0, 7), ("INT", b"7" + b" " * 90, 1, 7), ("INT", b" " * 63 + b"7", 0, 7),
+    ("INT", b" " * 64 + b"7", 0, 0), ("INT", b" " * 64 + b"7", 1, 7),
+])
+def test_a_leading_literal_is_read_by_the_routine_itself(data_type: str, text: bytes, whole: int, value: float) -> None:
+    assert texts.from_leading(data_type, whole, text) == value
+    assert by_routine(literals.read_leading, data_type, text, whole) == (reading.GOOD, bits_of(data_type, value))
+
+
+WRITERS = {"TIME": routines.put_time, "LTIME": routines.put_ltime, "DATE": routines.put_date, "LDATE": routines.put_ldate,
+           "TIME_OF_DAY": routines.put_tod, "LTIME_OF_DAY": routines.put_ltod, "DATE_AND_TIME": routines.put_dt,
+           "LDATE_AND_TIME": routines.put_ldt, "LINT": routines.put_integer, "LREAL": routines.put_lreal,
+           "REAL": routines.put_real}
+NUMBERS = [
+    0, 1, -1, 9, 10, 11, -10, 99, 100, 999_999_999, 1_000_000_000, 1_000_000_001, 60 * 10**9, 3600 * 10**9 - 1,
+    86_399_999_999_999,
+    86_400_000_000_000, -86_400_000_000_000, -86_400_000_000_001, 93_784_005_006_007, -93_784_005_006_007, 951_782_400 * 10**9,
+    951_868_800 * 10**9, 5_097_600 * 10**9, 4_102_444_800 * 10**9, -2_203_891_200 * 10**9, 951_868_799 * 10**9,
+    78_796_800 * 10**9, (1 << 63) - 1, -(1 << 63) + 1, 1_234_567_890_123_456_789, -8_520_336_000 * 10**9, 500_000_000, 1_000,
+    1_000_000,
+]  # fmt: skip
+REALS = [0.0, -0.0, 1.0, -1.5, 0.1, 1 / 3, 1e15, 1e16, 1e17, 123456789.0, 1e-4, 1e-5, 1e22, 1e300, 5e-324, float("inf"),
+         float("-inf"), float("nan"), 2.0**-149, 2.0**-126, 16777217.0, 3.4028234663852886e38, 9.999999e9,
+         0.30000001192092896]
+
+
+@each_of("data_type", WRITERS)
+def test_values_are_written_by_the_routine_itself(data_type: str) -> None:
+    differing = []
+    for value in REALS if data_type in ("REAL", "LREAL") else NUMBERS:
+        value = single(value) if data_type == "REAL" else value
+        given = bits_of(data_type, value)
+        signed = given - (given >> 63 << 64)
+        length = WRITERS[data_type](ctypes.addressof(OUT), signed)
+        if OUT.raw[:length] != texts.to_text(data_type, value):
+            differing.append((value, OUT.raw[:length]))
+    assert differing == []
 
 
 @pytest.mark.slow

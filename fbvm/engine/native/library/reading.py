@@ -238,6 +238,10 @@ def read_number(out: int, kind: int, at: int, n: int) -> int:
         return MALFORMED
     if n > LONGEST:
         return OUTSIDE
+    if based and n > 3 and says(at, 3, data(b"10#")) and run_of_digits(at + 3, n - 3) == n - 3:
+        at += 3
+        n -= 3
+        based = 0
     whole = run_of_digits(at, n) == n
     if not based and not whole and not is_real(at, n):
         return MALFORMED

@@ -44,13 +44,12 @@ def data(content: bytes) -> int:
 
 def float_bits(number: int) -> int:
     """The bits of the double nearest to a signed number."""
-    return int.from_bytes(struct.pack("<d", float(number)), "little")
+    return _bits(float(number))
 
 
 def single_bits(bits: int) -> int:
     """The bits of a double rounded to 32 bits."""
-    number: float = struct.unpack("<d", bits.to_bytes(8, "little"))[0]
-    return int.from_bytes(struct.pack("<d", single(number)), "little")
+    return _bits(single(_double(bits)))
 
 
 def float_text(bits: int, form: int, digits: int, flags: int) -> int:
@@ -58,12 +57,23 @@ def float_text(bits: int, form: int, digits: int, flags: int) -> int:
     write = ctypes.pythonapi.PyOS_double_to_string
     write.restype = ctypes.c_void_p
     write.argtypes = [ctypes.c_double, ctypes.c_char, ctypes.c_int, ctypes.c_int, ctypes.c_void_p]
-    return int(write(struct.unpack("<d", bits.to_bytes(8, "little"))[0], form, digits, flags, None))
+    return int(write(_double(bits), form, digits, flags, None))
 
 
 def text_float(at: int) -> int:
     """The bits of the double that a decimal text, ended by 0, is nearest to."""
-    return int.from_bytes(struct.pack("<d", float(ctypes.string_at(at))), "little")
+    return _bits(float(ctypes.string_at(at)))
+
+
+def _bits(value: float) -> int:
+    """The bits of a double as a signed number."""
+    return int.from_bytes(struct.pack("<d", value), "little", signed=True)
+
+
+def _double(bits: int) -> float:
+    """The double with these bits."""
+    value: float = struct.unpack("<d", struct.pack("<q", bits))[0]
+    return value
 
 
 def free_text(at: int) -> None:
