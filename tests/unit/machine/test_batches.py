@@ -119,15 +119,18 @@ def test_machine_code_says_who_wants_something_and_goes_on_behind_it() -> None:
 
 
 @pytest.mark.slow
-def test_a_plc_that_leaves_a_batch_is_up_to_date() -> None:
-    rig = Rig(image(), (0,), virtual_time=False)
+@pytest.mark.parametrize("is_inside", [True, False])
+def test_a_plc_that_leaves_a_batch_is_up_to_date(is_inside: bool) -> None:
+    rig = Rig(image(), (0,), is_inside=is_inside, virtual_time=False)
     for scan in range(4):
         rig.plc.scan(scan * MS)
     place, before = place_of(rig.plc), rig.plc._io.skipped
     assert place is not None
     place.leave(rig.plc, 0, 0)
     assert (rig.plc.scans, rig.plc.now_ns, rig.plc._io.skipped) == (4, 3 * MS, before)
+    rig.plc._io.changed_words = True
     place.leave(rig.plc, 3, 8 * MS)
+    assert not rig.plc._io.changed_words
     assert (rig.plc.scans, rig.plc.now_ns, rig.plc._io.skipped) == (7, 8 * MS, before + 3)
 
 

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from images import D200, counter_image, task
 from rows import each_of
 
-from fbvm.base.areas import DUE
+from fbvm.base.areas import AREAS, DUE
+from fbvm.base.memory import Memory
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Mode, Plc, Stopped
+from fbvm.machine.scan.refresh import Attached, IORefresh
 from fbvm.net.loop import LoopNetwork
 from fbvm.units.contract import AreaMemory
 from fbvm.watch.conditions import ConditionError
@@ -156,7 +160,9 @@ def test_cycle_times_count_tenths_of_a_millisecond(plc: Plc) -> None:
 def test_a_long_cycle_fills_both_words(plc: Plc) -> None:
     plc.scan(0)
     plc.scan(10_000 * MS)
-    assert plc.read("A264..A265") == [100_000 & 0xFFFF, 1]
+    assert plc.read("A264..A265") == plc.read("A262..A263") == [100_000 & 0xFFFF, 1]
+    plc.scan(10_010 * MS)
+    assert plc.read("A262..A265") == [100_000 & 0xFFFF, 1, 100, 0]
 
 
 def test_clock_pulses_are_off_first_assumed(plc: Plc) -> None:
@@ -480,6 +486,24 @@ def test_connections_do_not_travel_in_time(plc: Plc) -> None:
     plc.attach(_Echo(), _Wire())
     with pytest.raises(ValueError, match="do not travel in time"):
         plc.restore(state)
+
+
+def test_a_refresh_is_worth_while_from_the_moment_on_that_a_unit_waits_for() -> None:
+    layout = counter_image().layout
+    memory = Memory(layout.size, layout.areas)
+
+    def io(*units: tuple[int, bool]) -> IORefresh:
+        return IORefresh([cast(Attached, SimpleNamespace(unit=SimpleNamespace(wake_ns=wake_ns, watched=[("D", 3)]),
+                                                         link=SimpleNamespace(is_quiet=is_quiet)))
+                          for wake_ns, is_quiet in units], memory)
+
+    assert [io((9, True), (5, True)).is_idle(now_ns) for now_ns in (4, 5, 6)] == [True, False, False]
+    assert not io((9, True), (9, False)).is_idle(4) and io().is_idle(4)
+    assert (io((9, True), (5, True)).unit_ns(7), io((9, True)).unit_ns(7), io((9, True)).wake_ns(20)) == (5, 7, 9)
+    told = io((9, True))
+    told.changed_words = True
+    assert told.wake_ns(20) == 0
+    assert told.watched == [[AREAS["D"].offset + 6]]
 
 
 def test_a_plc_goes_on_from_a_state_with_the_units_that_belong_to_it(plc: Plc) -> None:

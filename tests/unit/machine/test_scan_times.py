@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from rows import each_of
+
 from fbvm.machine.scan_times import Lateness, ScanTimes
 
 
@@ -82,3 +84,28 @@ def test_a_burst_counts_as_its_scans() -> None:
     assert (bursts.count, bursts.overruns, str(bursts)) == (one_by_one.count, one_by_one.overruns, str(one_by_one))
     assert 0 < bursts.overruns < bursts.count
     assert bursts.longest_ns > 1_500
+
+
+@each_of("reading, value", [
+    ("count", 3), ("beyond", 1), ("longest_ns", 120), ("longest_scan", 8), ("mean_ns", 70), ("overruns", 1),
+    ("bins", [(30, 1), (60, 1), (120, 1)]), ("as_dict", 120),
+])
+def test_the_first_who_reads_behind_a_burst_finds_it_counted(reading: str, value: object) -> None:
+    times = ScanTimes(100)
+    times.note_burst(7, [1000, 1030], 150)
+    times.note_burst(9, [2000], 60)
+    found = times.as_dict()["longest_ns"] if reading == "as_dict" else getattr(times, reading)
+    assert found == value
+
+
+def test_a_share_and_a_sum_behind_a_burst() -> None:
+    times, others = ScanTimes(100), ScanTimes(100)
+    times.note_burst(0, [0, 10], 400)
+    assert times.within_ns(0.5) == 10
+    others.note_burst(4, [0], 500)
+    times.add(others, 100)
+    assert (times.longest_ns, times.longest_scan, times.count, times.overruns) == (500, 104, 3, 2)
+    lateness, more = Lateness(), Lateness()
+    lateness.missed, more.missed = 2, 3
+    lateness.add(more)
+    assert lateness.missed == 5

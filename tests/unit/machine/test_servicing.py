@@ -4,18 +4,27 @@ from __future__ import annotations
 
 from datetime import datetime
 from io import BytesIO, StringIO
+from typing import cast
 
 import pytest
 from depth import times
 from fins_rig import COUNTING, FinsRig, TcpClient, compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from images import counter_image
 
 from fbvm import Plc, Recording, RecordingFile, RecordingWriter, compile_text
+from fbvm.base.memory import Memory
+from fbvm.machine.servicing.commands import changes, execute
+from fbvm.machine.servicing.cpu import Machine
+from fbvm.machine.servicing.registers import Registers
 from fbvm.net.journal import Journal, open_journal
 from fbvm.record.recording import recording as recording_module
 from fbvm.record.recording.journal_replay import Replay
+from fbvm.units.contract import FinsAccess
 from fbvm.units.etn21.unit import Etn21
+from fbvm.wire.fins.codes import EndCode
+from fbvm.wire.fins.frames import Address, Command, Header
 from fbvm.wire.link import Event
 
 CONVERSATION = [
@@ -39,6 +48,44 @@ def converse(rig: FinsRig) -> list[tuple[str, str]]:
     rig.command(0x0403, unit=0x10)
     rig.plc.run(scans=10)
     return answers
+
+
+SIZES: dict[int, tuple[int, int, str]] = {
+    0x0101: (6, 6, ""), 0x0102: (6, 2000, "changes"), 0x0103: (8, 8, "changes"), 0x0104: (0, 2000, ""),
+    0x0105: (10, 10, "changes"),
+    0x0401: (0, 3, "changes controls alone"), 0x0402: (0, 2, "changes controls alone"), 0x0501: (0, 1, ""), 0x0502: (1, 2, ""),
+    0x0601: (0, 0, ""), 0x0620: (1, 1, ""), 0x0701: (0, 0, ""), 0x0702: (5, 7, "changes alone"), 0x0C01: (2, 2, ""),
+    0x0C02: (2, 2, ""), 0x0C03: (2, 2, ""), 0x2101: (2, 2, "changes alone"), 0x2102: (4, 4, ""), 0x2103: (0, 0, "changes alone"),
+    0x2301: (2, 2000, "changes"), 0x2302: (0, 0, "changes"),
+}
+"""Of each command the least and most bytes of parameters, and when it is refused (W342 5-3): where nothing may be changed or
+nobody may change the mode, and while another device has the access right."""
+
+
+@pytest.mark.parametrize("code", SIZES, ids="{:04X}".format)
+def test_what_is_asked_of_a_command_before_it_is_executed(code: int) -> None:
+    least, most, refused = SIZES[code]
+    layout, source = counter_image().layout, Address(0, 9, 0)
+    registers = Registers(Memory(layout.size, layout.areas))
+
+    def answer(size: int, **access: bool) -> int:
+        command = Command(Header(Address(), source, 1), code, bytes(size))
+        try:
+            return execute(cast(Machine, None), registers, command, FinsAccess(**access))[0]
+        except (AttributeError, TypeError):  # it was executed, on no machine at all
+            return -1
+
+    assert answer(most + 1) == EndCode.TOO_LONG
+    assert not least or answer(least - 1) == EndCode.TOO_SHORT
+    assert not {answer(least), answer(most)} & {EndCode.TOO_LONG, EndCode.TOO_SHORT, EndCode.PROTECTED, EndCode.ACCESS_RIGHT}
+    assert (answer(least, may_write=False) == EndCode.PROTECTED) == ("changes" in refused)
+    assert (answer(least, may_control=False) == EndCode.PROTECTED) == ("controls" in refused)
+    registers.right = Address(3, 5, 0x21)
+    assert registers.right == Address(3, 5, 0x21)
+    assert (answer(least) == EndCode.ACCESS_RIGHT) == ("alone" in refused or code == 0x0C01)  # which asks for the right
+    registers.right = source
+    assert answer(least) != EndCode.ACCESS_RIGHT
+    assert changes(code) == ("changes" in refused)
 
 
 @pytest.mark.slow
