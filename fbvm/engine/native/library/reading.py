@@ -233,7 +233,7 @@ def read_number(out: int, kind: int, at: int, n: int) -> int:
         sign = peek(at)
         at += 1
         n -= 1
-    based = place_of(ord("#"), at, n) < n
+    based: int = place_of(ord("#"), at, n) < n
     if n == 0 or (based and sign != 0):
         return MALFORMED
     if n > LONGEST:
