@@ -138,7 +138,7 @@ class PastRunner(Runner):
 
     def many(self, scan: int) -> bool:
         end = self._scene.unchanged_until(range(self.plc.scans, min(scan, self.plc.scans + MOST_AT_ONCE)))
-        return self.check is None and end > self.plc.scans and self._again.many(end)
+        return self.check is None and self._again.many(end)
 
 
 def last_in(runner: Runner, end: int) -> Generator[None, None, tuple[int, State, bool] | None]:

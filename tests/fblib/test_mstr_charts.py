@@ -243,6 +243,22 @@ def test_which_operations_need_a_path(operation: int, waits: bool) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("scans", [1, 2, 4])
+def test_a_block_whose_enable_falls_gives_its_path_back(scans: int) -> None:
+    rig = Rig(ScriptedPeer([]), blocks=2, options="Max_Paths := 1")
+    for block in (1, 2):
+        rig.control(*READ, block=block)
+    rig.set("m1_ENABLE", True)
+    rig.scan(scans)
+    rig.set("m2_ENABLE", True)
+    rig.scan()
+    assert (rig.outputs(1), rig.outputs(2)) == ("A", "")
+    rig.set("m1_ENABLE", False)
+    rig.scan()
+    assert (rig.outputs(1), rig.outputs(2)) == ("", "A")
+
+
+@pytest.mark.slow
 def test_a_waiting_block_may_be_aborted_or_give_up() -> None:
     rig = many(2, "Max_Paths := 0")
     rig.scan(3)

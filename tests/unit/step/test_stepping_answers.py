@@ -169,5 +169,8 @@ def test_events_are_those_of_the_scans_that_are_asked_for(make: Callable[[], Ste
     assert seen == [*((name, 1) for name in scan), ("INPUTS", 2), ("", 2), ("", 2)] and session.here == Position(2, 2)
     seen.clear()
     events.follow(Follower())  # type: ignore[arg-type]
+    events.follow(Follower(), range(1))  # type: ignore[arg-type]
+    assert session.read("Main.N") == 3 and line(session) == 4, "it stands where it stood"
+    del seen[-len(scan):]
     assert events.scans == range(3) and [row for row in seen if row[1] == 0] == [(name, 0) for name in scan] and len(seen) == 19
     assert events.line(session.facts.sites[0]) == TEXT.splitlines()[session.facts.sites[0].line - 1].strip()

@@ -9,6 +9,9 @@ from common_unit_tests import CommonUnitTests, FakeMemory
 from etn21_rig import E2, SERVER, Rig
 from rows import each_of
 
+from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
+from fbvm.net.loop import LoopNetwork
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.map import LINK_UP, Layout, Switch
 from fbvm.units.etn21.unit import Etn21, Fault
@@ -289,3 +292,14 @@ def test_faults_that_are_refused_leave_the_others_as_they_were() -> None:
     with pytest.raises(ValueError, match="room for 255 faults; 256 were given"):
         unit.faults[1:1] = [Fault(1)] * 254
     assert unit.faults == before
+
+
+def test_a_unit_that_nobody_has_asked_anything_asks_for_nothing() -> None:
+    unit = Etn21(0, "192.168.250.1")
+    assert unit.finish() == [], "it is in no PLC"
+    image = compile_text("PROGRAM Main END_PROGRAM").image
+    assert image is not None
+    plc = Plc(image)
+    plc.attach(unit, LoopNetwork())
+    plc.scan()
+    assert unit.finish() == [], "its program is not on"
