@@ -196,6 +196,7 @@ def test_the_standard_order_of_checks() -> None:
         "02 14 00 07 D1": "82 03", "02 14 00 07 D0": "82 02", "10 FF FF 00 01 03 00 00": "90 03",
         "10 FF FF 00 01 02 00 00": "90 02", "06 80 00 00 00 00": "86 03", "06 80 00 00 00": "86 02",
         "0F FF FF 00 02 02 00 00": "8F 03", "0F FF FF 00 02 01 00": "8F 02", "08 00 01 00": "88 01", "08 00": "88 03",
+        "08 00 01": "88 01",
     }  # fmt: skip
     assert {pdu: client.ask(pdu) for pdu in wrong_everything} == wrong_everything
 

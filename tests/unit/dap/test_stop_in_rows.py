@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +144,19 @@ def test_a_client_without_pages_gets_long_rows_in_parts(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_an_expression_has_its_type_and_where_it_lies(tmp_path: Path) -> None:
+    client = begun(tmp_path)
+    for text, result, kind in (("N + 1", "4", "INT"), ("T#50ms + T#1s", "T#1s50ms", "TIME"), ("N > 1", "TRUE", "BOOL"),
+                               ("Level", "129", "UINT"), ("P.State", "Filling (1)", "Phase")):  # fmt: skip
+        answer = client.ask("evaluate", expression=text, context="watch")
+        assert (answer["result"], answer["type"]) == (result, kind), text
+        assert "memoryReference" not in answer
+    word = client.ask("evaluate", expression="D200", context="watch")
+    assert word["result"] == "129 (16#0081)"
+    assert client.ask("readMemory", memoryReference=word["memoryReference"], count=2)["data"] == b64encode(b"\x00\x81").decode()
+
+
+@pytest.mark.slow
 def test_where_each_move_comes_to_stand(tmp_path: Path) -> None:
     client = begun(tmp_path)
     for command, arguments, stands in (
@@ -174,3 +188,18 @@ def test_where_each_move_comes_to_stand(tmp_path: Path) -> None:
         except RefusedError as refusal:
             found = str(refusal)
         assert found == stands, (command, arguments)
+
+
+@pytest.mark.slow
+def test_log_points_speak_again_behind_a_change_of_memory(tmp_path: Path) -> None:
+    client = begun(tmp_path)
+    client.ask("setBreakpoints", source={"path": str(tmp_path / "pump.st")}, breakpoints=[{"line": 32, "logMessage": "n {N}"}])
+    client.go("fbvm/stepScan", scans=2)
+    client.go("fbvm/gotoScan", scan=1)
+    client.go("fbvm/stepScan")
+    told = [row["output"].split(": ")[-1].strip() for row in client.events("output")]
+    assert len([row for row in told if "n " in row]) == 2, "what was said is not said again"
+    client.go("fbvm/gotoScan", scan=1)
+    client.ask("writeMemory", memoryReference="Main.N", data=b64encode(b"\x09\x00").decode())
+    client.go("fbvm/stepScan")
+    assert len([row for row in client.events("output") if "n 9" in row["output"]]) == 1

@@ -9,7 +9,7 @@ from fins_rig import FinsRig, TcpClient, compiled
 from rows import each_of
 
 from fbvm.net.loop import LoopNetwork
-from fbvm.units.etn21.fins.routing import endpoint_of
+from fbvm.units.etn21.fins.routing import endpoint_of, learn
 from fbvm.units.etn21.fins.state import FinsSettings, FinsState
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.fins.frames import parse_frame
@@ -345,3 +345,16 @@ def test_a_node_is_where_the_table_says_or_it_has_sent_from_or_its_number_leads(
     state = FinsState(learned={7: Peer("10.0.0.8", 9602), 8: Peer("10.0.0.8", 9602)})
     assert [str(endpoint_of(settings, state, node)) for node in (7, 8, 9, 255)] == [
         "10.0.0.7:9601", "10.0.0.8:9602", "192.168.250.9:9600", "192.168.250.255:9600"]
+
+
+@each_of("node, remote, code, learned", [
+    (8, Peer("10.0.0.9", 1), 0, {8: Peer("10.0.0.9", 1)}), (254, Peer("10.0.0.9", 1), 0, {254: Peer("10.0.0.9", 1)}),
+    (255, Peer("10.0.0.9", 1), 0, {}), (0, Peer("10.0.0.9", 1), 0, {}), (3, Peer("10.0.0.9", 1), 0, {}),
+    (7, Peer("10.0.0.7", 1), 0, {}), (7, Peer("10.0.0.8", 9601), 0x2108, {}),
+])
+def test_from_where_a_node_has_sent_is_kept_unless_the_table_has_it(node: int, remote: Peer, code: int,
+                                                                    learned: dict[int, Peer]) -> None:  # fmt: skip
+    """An IP address table has node 7; 3 is the unit's own, 255 and 0 are none."""
+    state = FinsState()
+    assert learn(FinsSettings("192.168.250.3", nodes={7: Peer("10.0.0.7", 9601)}), state, node, remote) == code
+    assert state.learned == learned

@@ -424,3 +424,12 @@ def test_what_waits_to_be_sent_ends_with_its_connection() -> None:
         command(words, COMMAND.close)
         rig.step(3)
         assert (words[LINE.state], words[LINE.sending]) == (STATE.closed, 0)
+
+
+def test_the_errors_of_the_stack_that_both_generations_have() -> None:
+    """5000h + errno, Schneider's list of TCP/IP error codes: EINVAL is 5016."""
+    table = {"EINTR": "04", "EIO": "05", "ENXIO": "06", "EBADF": "09", "ENOMEM": "0C", "EACCES": "0D", "EEXIST": "11",
+             "EINVAL": "16", "EPIPE": "20", "EADDRINUSE": "30", "EADDRNOTAVAIL": "31", "ENETUNREACH": "33", "ENETRESET": "34",
+             "ECONNABORTED": "35", "ECONNRESET": "36", "ENOBUFS": "37", "EISCONN": "38", "ENOTCONN": "39", "ETIMEDOUT": "3C",
+             "ECONNREFUSED": "3D", "EHOSTUNREACH": "41"}  # fmt: skip
+    assert {name: f"{number:02X}" for name, number in ERRNO.items()} == table
