@@ -158,6 +158,17 @@ def test_the_past_is_looked_at_and_not_written(page: Page) -> None:
     assert "recorded" in page.ask("view", plc="pump", scan=99)["error"]
 
 
+def test_rungs_of_the_present_are_shown_where_an_instance_is_looked_at(page: Page) -> None:
+    page.scan(3)
+    assert not page.session.shows_inside
+    page.done("look", plc="pump", names=[], instance="Main")
+    assert page.session.shows_inside
+    page.done("view", plc="pump", scan=1)
+    assert not page.session.shows_inside
+    page.done("view", plc="pump")
+    assert page.session.shows_inside
+
+
 def test_history_has_every_one_of_the_last_scans(page: Page) -> None:
     page.scan(30)
     found = page.done("history", plc="pump", names=["Main.Level", "Main.Pump"], scans=4)
