@@ -233,7 +233,7 @@ def read_number(out: int, kind: int, at: int, n: int) -> int:
         sign = peek(at)
         at += 1
         n -= 1
-    based: int = place_of(ord("#"), at, n) < n
+    based = place_of(ord("#"), at, n) < n
     if n == 0 or (based and sign != 0):
         return MALFORMED
     if n > LONGEST:
@@ -241,7 +241,7 @@ def read_number(out: int, kind: int, at: int, n: int) -> int:
     if based and n > 3 and says(at, 3, data(b"10#")) and run_of_digits(at + 3, n - 3) == n - 3:
         at += 3
         n -= 3
-        based = 0
+        based = place_of(ord("#"), at, n) < n
     whole = run_of_digits(at, n) == n
     if not based and not whole and not is_real(at, n):
         return MALFORMED
