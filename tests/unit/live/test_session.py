@@ -161,7 +161,7 @@ def test_the_past_is_looked_at_and_not_written(page: Page) -> None:
 def test_rungs_of_the_present_are_shown_where_an_instance_is_looked_at(page: Page) -> None:
     page.scan(3)
     assert not page.session.shows_inside
-    page.done("look", plc="pump", names=[], instance="Main")
+    page.done("look", plc="pump", names=[], instance="Main", scan=True)
     assert page.session.shows_inside
     page.done("view", plc="pump", scan=1)
     assert not page.session.shows_inside
