@@ -134,7 +134,8 @@ def _widest(doc: Doc, comments: Comments) -> int:
     for part in doc.parts if isinstance(doc, Fill) else doc if isinstance(doc, tuple) else (doc,):
         if isinstance(part, Break) or isinstance(doc, Fill):
             parts.append([])
-        parts[-1].append(part)
+        if not isinstance(part, Break):
+            parts[-1].append(part)
     return max(flat_width(tuple(part), comments) or 0 for part in parts)
 
 
@@ -300,7 +301,7 @@ class Printer:
                     todo += (SPACE,) if part.at else (SPACE, part.parts[0])
                 else:
                     todo.extend(reversed(part.parts[part.at:]))
-                    left -= len(part.parts) - part.at
+                    left -= len(part.parts) - max(part.at, 1)
             elif isinstance(part, (Group, Indent, Hang)):
                 todo.append(part.doc)
             else:

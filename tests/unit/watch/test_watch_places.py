@@ -181,6 +181,14 @@ def test_a_reference_that_has_left_an_area_is_outside_of_it() -> None:
     assert told == ["outside of D", "-> D0", "-> D32767", "outside of D"]
 
 
+def test_a_reference_to_a_word_of_several_bytes_has_the_address_of_its_size() -> None:
+    start, names = AREAS["M"].offset, Names({}, AREAS)
+    kinds = ((t.WORD, 20), (t.DWORD, 20), (t.LWORD, 24), (t.DWORD, 22), (t.BYTE, 22))
+    told = [names.reference_name(FIRST_OBJECT << OBJECT_SHIFT | start + at << OFFSET_SHIFT | WHOLE_BYTES, kind)
+            for kind, at in kinds]
+    assert told == ["-> %MW10", "-> %MD5", "-> %ML3", "-> %MB22", "-> %MB22"]
+
+
 def test_an_array_in_out_that_is_bound_to_nothing_yet_is_read_as_none() -> None:
     image = compile_text("""FUNCTION_BLOCK Low VAR_IN_OUT all : ARRAY[0..1] OF REF_TO INT; one : INT; END_VAR END_FUNCTION_BLOCK
 FUNCTION_BLOCK Near VAR_IN_OUT one : INT; END_VAR END_FUNCTION_BLOCK

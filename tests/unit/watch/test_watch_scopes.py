@@ -121,6 +121,7 @@ def test_a_structure_takes_no_number(plc: Plc) -> None:
 
 
 @each_of(("name", "before", "after", "part"), [
+    ("Main.pair", None, {"a": 1, "b": 2.0}, "Main.pair"), ("Main.pair", {"a": 1, "b": 2.0}, None, "Main.pair"),
     ("Main.w", 1, 2, "Main.w"), ("Main.pair", {"a": 1, "b": 2.0}, {"a": 1, "b": 3.0}, "Main.pair.b"),
     ("Main.pair", {"a": 1, "b": 2.0}, {"a": 2, "b": 3.0}, "Main.pair"),
     ("Main.pairs", [{"a": 1, "b": 2.0}] * 2, [{"a": 1, "b": 2.0}, {"a": 4, "b": 2.0}], "Main.pairs[1].a"),

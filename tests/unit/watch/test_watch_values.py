@@ -116,7 +116,8 @@ def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) 
     (CHAR, "\u20ac", "x: CHAR cannot hold the character"), (WCHAR, "\U0001f600", "WCHAR cannot hold the character"),
     (CHAR, "ab", "x is CHAR and takes one character, not 2"), (WCHAR, "", "x is WCHAR and takes one character, not 0"),
     (COLOUR, 1, "1 is no member of Colour; it has Red (0), Green (5)"),
-    (COLOUR, "Blue", "Colour has no member Blue"),
+    (COLOUR, "Blue", "Colour has no member Blue"), (COLOUR, False, "False is no member of Colour"),
+    (COLOUR, 5.0, "5.0 is no member"),
 ])
 def test_a_value_out_of_range_is_refused(kind: Type, value: object, message: str) -> None:
     with pytest.raises(ValueError) as error:
@@ -149,6 +150,7 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
     (t.BOOL, "2", "x is BOOL and takes TRUE or FALSE, not 2"), (t.INT, "1e3", "x is INT and takes a whole number, not 1e3"),
     (t.BYTE, "-129", "x: -129 is out of range of BYTE, which holds 0..255"),
     (FEW, "0", "x: 0 is out of range of Few, which holds 1..5"),
+    (COLOUR, "Shape.Red", "x: Colour has no member Shape.Red; it has Red, Green"),
     (t.INT, "noon", "x: 'noon' is no literal; INT takes a whole number"),
     (t.INT, "'", "x: \"'\" is no literal; INT takes a whole number"),
     (t.DATE, "DT#2024-01-01-00:00:00",
@@ -166,6 +168,7 @@ def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) ->
 @each_of(("kind", "value", "text"), [
     (t.BOOL, True, "TRUE"), (t.INT, -5, "-5"), (t.WORD, 255, "255"), (t.TIME, 1_500_000_000, "T#1s500ms"),
     (t.string(), "a", "'a'"), (COLOUR, 5, "Green (5)"), (COLOUR, 3, "? (3)"), (t.REAL, math.inf, "inf"),
+    (t.REAL, 0.10000000149011612, "0.1"), (t.LREAL, 0.10000000149011612, "0.10000000149011612"),
     (t.array(((0, 1),), t.BOOL), [True, False], "[TRUE, FALSE]"), (PAIR, {"n": 1, "s": "x"}, "(n := 1, s := 'x')"),
     (BLOCK, {"n": 1, "limit": 2, "$edge": 3}, "(n := 1)"), (RECORD, {"n": 1, "limit": 2}, "(n := 1, limit := 2)"),
     (PAIR, {"s": "x"}, "(s := 'x')"),
