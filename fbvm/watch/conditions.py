@@ -35,7 +35,7 @@ class Condition:
         """True if the condition is TRUE now.  What cannot be computed (1 / 0, a null reference) is FALSE."""
         try:
             return self.term.value(read) is True
-        except (ZeroDivisionError, OverflowError, TypeError):
+        except (ArithmeticError, TypeError):
             return False
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import cast
 
+from fbvm.base.arithmetic import quotient, remainder
 from fbvm.base.types import BOOL, DATE, DINT, LREAL, REAL, TIME, EnumType, Type, base, common, fold
 from fbvm.watch.paths import Place
 from fbvm.watch.scanner import ConditionError
@@ -61,12 +62,8 @@ def literal_term(text: str) -> Term:
 
 def _quotient(a: int | float, b: int | float) -> int | float:
     if isinstance(a, int) and isinstance(b, int):
-        return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+        return quotient(a, b)
     return a / b
-
-
-def _remainder(a: int, b: int) -> int:
-    return abs(a) % abs(b) * (-1 if a < 0 else 1)
 
 
 LEVELS: tuple[dict[str, Callable[..., Value]], ...] = (
@@ -76,7 +73,7 @@ LEVELS: tuple[dict[str, Callable[..., Value]], ...] = (
     {"=": operator.eq, "<>": operator.ne},
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
     {"+": operator.add, "-": operator.sub},
-    {"*": operator.mul, "/": _quotient, "MOD": _remainder},
+    {"*": operator.mul, "/": _quotient, "MOD": remainder},
 )
 LEVEL_OF = {sign: number for number, signs in enumerate(LEVELS) for sign in signs}
 _LOGIC = frozenset(("OR", "XOR", "AND", "&"))

@@ -11,13 +11,14 @@ from fbvm.watch.paths import Place, Span, find
 from fbvm.watch.values import Value, nearest_real
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
+SWITCH = EnumType("Switch", 2, 2, t.INT, {"OFF": 0, "ON": 1}, {0: "Off", 1: "On"})
 KINDS = {"tenth": t.REAL, "long": t.LREAL, "when": t.DT, "day": t.DATE,
-         "done": t.BOOL, "n": t.INT, "r": t.REAL, "wait": t.TIME, "text": t.string(), "c": COLOUR,
+         "done": t.BOOL, "n": t.INT, "r": t.REAL, "wait": t.TIME, "text": t.string(), "c": COLOUR, "s": SWITCH,
          "list": t.array(((0, 2),), t.INT)}
 SYMBOLS = {name.upper(): Field(name, kind, 180224 + 16 * at) for at, (name, kind) in enumerate(KINDS.items())}
 VALUES: dict[str, Value] = {
     "tenth": nearest_real(0.1), "long": 0.1, "when": 86_400_000_000_000, "day": 0, "W0": 0, "D10": 0, "W0.00": True,
-    "done": True, "n": -7, "r": 0.5, "wait": 1_500_000_000, "text": "ok", "c": 5, "list[1]": 3, "D200": 513,
+    "done": True, "n": -7, "r": 0.5, "wait": 1_500_000_000, "text": "ok", "c": 5, "s": 1, "list[1]": 3, "D200": 513,
     "CIO 1509.15": True, "E0_5": 9, "n.0": True,
 }  # fmt: skip
 
@@ -68,7 +69,8 @@ def test_an_address_may_have_a_space_within(text: str) -> None:
 
 
 @each_of("text", [
-    "c = Green", "green = c", "c = Colour.Green", "c <> Red", "c = c", "c = Colour#green", "(c = Green) = TRUE",
+    "c = Green", "green = c", "c = Colour.Green", "c <> Red", "c = c", "s = On", "On = s", "c = Colour#green",
+    "(c = Green) = TRUE",
 ])
 def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
     assert holds(text)

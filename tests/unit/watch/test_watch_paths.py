@@ -38,6 +38,7 @@ def place(text: str) -> Place:
     ("main . CONN.eno", "Main.conn.ENO", "BOOL", 180224 + 16, None),
     ("Main.a[1, 0].y", "Main.a[1, 0].y", "DINT", 180224 + 28, None),
     ("Main.a[3,1].x", "Main.a[3, 1].x", "INT", 180224 + 24 + 40, None),
+    ("Main.flags.8", "Main.flags.8", "BOOL", 180224 + 81, 0),
     ("Main.flags.9", "Main.flags.9", "BOOL", 180224 + 81, 1),
     ("Main.flags.%X0", "Main.flags.0", "BOOL", 180224 + 80, 0),
     ("Main.flags.X1", "Main.flags.1", "BOOL", 180224 + 80, 1),

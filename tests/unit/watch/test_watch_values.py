@@ -151,6 +151,7 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
     (t.BYTE, "-129", "x: -129 is out of range of BYTE, which holds 0..255"),
     (FEW, "0", "x: 0 is out of range of Few, which holds 1..5"),
     (COLOUR, "Shape.Red", "x: Colour has no member Shape.Red; it has Red, Green"),
+    (t.INT, "INT", "x: 'INT' is no literal; INT takes a whole number"),
     (t.INT, "noon", "x: 'noon' is no literal; INT takes a whole number"),
     (t.INT, "'", "x: \"'\" is no literal; INT takes a whole number"),
     (t.DATE, "DT#2024-01-01-00:00:00",
