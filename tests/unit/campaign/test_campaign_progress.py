@@ -68,6 +68,24 @@ def test_when_all_runs_are_done_failing_ones_are_made_smaller() -> None:
     assert (progress.state, progress.present_rate) == (SHRINKING, 18)
 
 
+def test_results_that_come_close_to_one_another_are_one_sample() -> None:
+    clock = Clock()
+    progress = Progress(100, clock)
+    for tenth in range(1, 41):
+        clock.now_s = tenth / 10
+        progress.add([Result(tenth)])
+    assert len(progress._samples) < 20 and progress._samples[-1] == (4.0, 40) and progress.rate == 10
+
+
+def test_a_page_without_failures_or_rates_says_so() -> None:
+    page = progress_page(Progress(100, Clock()), "Campaign", {})
+    assert '<p class="good">none so far</p>' in page and "<figure>" not in page
+    progress, clock = after_40_of_100()
+    clock.now_s = 3725
+    progress.add([Result(41)])
+    assert "runs a second over 1 h 2 min" in progress_page(progress, "Campaign", {})
+
+
 def test_the_page_loads_itself_again_while_it_goes_on_and_names_of_programs_stay_text() -> None:
     progress, _ = after_40_of_100()
     page = progress_page(progress, "Campaign", {21: "1.fbtrace"})

@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
+from math import inf
 from pathlib import Path
 from random import Random
 
 import pytest
 
 from fbvm.base.diagnostics import Source
+from fbvm.campaign import shrinking
 from fbvm.campaign.axes import axis_from_text
 from fbvm.campaign.execution import Result
 from fbvm.campaign.judge import NEVER, Failure
 from fbvm.campaign.plan import EXACT, REAL, Axis, FaultRule, Moments, Plan, PowerRule
 from fbvm.campaign.plan_file import Written, any_faults, read_plan_file
-from fbvm.campaign.shrinking import Part, least, shrink
+from fbvm.campaign.shrinking import FAULT, Part, least, shrink
 from fbvm.campaign.variants import STEP_NS, Cut, NamedFault, Variant, _moments, draw
-from fbvm.net.faults import NAMED
+from fbvm.net.faults import FOREVER, NAMED
 from fbvm.run.project import Project
 
 S = 1_000_000_000
@@ -121,6 +123,43 @@ def test_a_failing_run_keeps_what_it_fails_by_and_faults_get_as_short_as_they_ma
     assert shrunk.result.failure == Failure(NEVER, "a")
     with_cut = FailsIf(lambda variant: bool(variant.cuts) and variant.timing == REAL)
     assert shrink(with_cut, run, with_cut.result(run)).variant == Variant(0, 1, (0, 0), (), run.cuts, REAL)
+
+
+def test_parts_of_which_none_can_be_left_out_are_found_in_few_trials() -> None:
+    tried: list[Sequence[Part]] = []
+
+    def both(parts: Sequence[Part]) -> bool:
+        tried.append(parts)
+        return {3, 7} <= {number for _, number in parts}
+
+    eight = [(FAULT, number) for number in range(1, 9)]
+    assert least(eight, both) == [(FAULT, 3), (FAULT, 7)] and len(tried) < 20
+    assert least(eight, lambda parts: True) == [] and least([], lambda parts: False) == []
+    assert least(eight, lambda parts: len(parts) == 8) == eight and least(eight[:1], lambda parts: bool(parts)) == eight[:1]
+
+
+def test_runs_are_tried_so_often_and_not_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shrinking, "MOST_TRIES", 5)
+    run = Variant(0, 1, tuple(range(1, 20)))
+    tries = []
+
+    def whole(variant: Variant) -> bool:
+        tries.append(variant)
+        return sum(map(bool, variant.values)) == len(run.values)
+
+    execution = FailsIf(whole)
+    shrunk = shrink(execution, run, execution.result(run))
+    assert (shrunk.variant, shrunk.tries, len(tries)) == (run, 5, 6)
+
+
+def test_what_goes_wrong_is_told_in_words() -> None:
+    assert str(slow_for(S)) == "slow 1s..2s"
+    assert str(replace(slow_for(S), fault=replace(slow_for(S).fault, until_ns=FOREVER))) == "slow 1s.."
+    assert [str(cut) for cut in (Cut("", S, S), Cut("pump", 2 * S, S), Cut("pump", 0, S // 10, True))] == [
+        "power 1s..2s", "power pump 2s..3s", "power cold pump 0s..100ms"]
+    values, cycle = Axis("Main.r", "value", (0.5, inf)), Axis("cycle", "cycle", (10_000_000,))
+    assert [values.plain(value) for value in (0.5, inf, -inf, "a", 3)] == [0.5, "inf", "-inf", "a", 3]
+    assert (values.text(0.5), cycle.text(10_000_000)) == ("0.5", "10ms")
 
 
 FILE = """[campaign]

@@ -27,6 +27,18 @@ STATEMENTS = {
     "a S= b;": {"SRO a R= b;", "SDL ;;"},
     "t := T#50ms;": {"CRO t := T#40ms;", "CRO t := T#60ms;", "SDL ;;"},
     "a := TRUE; b := a;": {"CRO a := FALSE; b := a;", "SDL ;; b := a;", "SDL a := TRUE; ;;", "SWAP b := a; a := TRUE;"},
+    "n := REAL_TO_INT(2.5);": {"CRO n := REAL_TO_INT(0.0);", "SDL ;;"},
+    "n := REAL_TO_INT(REAL#0.0);": {"CRO n := REAL_TO_INT(REAL#1.0);", "SDL ;;"},
+    "t := T#5ms;": {"CRO t := T#15ms;", "SDL ;;"}, "t := TIME#10ms;": {"CRO t := TIME#20ms;", "CRO t := TIME#0ms;", "SDL ;;"},
+    "t := T#5us;": {"SDL ;;"}, "a R= b;": {"SRO a S= b;", "SDL ;;"}, "a := BOOL#FALSE;": {"CRO a := BOOL#TRUE;", "SDL ;;"},
+    "n := -n;": {"SDL ;;"}, "a := NOT b;": {"NIO a := (b);", "SDL ;;"},
+    "WHILE a DO EXIT; END_WHILE": {"NIO WHILE NOT (a) DO EXIT; END_WHILE", "SDL WHILE a DO ;; END_WHILE"},
+    "REPEAT CONTINUE; UNTIL a END_REPEAT": {"NIO REPEAT CONTINUE; UNTIL NOT (a) END_REPEAT", "SDL REPEAT ;; UNTIL a END_REPEAT"},
+    "IF a THEN RETURN; ELSIF b THEN ; ELSE n := 0; END_IF": {
+        "NIO IF NOT (a) THEN RETURN; ELSIF b THEN ; ELSE n := 0; END_IF",
+        "NIO IF a THEN RETURN; ELSIF NOT (b) THEN ; ELSE n := 0; END_IF",
+        "SDL IF a THEN ;; ELSIF b THEN ; ELSE n := 0; END_IF", "SDL IF a THEN RETURN; ELSIF b THEN ; ELSE ;; END_IF",
+        "CRO IF a THEN RETURN; ELSIF b THEN ; ELSE n := 1; END_IF"},
     "IF a THEN ; END_IF": {"NIO IF NOT (a) THEN ; END_IF"},
 }
 
@@ -111,6 +123,11 @@ INSTRUCTIONS = {
     "LD> D0 &9": {"ROR\nLD>= D0 &9", "ROR\nLD<= D0 &9", "CRO\nLD> D0 &8", "CRO\nLD> D0 &10"},
     "AND<=L D0 D2": {"ROR\nAND<L D0 D2", "ROR\nAND>L D0 D2", "LRO\nOR<=L D0 D2", "VRO\nAND<=L D2 D2", "VRO\nAND<=L D0 D0"},
     "@SET a": {"COIL\n@OUT a", "VRO\n@SET b", "EDGE\nSET a"},
+    "FBCALL TON x IN:=TRUE PT:=T#1s": {
+        "CRO\nFBCALL TON x IN:=FALSE PT:=T#1s", "CRO\nFBCALL TON x IN:=TRUE PT:=T#1010ms",
+        "CRO\nFBCALL TON x IN:=TRUE PT:=T#990ms",
+        "TRO\nFBCALL TOF x IN:=TRUE PT:=T#1s", "TRO\nFBCALL TP x IN:=TRUE PT:=T#1s"},
+    "MOV &0 D0": {"CRO\nMOV &1 D0"}, "MOV #9 D0": {"CRO\nMOV #8 D0"}, "MOV #0F D0": {"CRO\nMOV #10 D0", "CRO\nMOV #0E D0"},
     "TIM 0001 #0010": {"CRO\nTIM 0001 #0011", "CRO\nTIM 0001 #0009"},
     "@+(400) D0 #000F D0": {"ARO\n@- D0 #000F D0", "EDGE\n+(400) D0 #000F D0", "CRO\n@+(400) D0 #0010 D0",
                             "CRO\n@+(400) D0 #000E D0"},

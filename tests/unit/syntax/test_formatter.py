@@ -200,6 +200,10 @@ def test_tables_fill_their_lines() -> None:
 # --- comments and pragmas ---
 
 
+def test_comments_behind_one_another_keep_a_space_between_them() -> None:
+    assert body("a; (* one *) (* two *)(* three *)\nb;") == "a;  (* one *) (* two *) (* three *)\nb;\n"
+
+
 def test_comments_stay_where_they_belong() -> None:
     assert body("""
         // above
@@ -294,6 +298,26 @@ def test_names_are_written_as_declared() -> None:
         END_PROGRAM""").split("\n")[-7:] == [
             "    m[1](Go := TRUE, Place => Origin);", "    small := N[2].Place.X;", "    k := Kind#Large;",
             "    unknown := Unknown;", "    k := Large;", "END_PROGRAM", ""]
+
+
+def test_names_of_members_steps_actions_tasks_and_programs_are_written_as_declared() -> None:
+    lines = [" ".join(line.split()) for line in written("""
+        TYPE In : STRUCT A : INT; END_STRUCT; Out : STRUCT One : In; Many : ARRAY[0..1] OF In; END_STRUCT; Alias : Out; END_TYPE
+        FUNCTION_BLOCK Motor VAR_INPUT Go : BOOL; END_VAR END_FUNCTION_BLOCK
+        PROGRAM Main
+        VAR o : alias := (ONE := (a := 1), many := [(A := 2), 1((a := 3))]); m : MOTOR := (GO := TRUE);
+            l : ARRAY[1..2] OF out := [(one := (a := 4))]; END_VAR
+        INITIAL_STEP Start: work(N); END_STEP
+        TRANSITION T1 FROM START TO next := O.ONE.a > 1; END_TRANSITION
+        STEP Next: WORK(S); END_STEP
+        ACTION Work: M(go := start.x); END_ACTION
+        END_PROGRAM
+        CONFIGURATION Conf RESOURCE Res ON PLC TASK Quick(PRIORITY := 1); PROGRAM P1 WITH QUICK : MAIN; END_RESOURCE
+        END_CONFIGURATION""").split("\n")]
+    for line in ("o : Alias := (One := (A := 1), Many := [(A := 2), 1((A := 3))]);", "m : Motor := (Go := TRUE);",
+                 "l : ARRAY[1..2] OF Out := [(One := (A := 4))];", "Work(N);", "TRANSITION T1 FROM Start TO Next := o.One.A > 1;",
+                 "Work(S);", "m(Go := Start.X);", "PROGRAM P1 WITH Quick : Main;"):  # fmt: skip
+        assert line in lines
 
 
 def test_an_external_variable_without_its_global_one_is_spelt_as_it_is_declared() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
@@ -35,8 +36,17 @@ def test_a_comment_behind_a_comment_is_a_mistake_with_its_place() -> None:
     assert ":4:1: error S0109: this is no instruction" in diagnostic
 
 
+@pytest.mark.slow
 @each_of(("constant", "fits"), [("+32767", True), ("+32768", False), ("-32768", True), ("-32769", False), ("&65535", True),
                                 ("&65536", False), ("#FFFF", True), ("#10000", False)])
 def test_a_constant_has_sixteen_bits_in_a_word(constant: str, fits: bool) -> None:
     messages = said(f"LADDER\nLD A\nMOV {constant} D0\nOUT M\nEND_LADDER")
     assert [f"{constant} does not fit in 16 bits" in message for message in messages] == ([] if fits else [True])
+
+
+@pytest.mark.slow
+@each_of(("instruction", "numbers"), [("FAL 0 #0", ""), ("FAL 511 #0", ""), ("FAL 512 #0", "0 to 511"), ("FALS 0 #0", "1 to 511"),
+                                      ("FALS 1 #0", ""), ("FALS 511 D0", ""), ("FALS 512 #0", "1 to 511")])
+def test_failures_have_numbers(instruction: str, numbers: str) -> None:
+    messages = [each for each in said(f"LADDER\nLD A\n{instruction}\nEND_LADDER") if " error " in each]
+    assert [f"numbers are {numbers}" in each for each in messages] == ([True] if numbers else [])
