@@ -169,6 +169,9 @@ def test_tests_of_other_rooms_that_execute_the_statement_are_tried(tmp_path: Pat
     for name, text in ((path, now.partition("\n\n")[2]), (other, looks)):
         (then / name).parent.mkdir(parents=True)
         (then / name).write_text(text, encoding="utf-8")
+    missed = "tests/unit/base/test_missed.py"
+    for folder in (copy.folder, then):
+        (folder / missed).write_text(looks, encoding="utf-8")
     data = coverage.CoverageData(str(tmp_path / "map"))
     data.set_context(f"{other}::test_two|run")
     data.add_lines({str(then / path): [5]})
@@ -180,5 +183,6 @@ def test_tests_of_other_rooms_that_execute_the_statement_are_tried(tmp_path: Pat
     broken = m.Mutant(path, at, at + 1, "3")
     assert not m.Stage(copy, "quick", reached).finds(broken), "the room has no tests"
     assert m.Stage(copy, m.ELSEWHERE, reached).finds(broken)
+    assert reached.among([f"{other}::test_two"], [missed, other]) == [missed, f"{other}::test_two"], "it was not measured"
     (copy.folder / other).write_text(looks.replace("== 2", "> 0"), encoding="utf-8")
     assert reached.elsewhere([f"{other}::test_two"], []) == reached.among([f"{other}::test_two"], [other]) == [other]

@@ -20,6 +20,7 @@ class Reached:
         self._data = CoverageData(str(file))
         self._data.read()
         self._house = house
+        self._known = {_file(context) for context in self._data.measured_contexts()}
         measured = next(Path(name) for name in self._data.measured_files() if f"/{PACKAGE}/" in name.replace("\\", "/"))
         self._root = next(folder.parent for folder in measured.parents if folder.name == PACKAGE)
 
@@ -34,7 +35,8 @@ class Reached:
         return sorted(found) or None
 
     def among(self, reaching: list[str] | None, own: list[str]) -> list[str]:
-        """Those tests of a room that execute the statement, and the whole files that were changed since; all if none is known."""
+        """Those tests of a room that execute the statement, and the whole files that were changed since or did not run; all if
+        none is known."""
         if reaching is None:
             return own
         changed = [file for file in own if self._is_changed(file)]
@@ -49,7 +51,7 @@ class Reached:
 
     def _is_changed(self, file: str) -> bool:
         then = self._root / file
-        return not then.is_file() or then.read_bytes() != (self._house / file).read_bytes()
+        return file not in self._known or not then.is_file() or then.read_bytes() != (self._house / file).read_bytes()
 
 
 def _file(test: str) -> str:
