@@ -73,15 +73,12 @@ class _Statements:
         return kind if writable(self.scope, expr, purpose) else None
 
     def _assign(self, node: tree.Assign) -> None:
-        if node.op == "REF=" and len(node.targets) == 1:
+        if node.op == "REF=":  # which has one target
             is_property, taken = objects.target_property(self.scope, node.targets[0])
             if is_property:
                 self._set_reference(node, taken)
             else:
                 references.bind(self.scope, node)
-            return
-        if node.op == "REF=":
-            self.error("S0901", node, f"{node.op} is understood but not executed by this version")
             return
         kinds = [self.target(target) for target in node.targets]
         last = kinds[-1]

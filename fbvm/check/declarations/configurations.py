@@ -63,9 +63,9 @@ class Configurations:
             programs = [p for p in programs if p not in called]
         if len(programs) == 1 and programs[0].type is not None:
             task = TaskFact("", LOWEST, 0)
-            self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name)
-            self.context.tasks.append(task)
-            self._unconnected(programs[0], task, programs[0].source, programs[0].tree.name, "")
+            if self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name):
+                self.context.tasks.append(task)
+                self._unconnected(programs[0], task, programs[0].source, programs[0].tree.name, "")
 
     def begin_tasks(self) -> None:
         """Let each task call, in front of its programs, what libraries that tell programs about their tasks want called."""
@@ -84,23 +84,25 @@ class Configurations:
                 self.context.check_body(pou)
                 task.runs.insert(0, Run(task.runs[0].instance, pou))
 
-    def _instance(self, name: str, pou: Pou, task: TaskFact, source: Source, node: tree.Node) -> None:
+    def _instance(self, name: str, pou: Pou, task: TaskFact, source: Source, node: tree.Node) -> bool:
+        """Let the task run an instance of that name; False after a diagnostic."""
         assert pou.type is not None
         key = ("", fold(name))
         other = self.project.globals.get(key)
         if other is not None and other.type is pou.type and other not in self._run:
             self._run.append(other)
             task.runs.append(Run(other, pou))
-            return
+            return True
         if other is not None:
             self.report.add("S0202", source, node, f"{name} is the name of a program and of a global variable", "",
                             (other.source, other.node.start, "the variable"))
-            return
+            return False
         instance = Variable(name, pou.type, "PROGRAM", source, node, place="abs", initial=pou.initial)
         self.context.global_order.append(instance)
         self.project.globals[key] = instance
         self._run.append(instance)
         task.runs.append(Run(instance, pou))
+        return True
 
     def _unconnected(self, pou: Pou, task: TaskFact, source: Source, node: tree.Name, connection: str) -> None:
         """Report an in-out of a program that nothing is connected to; in some dialects it gets a variable of its own."""
@@ -186,8 +188,7 @@ class Configurations:
             self.report.add("S0204", source, program.type_name, f"there is no PROGRAM {program.type_name.text}",
                             f"a task runs a PROGRAM, which calls an instance of the {pou.kind}" if pou is not None else
                             self.project.nearest(program.type_name.text, names))
-        elif pou.type is not None:
-            self._instance(program.name.text, pou, task, source, program.name)
+        elif pou.type is not None and self._instance(program.name.text, pou, task, source, program.name):
             if program.connections:
                 self._connect(program.name, program.end, program.connections, task, source)
             else:

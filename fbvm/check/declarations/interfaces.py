@@ -88,6 +88,8 @@ class _Interface:
         if "ENO" not in pou.variables and writes_eno(pou):
             self._enables_itself()
         if pou.is_routine:
+            if pou.is_function and pou.tree.methods:
+                self._error("S0205", pou.tree.methods[0].name, "a FUNCTION has no METHOD", "make it a FUNCTION_BLOCK")
             self._frame([v for v in pou.order if v.place == "self"])
         else:
             self._methods()
@@ -140,9 +142,6 @@ class _Interface:
     def _methods(self) -> None:
         """Make the POUs of methods and accessors, and the variables that each of them keeps in the instance."""
         pou = self.pou
-        if pou.is_function and pou.tree.methods:
-            self._error("S0205", pou.tree.methods[0].name, "a FUNCTION has no METHOD", "make it a FUNCTION_BLOCK")
-            return
         for written in pou.tree.methods:
             name, shown = fold(written.name.text), f"{pou.name}.{written.name.text}"
             key = name if written.kind == "METHOD" else f"{written.kind} {name}"
