@@ -47,6 +47,11 @@ def test_without_the_token_there_is_no_socket(query: str) -> None:
     assert answered(request(f"/live{query}".encode("ascii", "replace").decode()))[0] == 403
 
 
+def test_a_query_of_more_fields_than_a_page_sends_has_no_token() -> None:
+    for more, status in (("&a=1&b=2&c=3", 101), ("&a=1&b=2&c=3&d=4", 403)):
+        assert answered(request(f"/live?token={TOKEN}{more}"))[0] == status, more
+
+
 def test_two_host_headers_are_refused() -> None:
     assert answered(request().replace(b"Upgrade:", b"Host: evil.example\r\nUpgrade:", 1))[0] == 421
 

@@ -108,6 +108,9 @@ def test_a_drawing_that_is_gone_or_does_more_is_said(tmp_path: Path) -> None:
     machine.save("pump.svg", SVG.replace("<g", "<script/><g"))
     machine.pictures.look()
     assert "<script>" in machine.problems[0]
+    machine.save("pump.svg", "<html></html>")
+    machine.pictures.look()
+    assert len(machine.problems) == 1 and machine.problems[0].startswith("pump.svg: ") and machine.pictures.places == {}
     (tmp_path / "pump.svg").unlink()
     machine.pictures.look()
     assert machine.problems == ["pump.svg: no such file or directory"]

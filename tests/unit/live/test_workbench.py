@@ -10,10 +10,12 @@ from browsers import PUMP, Page
 from rows import each_of
 
 from fbvm import LoopNetwork, Peer
+from fbvm.engine.trap import Trap
 from fbvm.live.messages import MOST_NAMES, MOST_TEXT
 from fbvm.live.plcs import MOST_CAPTURE_BYTES
 from fbvm.live.updates import ACTS, MEMORY_WORDS, MOST_SHOWN, UPDATE_NS, VIEW_NS
-from fbvm.live.workbench import FASTEST, MOST_STEPS, SLOWEST
+from fbvm.live.workbench import FASTEST, MOST_STEPS, SLOWEST, fault_rows
+from fbvm.net.faults import Fault, fault
 from fbvm.wire.tap import TapEvent, TapKind
 
 CHART = """PROGRAM Main
@@ -277,3 +279,42 @@ def test_a_program_without_a_network_has_no_faults() -> None:
     for do, fields in {"fault": {"kind": "cut"}, "mend": {}}.items():
         assert page.ask(do, **fields)["error"] == "this program has no network"
     assert isinstance(page.network, LoopNetwork) and page.network.faults == []
+
+
+def test_while_somebody_else_has_the_plc_a_page_looks_on(page: Page) -> None:
+    page.bench.held_by = "an editor"
+    said = page.ask("write", plc="pump", name="Main.Level", value="5")["error"]
+    assert said == "an editor has the PLC: this page looks on meanwhile" and page.bench.acts == []
+    assert page.done("search", plc="pump", text="Main.Level")["found"][0]["name"] == "Main.Level"
+    page.bench.held_by = ""
+    page.done("write", plc="pump", name="Main.Level", value="5")
+
+
+@pytest.mark.slow
+def test_there_are_so_many_breakpoints_and_found_names_and_no_more(page: Page) -> None:
+    page.done("break", plc="pump", kind="change", where="Main.Level")
+    for number in range(99):
+        page.done("break", plc="pump", kind="condition", where=f"Main.Level = {number}")
+    assert "there are 100 breakpoints already" in page.ask("break", plc="pump", kind="change", where="D5")["error"]
+    assert [row.kind for row in page.plc.breakpoints][:2] == ["change", "condition"]
+    assert len(page.done("search", plc="pump", text=" ")["found"]) == 200
+
+
+def test_what_a_restart_has_kept_is_noted_as_writes(page: Page) -> None:
+    old = opened()
+    place = page.plc.find("Main.Level")
+    trap = Trap("R0101", page.plc.image.sites[0], (2, 0), "2 divided by 0")
+    page.bench.note_restart(old.bench, {"pump": [place]}, {"pump": trap})
+    assert [(act.what, act.scan, act.name, act.value) for act in page.bench.acts] == [
+        ("restart", 0, "", None), ("restart", 0, "", None), ("keep", 0, "Main.Level", page.plc.read("Main.Level"))]
+    assert [act.text for act in page.bench.acts] == [
+        "restart with the changed ; 1 retained variables kept their values",
+        f"FB_exit of the program before ended with {trap}", "Main.Level kept"]  # fmt: skip
+
+
+def test_faults_are_listed_by_their_kinds() -> None:
+    host = "10.0.0.1"
+    rows = [fault("slow", latency_ns=5), fault("silent"), Fault(peer=Peer(host, 0), gap_ns=5), Fault(peer=Peer(host, 502))]
+    assert [(row["kind"], row["peer"]) for row in fault_rows(rows)] == [
+        ("slow", "all"), ("silent", "all"), ("fault", "10.0.0.1"), ("fault", "10.0.0.1:502")]
+    assert [bool(row["meaning"]) for row in fault_rows(rows)] == [True, True, False, False]
