@@ -72,6 +72,13 @@ def test_the_plcs_of_a_project_are_threads_of_one_time(tmp_path: Path) -> None:
     assert client.value("Main.n") == "4"
     client.go("next", threadId=2)
     assert client.frames[-1]["name"] == "scan 2, 60ms" and client.value("Main.n") == "300"
+    client.ask("setBreakpoints", source={"path": str(tmp_path / "slow.st")}, breakpoints=[])
+    info = client.ask("dataBreakpointInfo", name="Main.n", frameId=client.frames[0]["id"])
+    answer = client.ask("setDataBreakpoints", breakpoints=[{"dataId": info["dataId"]}, {"dataId": "nobody|Main.n"}])
+    assert info["dataId"] == "slow|Main.n" and [row["verified"] for row in answer["breakpoints"]] == [True, True]
+    client.ask("setDataBreakpoints", breakpoints=[{"dataId": info["dataId"]}])
+    stop = client.go("continue")
+    assert (stop["reason"], stop["threadId"]) == ("data breakpoint", 2)
 
 
 def test_rungs_are_frames_and_breakpoints(tmp_path: Path) -> None:
