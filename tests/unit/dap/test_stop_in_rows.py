@@ -38,6 +38,7 @@ VAR
     Level AT D200 : UINT := 129;
     Big : ARRAY[0..599] OF INT;
     Few : ARRAY[1..3] OF INT := [1, 2, 3];
+    Most : ARRAY[1..16] OF SINT; More : ARRAY[1..17] OF SINT;
 END_VAR
 VAR CONSTANT Limit : INT := 7; END_VAR
     P(On := TRUE, Count := N);
@@ -86,7 +87,7 @@ def test_each_frame_has_its_scopes_and_each_scope_its_rows(tmp_path: Path) -> No
     frames = answer["stackFrames"]
     assert [(row["name"], row["line"], row["column"], row.get("endLine"), row.get("endColumn"), row.get("canRestart"))
             for row in frames] == [
-        ("Sum", 9, 5, 9, 15, True), ("Pump  Main.P", 19, 5, 19, 37, True), ("Main", 31, 5, 31, 30, True),
+        ("Sum", 9, 5, 9, 15, True), ("Pump  Main.P", 19, 5, 19, 37, True), ("Main", 32, 5, 32, 30, True),
         ("scan 0, 0s", 0, 0, None, None, None)]  # fmt: skip
     assert answer["totalFrames"] == 4 and frames[3]["presentationHint"] == "label"
     assert all(row["source"]["name"] == "pump.st" and "presentationHint" not in row["source"] for row in frames[:3])
@@ -98,7 +99,7 @@ def test_each_frame_has_its_scopes_and_each_scope_its_rows(tmp_path: Path) -> No
     assert [[shown(scope) for scope in scopes] for scopes in own] == [
         ["Inputs: 2, arguments", "Locals: 2, locals", *SHARED],
         ["Temporary: 1, locals", "Inputs: 1, arguments", "Outputs: 1", "In-outs: 1", "Locals: 1, locals", *SHARED],
-        ["Locals: 7, locals", *SHARED], SHARED]  # fmt: skip
+        ["Locals: 9, locals", *SHARED], SHARED]  # fmt: skip
     inside = [[rows(client, scope["variablesReference"]) for scope in scopes if shown(scope) not in SHARED] for scopes in own]
     assert inside[0] == [["A = 6, INT", "B = 1, INT"], ["C = 0, INT", "Sum = 0, INT"]]
     assert inside[1] == [["Twice = 6, INT"], ["On = TRUE, BOOL, as Main.P.On"], ["Speed = 0, INT, as Main.P.Speed"],
@@ -106,11 +107,14 @@ def test_each_frame_has_its_scopes_and_each_scope_its_rows(tmp_path: Path) -> No
     assert inside[2] == [[
         "N = 3, INT, as Main.N", "P = Pump, Pump, as Main.P, 4 names", "T = Tank, Tank, as Main.T, 2 names",
         "Level = 129, UINT, as Main.Level", "Big = ARRAY [0..599] OF INT, ARRAY [0..599] OF INT, as Main.Big, 600 numbers",
-        "Few = [1, 2, 3], ARRAY [1..3] OF INT, as Main.Few, 3 numbers", "Limit = 7, INT, as Main.Limit, constant, readOnly"]]
+        "Few = [1, 2, 3], ARRAY [1..3] OF INT, as Main.Few, 3 numbers",
+        f"Most = [{', '.join('0' * 16)}], ARRAY [1..16] OF SINT, as Main.Most, 16 numbers",
+        "More = ARRAY [1..17] OF SINT, ARRAY [1..17] OF SINT, as Main.More, 17 numbers",
+        "Limit = 7, INT, as Main.Limit, constant, readOnly"]]
 
     shared = {scope["name"]: scope["variablesReference"] for scope in own[3]}
     assert rows(client, shared["Globals"]) == ["Total = 40000, DINT"]
-    assert rows(client, shared["Programs"]) == ["Main = Main, Main, 7 names"]
+    assert rows(client, shared["Programs"]) == ["Main = Main, Main, 9 names"]
     assert rows(client, shared["Runtime"]) == [f"{row}, readOnly" for row in (
         "scan = 0", "statement = 3", "time = T#0s", "cycle = T#10ms", "mode = RUN", "executed scans = 0", "budget = 2000000",
         "engine = Python", "warnings = none")]  # fmt: skip
@@ -161,24 +165,24 @@ def test_where_each_move_comes_to_stand(tmp_path: Path) -> None:
     client = begun(tmp_path)
     for command, arguments, stands in (
         ("stepIn", {}, ("step", "scan 0, 0s", 18)), ("stepIn", {}, ("step", "scan 0, 0s", 19)),
-        ("stepIn", {}, ("step", "scan 0, 0s", 9)), ("stepOut", {}, ("step", "scan 0, 0s", 32)),
-        ("stepOut", {}, ("step", "scan 0, 0s", 0)), ("stepBack", {}, ("step", "back in scan 0, 0s", 33)),
-        ("next", {}, ("step", "scan 0, 0s", 0)), ("fbvm/stepBackInto", {}, ("step", "back in scan 0, 0s", 33)),
-        ("fbvm/stepBackInto", {}, ("step", "back in scan 0, 0s", 32)),
+        ("stepIn", {}, ("step", "scan 0, 0s", 9)), ("stepOut", {}, ("step", "scan 0, 0s", 33)),
+        ("stepOut", {}, ("step", "scan 0, 0s", 0)), ("stepBack", {}, ("step", "back in scan 0, 0s", 34)),
+        ("next", {}, ("step", "scan 0, 0s", 0)), ("fbvm/stepBackInto", {}, ("step", "back in scan 0, 0s", 34)),
+        ("fbvm/stepBackInto", {}, ("step", "back in scan 0, 0s", 33)),
         ("fbvm/stepBackInto", {}, ("step", "back in scan 0, 0s", 10)), ("restartFrame", {}, ("restart", "back in scan 0, 0s", 9)),
-        ("fbvm/stepScan", {}, ("step", "scan 1, 10ms", 31)), ("fbvm/stepScan", {"scans": 3}, ("step", "scan 4, 40ms", 31)),
+        ("fbvm/stepScan", {}, ("step", "scan 1, 10ms", 32)), ("fbvm/stepScan", {"scans": 3}, ("step", "scan 4, 40ms", 32)),
         ("fbvm/stepScan", {"scans": -1}, "at least one scan"), ("stepBack", {}, ("step", "back in scan 3, 30ms", 0)),
-        ("fbvm/stepBackScan", {}, ("step", "back in scan 3, 30ms", 31)),
-        ("fbvm/stepBackScan", {"scans": 2}, ("step", "back in scan 1, 10ms", 31)),
-        ("fbvm/gotoScan", {"scan": -1}, "scans are counted from 0"), ("fbvm/gotoScan", {"scan": 4}, ("step", "scan 4, 40ms", 31)),
-        ("fbvm/gotoScan", {"scan": 6}, ("step", "scan 6, 60ms", 31)),
-        ("fbvm/gotoScan", {"scan": 1}, ("step", "back in scan 1, 10ms", 31)),
-        ("fbvm/lastWrite", {"name": "Main.N"}, ("data breakpoint", "Main.N was 3, is 4, by pump.st:32 in Main", 33)),
-        ("fbvm/lastWrite", {"name": "Main.Limit"}, ("step", "Main.Limit was never changed before", 33)),
-        ("reverseContinue", {}, ("entry", "beginning of what is kept: scan 0, 0s", 31)),
-        ("stepBack", {}, "this is the beginning of what is kept: scan 0, 0s"), ("next", {}, ("step", "scan 0, 0s", 32)),
-        ("next", {}, ("step", "scan 0, 0s", 33)), ("next", {}, ("step", "scan 0, 0s", 0)),
-        ("next", {}, ("step", "scan 1, 10ms", 31)),
+        ("fbvm/stepBackScan", {}, ("step", "back in scan 3, 30ms", 32)),
+        ("fbvm/stepBackScan", {"scans": 2}, ("step", "back in scan 1, 10ms", 32)),
+        ("fbvm/gotoScan", {"scan": -1}, "scans are counted from 0"), ("fbvm/gotoScan", {"scan": 4}, ("step", "scan 4, 40ms", 32)),
+        ("fbvm/gotoScan", {"scan": 6}, ("step", "scan 6, 60ms", 32)),
+        ("fbvm/gotoScan", {"scan": 1}, ("step", "back in scan 1, 10ms", 32)),
+        ("fbvm/lastWrite", {"name": "Main.N"}, ("data breakpoint", "Main.N was 3, is 4, by pump.st:33 in Main", 34)),
+        ("fbvm/lastWrite", {"name": "Main.Limit"}, ("step", "Main.Limit was never changed before", 34)),
+        ("reverseContinue", {}, ("entry", "beginning of what is kept: scan 0, 0s", 32)),
+        ("stepBack", {}, "this is the beginning of what is kept: scan 0, 0s"), ("next", {}, ("step", "scan 0, 0s", 33)),
+        ("next", {}, ("step", "scan 0, 0s", 34)), ("next", {}, ("step", "scan 0, 0s", 0)),
+        ("next", {}, ("step", "scan 1, 10ms", 32)),
     ):  # fmt: skip
         if command == "restartFrame":
             arguments = {"frameId": client.frames[0]["id"]}
@@ -193,7 +197,7 @@ def test_where_each_move_comes_to_stand(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_log_points_speak_again_behind_a_change_of_memory(tmp_path: Path) -> None:
     client = begun(tmp_path)
-    client.ask("setBreakpoints", source={"path": str(tmp_path / "pump.st")}, breakpoints=[{"line": 32, "logMessage": "n {N}"}])
+    client.ask("setBreakpoints", source={"path": str(tmp_path / "pump.st")}, breakpoints=[{"line": 33, "logMessage": "n {N}"}])
     client.go("fbvm/stepScan", scans=2)
     client.go("fbvm/gotoScan", scan=1)
     client.go("fbvm/stepScan")
