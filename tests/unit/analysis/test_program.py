@@ -252,3 +252,35 @@ def test_a_bit_of_a_word_changes_what_addresses_mean_everywhere() -> None:
     assert not program.check_changes()
     program.check_all()
     assert codes(program, "words.st") == [("S0193", 3)]
+
+
+@each_of("text", [
+    "FUNCTION_BLOK B\nVAR_INPUT a : INT; END_VAR\nEND_FUNCTION_BLOCK\nPROGRAM Main VAR b : B; END_VAR b(a := 1); END_PROGRAM",
+    "FUNCTION_BLOCK B\nVAR_INPUT 1a : INT; END_VAR\nEND_FUNCTION_BLOCK\nPROGRAM Main VAR b : B; END_VAR b(a := 1); END_PROGRAM",
+    "TYPE T : STRUCT a ; b : INT; END_STRUCT END_TYPE\nPROGRAM Main VAR t : T; END_VAR t.a := 1; t.c := 2; END_PROGRAM",
+])
+def test_what_follows_from_a_mistake_elsewhere_is_not_told(text: str) -> None:
+    program = Program()
+    program.replace("a.st", text)
+    program.check_all()
+    assert [message.code for message in program.diagnostics("a.st")] == ["S0101"]
+
+
+def test_a_type_that_becomes_a_program_and_back_needs_a_whole_check() -> None:
+    program = Program()
+    for text in ("TYPE T : INT; END_TYPE", "PROGRAM Main END_PROGRAM", "TYPE T : INT; END_TYPE"):
+        program.replace("a.st", text)
+        assert not program.check_changes()
+        program.check_all()
+        assert program.diagnostics("a.st") == []
+
+
+def test_errors_of_a_library_are_told_apart(tmp_path: Path) -> None:
+    folder = tmp_path / "lib" / "mine"
+    folder.mkdir(parents=True)
+    (folder / "Wrong.st").write_text("FUNCTION_BLOCK Wrong VAR n : INT; END_VAR n := m; END_FUNCTION_BLOCK", encoding="utf-8")
+    program = Program(libraries=[tmp_path / "lib"])
+    program.replace("a.st", "PROGRAM Main VAR w : Wrong; END_VAR w(); END_PROGRAM")
+    assert program.library_errors() == []
+    program.check_all()
+    assert [message.code for message in program.library_errors()] == ["S0201"]

@@ -145,3 +145,22 @@ def test_every_name_of_the_corpus_has_a_declaration() -> None:
             lost += [(each.name, use.key) for part in program.parts() for use in program.uses(part)
                      if use.key[0] != "standard" and find(program.checked.checker, use.key) is None]
     assert lost == []
+
+
+def test_a_global_variable_that_its_list_qualifies_has_a_declaration_at_both_places() -> None:
+    program, main = Program(dialect="codesys"), "PROGRAM Main VAR x : INT; END_VAR x := GVL.Speed; END_PROGRAM"
+    qualified = "{attribute 'qualified_only'}\nVAR_GLOBAL Speed : INT; END_VAR\n"
+    program.replace("GVL.st", qualified)
+    program.replace("main.st", main)
+    program.check_all()
+    for name, offset in (("main.st", main.index("Speed")), ("GVL.st", qualified.index("Speed"))):
+        declared = declared_at(program, name, offset)
+        assert declared is not None and declared.key == ("global", "", "GVL.SPEED")
+        assert len(references(program, declared.key)) == 2
+
+
+def test_an_input_with_an_edge_has_a_declaration() -> None:
+    text = ("FUNCTION_BLOCK Count\nVAR_INPUT\n  Level : INT;\n  Up : BOOL R_EDGE;\nEND_VAR\nVAR n : INT; END_VAR\n"
+            "IF Up THEN n := n + Level; END_IF;\nEND_FUNCTION_BLOCK\n")
+    check_declaration(text, "IF Up", "Up", 4, 2)
+    check_declaration(text, "n + Level", "Level", 3, 2)

@@ -87,6 +87,25 @@ def test_completion_in_a_section_offers_types_and_free_addresses(line: str, some
     assert some <= {item.label for item in complete(program, "pump.st", offset)}
 
 
+def test_what_completion_offers_as_a_type_comes_in_its_order_with_its_kind() -> None:
+    program, offset = at_mark("TYPE Own : INT; END_TYPE\nFUNCTION_BLOCK Mine END_FUNCTION_BLOCK\n"
+                              "PROGRAM Main\nVAR\n    x : ‸\nEND_VAR\nEND_PROGRAM\n")
+    offered = {item.label: (item.kind, item.insert, item.rank) for item in complete(program, "pump.st", offset)}
+    wanted = {"Own": ("type", "", 1), "Mine": ("block", "", 1), "INT": ("type", "", 2), "STRING": ("type", "", 2),
+              "ARRAY": ("keyword", "ARRAY [${1:0..9}] OF $0", 3), "TON": ("block", "", 4)}
+    assert {name: offered[name] for name in wanted} == wanted
+    assert "ADSLOGSTR" not in offered, "a function is no type"
+
+
+def test_what_completion_offers_as_a_statement_comes_in_its_order_with_its_kind() -> None:
+    program, offset = at_mark(HEAD + "‸\nEND_PROGRAM\n")
+    offered = {item.label: (item.kind, item.insert, item.rank) for item in complete(program, "pump.st", offset)}
+    wanted = {"P1": ("variable", "", 2), "Filling": ("enumerator", "", 4), "ABS": ("function", "ABS($0)", 6),
+              "ADSLOGSTR": ("function", "ADSLOGSTR($0)", 8)}
+    assert {name: offered[name] for name in wanted} == wanted
+    assert offered["IF"][0] == "keyword" and offered["IF"][2] == 7 and "TON" not in offered
+
+
 def test_completion_between_declarations_offers_declarations() -> None:
     program, offset = at_mark("‸")
     assert "FUNCTION_BLOCK" in {item.label for item in complete(program, "pump.st", offset)}
@@ -168,6 +187,18 @@ def test_an_unknown_name_is_declared_with_a_type_that_fits() -> None:
 def test_the_type_of_an_unknown_name_is_the_usual_one(written: str, kind: str) -> None:
     program, offset = at_mark(f"PROGRAM Main VAR b : BOOL; w : WORD; l : LREAL; END_VAR {written} END_PROGRAM\n")
     assert [fix.title for fix in fixes(program, "pump.st", offset, offset)] == [f"Declare n : {kind}"]
+
+
+@each_of("text, mended", [
+    ("PROGRAM Main\nVAR\n    x : INT;\nx := 1;\nEND_PROGRAM\n", "    x : INT;\nEND_VAR\nx := 1;"),
+    ("TYPE T : STRUCT a : INT; END_STRUCT\nPROGRAM Main\nEND_PROGRAM\n", "END_STRUCT\nEND_TYPE\nPROGRAM"),
+    ("PROGRAM Main\nVAR x : INT;\n  IF x = 1 THEN x := 2; END_IF\nEND_PROGRAM\n", "x : INT;\n  END_VAR\n  IF x"),
+    ("PROGRAM Main VAR x : INT; END_VAR\n  IF x = 1 THEN x := 2;\nEND_PROGRAM\n", "x := 2;\nEND_IF;\nEND_PROGRAM"),
+])
+def test_the_end_that_is_missing_gets_a_line_of_its_own(text: str, mended: str) -> None:
+    program, _ = at_mark("‸" + text)
+    [fix] = fixes(program, "pump.st", 0, len(text))
+    assert fix.title.startswith("Insert END_") and mended in applied(text, fix.edits)
 
 
 def test_a_warning_can_be_mended_or_suppressed() -> None:
