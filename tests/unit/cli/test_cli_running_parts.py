@@ -213,7 +213,8 @@ def test_a_run_under_a_page_has_the_options_of_a_run(monkeypatch: pytest.MonkeyP
     plc.run(scans=5)
     assert running.plc is plc
     with click.Context(click.Command("run")):
-        run._run_live(counter_image(), 1, (), files=(Path("a.st"),), program=None, libraries=(), **options | {"lines": ("nowhere",)})
+        wrong = options | {"lines": ("nowhere",)}
+        run._run_live(counter_image(), 1, (), files=(Path("a.st"),), program=None, libraries=(), **wrong)
     with pytest.raises(click.UsageError, match="nowhere"):
         served[1][0].bound(plc)
 

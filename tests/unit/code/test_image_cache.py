@@ -85,6 +85,19 @@ def test_sources_and_libraries_count(anew: list[int], file: str, text: str) -> N
     assert len(anew) == 2
 
 
+def test_a_library_file_that_cannot_be_read_counts_with_its_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = []
+    for error in (None, FileNotFoundError(2, "gone"), PermissionError(13, "not yours")):
+        def read(path: Path, most: int, error: OSError | None = error) -> bytes:
+            if error:
+                raise error
+            return b""
+
+        monkeypatch.setattr(image_cache, "read_file", read)
+        names.append(image_cache.name([], [Path("lib")], []))
+    assert len(set(names)) == 3
+
+
 def test_another_name_of_a_source_counts(anew: list[int]) -> None:
     compiled()
     Path("main.st").rename("other.st")

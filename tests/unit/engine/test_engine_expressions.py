@@ -230,6 +230,16 @@ def test_nan_is_stored_canonical() -> None:
     assert [rig.slot("u32", 8), rig.memory.read(SLOTS_OFFSET + 13, "u32"), rig.slot("u32", 20)] == [0x7FC00000] * 3
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_whole_numbers_beyond_24_bits_are_rounded_to_real(sign: int) -> None:
+    """A mask tells the engine how large a number may be: up to 2**24 it need not be rounded."""
+    for mask, number, wanted in ((0xFFFFFF, 0xFFFFFF, 0xFFFFFF), (0x1FFFFFF, 0x1FFFFFF, 0x2000000),
+                                 (0x1FFFFFF, 0x1FFFFFD, 0x1FFFFFC)):  # fmt: skip
+        masked: Node = ("and", "i32", load("i32", 0), const("i32", mask))
+        node: Node = masked if sign > 0 else ("neg", "i32", masked)
+        assert yields("f32", ("convert", "f32", "i32", node), {0: struct.pack("<i", number)}) == sign * wanted
+
+
 def test_an_operand_that_is_not_evaluated_does_not_trap() -> None:
     trap = ("eq", "b", "i16", const("i16", 1), ("div", "i16", const("i16", 1), load("i16", 0), 3))
     assert yields("b", ("and_then", "b", const("b", 0), trap)) is False
