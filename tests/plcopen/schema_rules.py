@@ -16,18 +16,22 @@ _PINS = "inputVariables! inOutVariables! outputVariables!"
 _LISTS = "localVars tempVars inputVars outputVars inOutVars externalVars globalVars"
 _MARKS = "| name constant retain nonretain persistent"
 _ROWS = f"""
-project | | fileHeader! contentHeader! types! instances!
+project | | fileHeader! contentHeader! types! instances! addData
 fileHeader | companyName productName productVersion creationDateTime |
 contentHeader | name | modificationDateTime | coordinateInfo!
 coordinateInfo | | fbd! ld! sfc!
 scaling | x y |
 types | | dataTypes! pous!
-dataType | name | baseType! initialValue
-pou | name pouType | interface actions transitions body
-interface | | returnType {_LISTS.replace(" ", "* ")}*
+dataType | name | baseType! initialValue addData
+pou | name pouType | interface actions transitions body addData
+interface | | returnType {_LISTS.replace(" ", "* ")}* addData
 variable | | type initialValue addData documentation connectionPointIn connectionPointOut
 instances | | configurations!
-configuration | name | resource* globalVars*
+configuration | name | resource* globalVars* accessVars configVars
+accessVars | | accessVariable*
+configVars | | configVariable*
+accessVariable | alias instancePathAndName | direction | type!
+configVariable | instancePathAndName | address | type! initialValue
 resource | name | task* globalVars* pouInstance*
 task | name priority | interval single | pouInstance*
 pouInstance | name typeName |
@@ -58,7 +62,16 @@ connectionPointIn | | relPosition connection*
 connection | refLocalId | formalParameter | position*
 position | x y |
 relPosition | x y |
-data | name handleUnknown | text
+addData | | data*
+data | name handleUnknown | text Inheritance AccessModifiers Attributes Method* Property* Interface InputAssignments
+Inheritance | | Extends* Implements*
+Attributes | | Attribute*
+Attribute | Name Value |
+Method | name | interface! body
+Property | name | interface! GetAccessor SetAccessor
+Interface | name | Methods Properties Inheritance addData
+InputAssignments | | InputAssignment*
+InputAssignment | | Name Value!
 """
 COORDINATES = {"x", "y", "height", "width"}
 
@@ -98,7 +111,7 @@ def _element(element: Element) -> list[str]:
     order = [child.rstrip("*!") for child in children]
     found = [child.name for child in element.children]
     wrong += [f"holds {child}" for child in found if child not in order]
-    if name != "interface":
+    if name not in ("interface", "Property"):
         places = [order.index(child) for child in found if child in order]
         wrong += ["its children are in another order"] if places != sorted(places) else []
     wrong += [f"has no <{child[:-1]}>" for child in children if child.endswith("!") and child[:-1] not in found]

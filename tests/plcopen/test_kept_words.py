@@ -223,7 +223,6 @@ def test_what_diagrams_do_not_have_is_named(rung: str, message: str) -> None:
 
 @each_of(("text", "message"), [
     ("PROGRAM M VAR_INPUT a : BOOL R_EDGE; END_VAR END_PROGRAM", "M: the format has no R_EDGE and F_EDGE"),
-    ("TYPE B EXTENDS A : STRUCT y : INT; END_STRUCT; END_TYPE", "B: EXTENDS is not exported"),
     ("FUNCTION F : INT VAR_IN_OUT a : ARRAY[*] OF INT; END_VAR END_FUNCTION", "F: the format has no arrays of any length"),
     ("PROGRAM M VAR a : ARRAY[0..3] OF INT := [4()]; END_VAR END_PROGRAM", "M: the format cannot repeat a default value"),
     ("PROGRAM M VAR r : REF_TO INT; END_VAR END_PROGRAM", "M: the format has no type for REF_TO INT"),
@@ -232,9 +231,9 @@ def test_what_diagrams_do_not_have_is_named(rung: str, message: str) -> None:
     ("PROGRAM M VAR PUBLIC a : INT; END_VAR END_PROGRAM", "M: the format has no PUBLIC"),
     ("PROGRAM M END_PROGRAM CONFIGURATION C RESOURCE R ON PLC TASK T(PRIORITY := 1); PROGRAM P WITH T : M(a := b); "
      "END_RESOURCE END_CONFIGURATION", "C: connections and qualifiers of programs are not exported"),
-    ("PROGRAM M END_PROGRAM CONFIGURATION C VAR_CONFIG R.P.a AT %IX0.0 : BOOL; END_VAR RESOURCE R ON PLC PROGRAM P : M; "
-     "END_RESOURCE END_CONFIGURATION", "C: VAR_ACCESS and VAR_CONFIG are not exported"),
-    ("ACTION M.a: END_ACTION", "what stands outside of its POU is not exported"),
+    ("PROGRAM M END_PROGRAM CONFIGURATION C VAR_CONFIG R.P.a AT D100 : INT; END_VAR RESOURCE R ON PLC PROGRAM P : M; "
+     "END_RESOURCE END_CONFIGURATION", "C: the address D100 in VAR_CONFIG is not exported"),
+    ("ACTION M.a: END_ACTION", "the POU M of this action is not exported"),
 ])  # fmt: skip
 def test_what_the_format_has_no_form_for_is_named(text: str, message: str) -> None:
     assert said(text) == [message]
@@ -243,4 +242,6 @@ def test_what_the_format_has_no_form_for_is_named(text: str, message: str) -> No
 def test_pragmas_and_addresses_that_are_lost_are_warnings() -> None:
     text = "{attribute 'displaymode' := 'hex'} " + HEAD + "LD 0.00\nOUT 100.01\nEND_LADDER\nEND_PROGRAM"
     made = export_xml([Source("Main.st", text)])
-    assert [(found.code, found.severity) for found in made.diagnostics] == [("X0190", "warning")] + [("X0390", "warning")] * 2
+    assert [(found.code, found.severity) for found in made.diagnostics] == [("X0390", "warning")] * 2
+    inside = export_xml([Source("Main.st", text.replace("VAR a", "VAR {info 'here'} a", 1))])
+    assert [(found.code, found.severity) for found in inside.diagnostics] == [("X0190", "warning")] + [("X0390", "warning")] * 2

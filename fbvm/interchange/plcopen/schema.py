@@ -13,6 +13,8 @@ _NAMES = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT 
           "ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
 ELEMENTARY = frozenset(_NAMES.split())
 """Types that are empty elements of their name (TC6 2.01 elementaryTypes)."""
+CODESYS = "http://www.3s-software.com/plcopenxml/"
+"""What the names of the `addData` of CODESYS begin with."""
 LOCATION = "urn:fbvm:location"
 """Name of fbvm's `addData` at a variable: an address that is no IEC location, such as D100."""
 MNEMONIC = "urn:fbvm:mnemonic"

@@ -163,6 +163,10 @@ class Configuration:
     name: str
     globals: tuple[VarList, ...]
     resources: tuple[Resource, ...]
+    accesses: tuple[str, ...] = ()
+    """The lines of its VAR_ACCESS."""
+    settings: tuple[str, ...] = ()
+    """The lines of its VAR_CONFIG."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from fbvm.syntax.parser import parse
 INTERFACE, METHOD, PROPERTY = "Interface", "Method", "Property"
 ACCESSORS = {"GetAccessor": "GET", "SetAccessor": "SET", "Get": "GET", "Set": "SET"}
 _KIND = re.compile(r"(?im)^[ \t]*(FUNCTION_BLOCK|FUNCTION|PROGRAM)\b")
-_WORDS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "ABSTRACT", "FINAL")
+_WORDS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "ABSTRACT", "FINAL", "OVERRIDE")
 
 
 def added(element: Element | None) -> list[Element]:

@@ -234,11 +234,29 @@ def _body(reading: Reading, element: Element) -> Body | None:
 
 def _configuration(reading: Reading, element: Element) -> Configuration:
     resources = [inner for inner in element.walk() if inner.name == "resource"]
-    for what in ("accessVars", "configVars"):
-        if (found := element.one(what)) and found.children:
-            reading.report("X0203", found, f"{what} of a configuration are not taken over")
-    return Configuration(identifier(reading, element) or "Config0", _unnamed(reading, element),
-                         tuple(_resource(reading, r) for r in resources))
+    accesses, settings = (tuple(line for holder in element.all(what) for each in holder.children for line in write(reading, each))
+                          for what, write in (("accessVars", _access), ("configVars", _setting)))
+    made = Configuration(identifier(reading, element) or "Config0", _unnamed(reading, element),
+                         tuple(_resource(reading, r) for r in resources), accesses, settings)
+    if (made.accesses or made.settings) and not any(resource.instances for resource in made.resources):
+        reading.report("X0203", element, "access and configuration variables are not taken over: no resource has a program")
+    return made
+
+
+def _access(reading: Reading, element: Element) -> Iterator[str]:
+    """The line of VAR_ACCESS for an access variable."""
+    path, kind = element.get("instancePathAndName").strip(), type_text(reading, element.one("type"), element)
+    if (name := identifier(reading, element, "alias")) and path and kind:
+        yield f"{name} : {path} : {kind} {'READ_WRITE' if element.get('direction') == 'readWrite' else 'READ_ONLY'};"
+
+
+def _setting(reading: Reading, element: Element) -> Iterator[str]:
+    """The line of VAR_CONFIG for a configuration variable."""
+    path, kind = element.get("instancePathAndName").strip(), type_text(reading, element.one("type"), element)
+    if path and kind:
+        initial = value_text(element.one("initialValue"), kind, reading.producer.family)
+        place = element.get("address").strip()
+        yield f"{path}{f' AT {place}' if place else ''} : {kind}{f' := {initial}' if initial else ''};"
 
 
 def _unnamed(reading: Reading, element: Element) -> tuple[VarList, ...]:

@@ -148,6 +148,9 @@ def _configuration(configuration: Configuration) -> list[str]:
     lines += [line for listed in configuration.globals for line in _section(listed)[:-1]]
     for resource in resources:
         lines += _resource(resource)
+    for word, settings in (("VAR_ACCESS", configuration.accesses), ("VAR_CONFIG", configuration.settings)):
+        if settings and any(resource.instances for resource in resources):
+            lines += [word, *settings, "END_VAR"]
     return [*lines, "END_CONFIGURATION"]
 
 

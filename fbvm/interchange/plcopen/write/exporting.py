@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.interchange.markup import Element, element, written
-from fbvm.interchange.plcopen.write.pous import pou
-from fbvm.interchange.plcopen.write.types import NotExportable, Types
+from fbvm.interchange.plcopen.write import objects
+from fbvm.interchange.plcopen.write.pous import add_action, pou
+from fbvm.interchange.plcopen.write.types import OTHERS, NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.pragmas import harmless
@@ -21,9 +22,6 @@ XHTML = "http://www.w3.org/1999/xhtml"
 BEGINNING = "1970-01-01T00:00:00"
 """The creation time in a document, if none is given."""
 _NAME = re.compile(r"[^\W\d]\w*")
-_ACTING = re.compile(r"(?i)'(pack_mode|qualified_only|strict|call_after_init|call_after_global_init_slot|global_init_slot|"
-                     r"to_string|instance-path)'")
-"""Attributes that change what a program does."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +47,10 @@ class _Parts:
     pous: list[Element] = field(default_factory=list)
     globals: list[Element] = field(default_factory=list)
     configurations: list[Element] = field(default_factory=list)
+    actions: list[tuple[Types, tree.Action | tree.Actions, str]] = field(default_factory=list)
+    """Actions that stand outside of their POU, with the name of the POU that is written in front of them."""
+    added: list[Element] = field(default_factory=list)
+    """The `data` of the project, such as INTERFACEs."""
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
 
@@ -72,6 +74,8 @@ def export_xml(sources: Sequence[Source | Path | str], name: str = "project", cr
     outputs = {pou.name.text.upper(): _outputs(pou) for pou in pous}
     for source, text in texts:
         _source(parts, source, text, outputs)
+    for types, declared, before in parts.actions:
+        _actions(parts, types, declared, before)
     unread = [d for d in parts.diagnostics if d.code[0] == "S" and d.severity == "error"]
     found = sorted(parts.diagnostics, key=Diagnostic.order)
     return Exported(None if unread else written(_project(parts, name, created)), found)
@@ -109,35 +113,86 @@ def _source(parts: _Parts, source: Source, text: tree.SourceText, outputs: Mappi
 
 
 def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: str) -> None:
-    if isinstance(declared, tree.Pou):
+    if isinstance(declared, tree.Pou) and declared.kind == "INTERFACE":
+        types.foreign.append((declared.name, f"INTERFACE {declared.name.text} is kept as CODESYS and TwinCAT have it; {OTHERS}"))
+        parts.added.append(objects.interface(types, declared))
+    elif isinstance(declared, tree.Pou):
         parts.pous.append(pou(types, declared))
     elif isinstance(declared, tree.TypeDecl):
         initial = element("initialValue", types.value(declared.initial)) if declared.initial is not None else None
-        parts.types.append(element("dataType", element("baseType", types.spec(declared.spec)), initial, name=declared.name.text))
+        bases = declared.spec.bases if isinstance(declared.spec, tree.StructSpec) else ()
+        if bases:
+            types.foreign.append((bases[0], f"the base of {declared.name.text} is kept as CODESYS and TwinCAT have it; {OTHERS}"))
+        head = objects.added(objects.inherited("datatypeinheritance", bases), objects.attributes(types, declared.start))
+        parts.types.append(element("dataType", element("baseType", types.spec(declared.spec)), initial, head,
+                                   name=declared.name.text))
     elif isinstance(declared, tree.GlobalVars):
-        parts.globals.append(types.section(declared.section, name))
+        made = types.section(declared.section, name)
+        if (head := objects.added(objects.attributes(types, declared.start))) is not None:
+            made.content.append(head)
+        parts.globals.append(made)
     elif isinstance(declared, tree.Configuration):
         parts.configurations.append(_configuration(types, declared))
     elif isinstance(declared, tree.Namespace | tree.Using):
         raise NotExportable(declared, "NAMESPACE and USING are not exported", "PLCopen XML has none: declare it outside")
+    elif isinstance(declared, tree.Action | tree.Actions):
+        parts.actions.append((types, declared, parts.pous[-1].get("name") if parts.pous else ""))
     else:
-        raise NotExportable(declared, "what stands outside of its POU is not exported", "put ACTIONs into their POU")
+        raise NotExportable(declared, "what stands outside of a CONFIGURATION is not exported", "put VAR_CONFIG into one")
+
+
+def _actions(parts: _Parts, types: Types, declared: tree.Action | tree.Actions, before: str) -> None:
+    """Add actions that stand outside of their POU to its element; `before` is the POU in front of them."""
+    owner = declared.owner.text if declared.owner is not None else before
+    found = next((each for each in parts.pous if each.get("name").upper() == owner.upper()), None)
+    try:
+        if found is None:
+            raise NotExportable(declared, f"the POU {owner} of this action is not exported", "give its file, too")
+        for action in declared.actions if isinstance(declared, tree.Actions) else (declared,):
+            add_action(types, found, action)
+    except NotExportable as unexportable:
+        node, message, hint = unexportable.args
+        parts.diagnostics.append(Diagnostic("X0301", types.source, node.start, node.end, message, hint))
 
 
 def _matters(pragma: str) -> bool:
     """Whether a pragma in front of a declaration changes the meaning of the program."""
-    return not harmless(pragma) or bool(_ACTING.search(pragma))
+    return not harmless(pragma) or bool(objects.ACTING.search(pragma))
 
 
 # --- configurations ---------------------------------------------------------------------------------------------------
 
 
 def _configuration(types: Types, declared: tree.Configuration) -> Element:
-    for unsaid in (*declared.refused, *declared.settings):
-        raise NotExportable(unsaid, "VAR_ACCESS and VAR_CONFIG are not exported", "")
+    for unsaid in declared.refused:
+        raise NotExportable(unsaid, "this part of a CONFIGURATION is not exported", "")
     resources = [_resource(types, resource) for resource in declared.resources]
     lists = [types.section(section) for section in declared.sections]
-    return element("configuration", *resources, *lists, name=declared.name.text)
+    return element("configuration", *resources, *lists, *_settings(types, declared.settings), name=declared.name.text)
+
+
+def _settings(types: Types, settings: Iterable[tree.AccessVars | tree.ConfigVars]) -> Iterator[Element]:
+    """The elements of all VAR_ACCESS, and of all VAR_CONFIG."""
+    shared = [_access(types, each) for listed in settings if isinstance(listed, tree.AccessVars) for each in listed.variables]
+    given = [_given(types, each) for listed in settings if isinstance(listed, tree.ConfigVars) for each in listed.variables]
+    if shared:
+        yield element("accessVars", *shared)
+    if given:
+        yield element("configVars", *given)
+
+
+def _access(types: Types, shared: tree.Access) -> Element:
+    return element("accessVariable", element("type", types.spec(shared.spec)), alias=shared.name.text,
+                   instancePathAndName=types.text(shared.path), direction="readWrite" if shared.writable else "readOnly")
+
+
+def _given(types: Types, given: tree.ConfigVar) -> Element:
+    address = {"address": given.location.text.strip()} if given.location is not None else {}
+    if address and not address["address"].startswith("%"):
+        raise NotExportable(given, f"the address {address['address']} in VAR_CONFIG is not exported", "give one such as %IX0.0")
+    initial = element("initialValue", types.value(given.initial)) if given.initial is not None else None
+    return element("configVariable", element("type", types.spec(given.spec)), initial, instancePathAndName=types.text(given.path),
+                   **address)
 
 
 def _resource(types: Types, resource: tree.Resource) -> Element:
@@ -165,7 +220,10 @@ def _project(parts: _Parts, name: str, created: str) -> Element:
     if parts.globals and not parts.configurations:
         parts.configurations.append(element("configuration", element("resource", name="Res0"), name="Config0"))
     if parts.globals:
-        parts.configurations[0].content += parts.globals
+        first = parts.configurations[0]
+        place = next((at for at, part in enumerate(first.content) if isinstance(part, Element)
+                      and part.name in ("accessVars", "configVars")), len(first.content))
+        first.content[place:place] = parts.globals
     scaling: Callable[[str], Element] = lambda kind: element(kind, element("scaling", x=1, y=1))  # noqa: E731
     header = element("coordinateInfo", scaling("fbd"), scaling("ld"), scaling("sfc"))
     return element(
@@ -173,5 +231,5 @@ def _project(parts: _Parts, name: str, created: str) -> Element:
         element("fileHeader", companyName="", productName="fbvm", productVersion="1", creationDateTime=created),
         element("contentHeader", header, name=name, modificationDateTime=created),
         element("types", element("dataTypes", *parts.types), element("pous", *parts.pous)),
-        element("instances", element("configurations", *parts.configurations)),
+        element("instances", element("configurations", *parts.configurations)), objects.added(*parts.added),
         **{"xmlns": NAMESPACE, "xmlns:xhtml": XHTML})

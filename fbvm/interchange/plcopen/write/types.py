@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from fbvm.base.diagnostics import Source
 from fbvm.base.digits import whole_number
 from fbvm.interchange.markup import Element, element
-from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
+from fbvm.interchange.plcopen.schema import CODESYS, ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
 from fbvm.interchange.plcopen.write.layout import own_data
 from fbvm.syntax import tree
 
@@ -33,6 +33,9 @@ _SIGNS = re.compile(rf"(?s)({_TEXTS})|[()]")
 _BLANKS = re.compile(rf"(?s)({_TEXTS})|\s+")
 _NUMBERED = re.compile(r"([TtCc])(\d+)")
 _REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
+
+
+OTHERS = "other tools do not read it"
 
 
 class NotExportable(Exception):
@@ -99,13 +102,24 @@ class Types:
             return element("enum", element("values", *values), element("baseType", self.spec(spec.base)) if spec.base else None)
         if isinstance(spec, tree.StructSpec) and not spec.overlap:
             return self._struct(spec)
-        if isinstance(spec, tree.RefSpec) and spec.kind == "POINTER TO":
+        if isinstance(spec, tree.RefSpec):
+            return self._reference(spec)
+        if isinstance(spec, tree.ConstructedSpec) and spec.values is None:
+            return self.spec(spec.base)
+        raise self._unknown(spec)
+
+    def _unknown(self, spec: tree.TypeSpec) -> NotExportable:
+        return NotExportable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
+
+    def _reference(self, spec: tree.RefSpec) -> Element:
+        if spec.kind == "POINTER TO":
             return element("pointer", element("baseType", self.spec(spec.target)))
-        raise NotExportable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
+        if spec.kind == "REFERENCE TO" and isinstance(spec.target, tree.NamedType):
+            self.foreign.append((spec, "REFERENCE TO is written as CODESYS has it, as the name of a type"))
+            return element("derived", name=f"REFERENCE TO {spec.target.text}")
+        raise self._unknown(spec)
 
     def _struct(self, spec: tree.StructSpec) -> Element:
-        for base in spec.bases:
-            raise NotExportable(base, "EXTENDS is not exported", "write the members of the base into the structure")
         return element("struct", *(made for member in spec.members for made in self.variables(member)))
 
     def _array(self, spec: tree.ArraySpec) -> Element:
@@ -147,6 +161,8 @@ class Types:
                 self._location(made, declared.location)
             if declared.initial is not None:
                 made.content.insert(1, element("initialValue", self.value(declared.initial)))
+            if isinstance(declared.spec, tree.ConstructedSpec):
+                made.content.append(self._assignments(declared.spec))
             if remark := _REMARK.match(self.source.text, declared.end):
                 made.content.append(documentation(remark[1].strip()))
             yield made
@@ -163,6 +179,14 @@ class Types:
         self.taken.add(name.upper())
         self.made[name] = element("dataType", element("baseType", self.spec(declared.spec)), name=name)
         return element("derived", name=name)
+
+    def _assignments(self, spec: tree.ConstructedSpec) -> Element:
+        """What a variable gives FB_init, as CODESYS has it."""
+        self.foreign.append((spec, "what the variable gives FB_init is kept as CODESYS has it; other tools do not read it"))
+        rows = [element("InputAssignment", element("Name", each.name.text) if each.name is not None else None,
+                        element("Value", self.text(each.value))) for each in spec.arguments if each.value is not None]
+        return element("addData", element("data", element("InputAssignments", *rows), name=f"{CODESYS}inputassignments",
+                                          handleUnknown="implementation"))
 
     def _location(self, made: Element, location: tree.Location) -> None:
         text = location.text.strip()
