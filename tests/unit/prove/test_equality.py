@@ -92,3 +92,34 @@ PROGRAM P END_PROGRAM"""
         with pytest.raises(Unlike) as refused:
             pair(sources, names)
         assert str(refused.value) == said
+
+
+@pytest.mark.slow
+@each_of("left, right, said", [
+    ("Same", "Given", "Same is a FUNCTION_BLOCK, Given a FUNCTION"),
+    ("Silent", "Quiet", "Silent and Quiet have 0 outputs to compare; 1 to 400 are possible"),
+    ("Many", "Many", "Many and Many have 401 outputs to compare; 1 to 400 are possible"),
+])
+def test_blocks_without_outputs_to_compare_are_refused(left: str, right: str, said: str) -> None:
+    sources = [Source("blocks.st", """
+        FUNCTION_BLOCK Same VAR_INPUT i : INT; END_VAR END_FUNCTION_BLOCK
+        FUNCTION Given : INT VAR_INPUT i : INT; END_VAR Given := i; END_FUNCTION
+        FUNCTION_BLOCK Silent VAR_INPUT i : INT; END_VAR END_FUNCTION_BLOCK
+        FUNCTION_BLOCK Quiet VAR_INPUT i : INT; END_VAR END_FUNCTION_BLOCK
+        FUNCTION_BLOCK Many VAR_INPUT i : INT; END_VAR VAR_OUTPUT a : ARRAY [0..400] OF INT; END_VAR END_FUNCTION_BLOCK""")]
+    with pytest.raises(Unlike) as refused:
+        made = compile_sources([*sources, pair(sources, (left, right))], PROGRAM, runnable=True, lint=False)
+        assert made.image is not None
+        equality(made.image, (left, right))
+    assert str(refused.value) == said
+
+
+def test_the_members_of_structures_are_compared_one_by_one_and_reals_also_as_no_number() -> None:
+    sources = [Source("blocks.st", """TYPE Pair : STRUCT n : INT; r : LREAL; END_STRUCT END_TYPE
+        FUNCTION_BLOCK One VAR_INPUT i : INT; END_VAR VAR_OUTPUT p : Pair; END_VAR END_FUNCTION_BLOCK""")]
+    made = compile_sources([*sources, pair(sources, ("One", "One"))], PROGRAM, runnable=True, lint=False)
+    assert made.image is not None
+    asked = equality(made.image, ("One", "One"), ("i > 0",))
+    assert (asked.kind, asked.assumptions, asked.prefix, asked.title) == ("always", ("i > 0",), "Equal.", "One and One are equal")
+    assert asked.text == ("Equal.Left.p.n = Equal.Right.p.n AND (Equal.Left.p.r = Equal.Right.p.r OR "
+                          "Equal.Left.p.r <> Equal.Left.p.r AND Equal.Right.p.r <> Equal.Right.p.r)")
