@@ -92,8 +92,8 @@ class Rig:
         size = self.plc.read("Main.Client.Reply_Size")
         return bytes(self.plc.read("Main.Client.Reply")[:size]).hex(" ").upper()  # type: ignore[index, misc]
 
-    def counters(self) -> object:
-        return self.plc.read("W491..W495")
+    def counters(self) -> list[int]:
+        return [*self.plc.read("W491..W495")]  # type: ignore[misc, list-item]
 
 
 def answering(reply: Callable[[bytes], list[Action]]) -> ModbusPeer:
@@ -363,7 +363,9 @@ def test_a_server_that_misbehaves(misdeed: str, timing: str) -> None:
     rig = Rig(ModbusPeer(None, MISDEEDS[misdeed]), timing=timing).connect()
     rig.peer.server.holding_registers[0] = 0x1234
     of_real = ENDS_OF_REAL if timing == "real" else {}
-    assert rig.ask(READ) == of_real.get(misdeed, ENDS.get(misdeed, SILENT))
+    ended = rig.ask(READ)
+    assert ended == of_real.get(misdeed, ENDS.get(misdeed, SILENT))
+    assert rig.counters()[3:] == [ended == "error 004B", 0], "the receive that the reset has ended"
     recovers(rig)
 
 

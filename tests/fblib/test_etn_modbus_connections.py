@@ -322,6 +322,20 @@ def test_half_a_frame_does_not_hold_up_the_others() -> None:
 
 
 @pytest.mark.slow
+def test_who_never_ends_a_frame_does_not_hold_up_the_others() -> None:
+    """A byte comes in each scan, so there is always something to be received."""
+    rig = Rig("Sockets := 2")
+    slow, quick = rig.client(), rig.client()
+    slow.say(bytes.fromhex("0001 0000 00FE 01 08 0000"))
+    quick.say(ECHO_FRAME)
+    for _ in range(60):
+        slow.say(b"\x55")
+        rig.scan()
+        quick.fetch()
+    assert quick.data == ECHO_FRAME
+
+
+@pytest.mark.slow
 def test_everybody_gets_a_turn() -> None:
     """One that asks without a pause and one that asks now and then."""
     rig = Rig("Sockets := 3")
