@@ -52,3 +52,14 @@ def test_a_chart_shows_them() -> None:
 def test_response_codes_have_words_also_those_that_no_emulated_unit_ends_with(code: int, said: str) -> None:
     """W421 6-9 lists them; a recorded real unit may have them."""
     assert said in Etn21().meanings["D30027"][code]
+
+
+@each_of("number", [0, 15])
+def test_what_is_described_lies_in_the_words_of_the_unit(number: int) -> None:
+    """25 CIO words from n on and 100 D words from m on, W420 4-1, 4-2: of eight areas and sockets, and none behind them."""
+    n, m, unit = 1500 + 25 * number, 30000 + 100 * number, Etn21(number)
+    found = [address for key in unit.descriptions if (address := parse_address(key)) is not None]
+    assert {address.number for address in found if address.area == "CIO"} == {n, *range(n + 1, n + 24)}
+    own = {address.number for address in found if address.area == "D"}
+    assert own <= set(range(m + 1, m + 100)) and {m + 27 + 10 * area for area in range(8)} <= own
+    assert {int(key[1:]) for key in unit.meanings} == {*range(m + 9, m + 17), *(m + 27 + 10 * area for area in range(8))}
