@@ -70,7 +70,7 @@ _LIBRARIES = (
      r"F_AnyToUnionValue|U_ExpectedOrActual|F_GetCpuCounterAs64bit", "TcUnit"),
     (r"Sys(?:Time|File|Mem|Sock|Com|Task|Target|Process|Cpu|Dir|Event|Lib)\w+|RTS_IEC_\w+|CmpErrors2?|TimerSwitch",
      "CODESYS's system libraries"),
-    (r"GEN|GEN_MODE|PD|PID|PID_FIXCYCLE|DERIVATIVE|BASE64|\w+_TO_GRAY|GRAY_TO_\w+|\w+HEXinASCII\w*|WORD_AS_STRING",
+    (r"GEN|GEN_MODE|PD|PID|PID_FIXCYCLE|DERIVATIVE|BASE64",
      "CODESYS's Util"),
 )
 """Patterns of names, and the library that they come from."""
