@@ -105,6 +105,8 @@ class Dialect:
     jumps_in_text: bool = False
     exceptions: bool = False
     conditional_returns: bool = False
+    persistent_parameters: bool = False
+    constant_inputs_are_written: bool = False
     constant_in_outs_take_texts: bool = False
     functions_have_inputs: bool = False
     plain_names: bool = False
@@ -241,6 +243,10 @@ QUESTIONS = {
     "own_time": ("FUNCTION TIME : TIME", "an error", "taken, with a warning (S0193)"),
     "short_circuit_words": ("a AND_THEN b, a OR_ELSE b", "taken, with a warning (S0195)", "taken"),
     "jumps_in_text": ("JMP in Structured Text", "taken, with a warning (S0195)", "taken"),
+    "persistent_parameters": ("VAR_OUTPUT RETAIN PERSISTENT, VAR_INPUT CONSTANT PERSISTENT of a FUNCTION_BLOCK",
+                              "an error (S0206)", "taken"),
+    "constant_inputs_are_written": ("VAR_INPUT CONSTANT of a block, written in its body or through an instance",
+                                    "an error (S0501)", "written, as any other input"),
     "conditional_returns": ("RETURN(done); with parentheses around the whole value", "the result is done, and the POU is left",
                             "the POU is left if done is TRUE, with the result that it has"),
     "constant_in_outs_take_texts": ("F('abc'), where F declares VAR_IN_OUT CONSTANT s : STRING", "an error (S0407)",
@@ -291,7 +297,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
                    own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
-                   conditional_returns=True, constant_in_outs_take_texts=True,
+                   conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
                    short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (
@@ -299,7 +305,7 @@ _ROWS = (
     _CODESYS,
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
             libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit", "twincat/write_protected",
-                       "twincat/motion"), unsigned_ltime=True,
+                       "twincat/motion"), unsigned_ltime=True, constant_inputs_are_written=True,
             large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
             libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True),

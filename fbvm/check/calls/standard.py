@@ -5,6 +5,7 @@ from __future__ import annotations
 from fbvm.base.arithmetic import Undefined
 from fbvm.base.dialects import takers
 from fbvm.base.types import (
+    BOOL,
     ELEMENTARY,
     GENERIC,
     LREAL,
@@ -173,6 +174,8 @@ def _signature(scope: Scope, call: tree.Call, row: Signature, fixed: Elementary 
                        functions.OTHER_NAMES.get(row.key, ())).in_order()
     if values is None:
         return None
+    if row.key == "TRUNC" and scope.dialect.narrowing and (whole := _whole(scope, call, values[0])) is not None:
+        return whole
     wanted = _parameter_types(row, len(values))
     variable: Type | None = fixed
     if "T" in wanted and fixed is None:
@@ -191,6 +194,17 @@ def _signature(scope: Scope, call: tree.Call, row: Signature, fixed: Elementary 
         assert variable is not None
         return variable
     return ELEMENTARY[row.result] if row.result else ""
+
+
+def _whole(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
+    """The type of TRUNC of a whole number, which is that number: CODESYS 2.3 takes it as a REAL without a message."""
+    kind = scope.infer(value)
+    if kind is None or not is_any(kind, "ANY_INT", "ANY_BIT") or kind == BOOL:
+        return None
+    scope.facts.rewritten[call] = value
+    if value in scope.facts.constants:
+        scope.facts.constants[call] = scope.facts.constants[value]
+    return kind
 
 
 def _parameter_types(row: Signature, count: int) -> list[str]:

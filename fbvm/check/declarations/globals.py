@@ -19,7 +19,7 @@ def enroll(context: Context) -> None:
     project = context.project
     new, project.sections = project.sections, []
     for section, source in new:
-        check_qualifiers(context.report, section, source, "program")
+        check_qualifiers(context.report, section, source, "program", context.project.dialect)
     for section, source in new:
         for declared in section.variables:
             declaration = GlobalDeclaration(declared, section, source)

@@ -163,7 +163,7 @@ class _Interface:
 
     def _kept(self, method: Pou, section: tree.VarSection) -> None:
         """The variables of VAR_INST: they lie in the instance, and only their method sees them."""
-        check_qualifiers(self.context.report, section, self.pou.source, "FUNCTION_BLOCK")
+        check_qualifiers(self.context.report, section, self.pou.source, "FUNCTION_BLOCK", self.scope.dialect)
         for declared in section.variables:
             resolved = self._resolved(declared, section)
             for name in declared.names:
@@ -186,7 +186,7 @@ class _Interface:
         if section.kind == "VAR_INST" and self.pou.block is not None:
             return False  # the instance has them
         if section.kind in _SECTIONS:
-            check_qualifiers(self.context.report, section, self.pou.source, self.pou.kind)
+            check_qualifiers(self.context.report, section, self.pou.source, self.pou.kind, self.scope.dialect)
             return True
         if section.kind in _NOT_EXECUTED:
             self._error("S0901", section, f"{section.kind} is understood but not executed by this version")

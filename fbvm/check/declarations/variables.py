@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.diagnostics import Source
-from fbvm.base.dialects import takers
+from fbvm.base.dialects import Dialect, takers
 from fbvm.base.types import ArrayType, Elementary, EnumType, StringType, StructType, base, fold, on_bits
 from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.locations import location_of
@@ -30,8 +30,10 @@ _ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
 """Access words, which blocks and classes have in front of variables; these are not seen from outside in any case."""
 
 
-def check_qualifiers(report: Report, section: tree.VarSection, source: Source, pou_kind: str) -> None:
+def check_qualifiers(report: Report, section: tree.VarSection, source: Source, pou_kind: str, dialect: Dialect) -> None:
     """Report qualifiers that a section of a POU of that kind cannot have."""
+    if dialect.persistent_parameters and pou_kind == "FUNCTION_BLOCK" and section.kind in ("VAR_INPUT", "VAR_OUTPUT"):
+        return
     words = [fold(q.text) for q in section.qualifiers]
     for word, node in zip(words, section.qualifiers, strict=True):
         if word in _ACCESS and section.kind == "VAR" and pou_kind in ("FUNCTION_BLOCK", "CLASS"):
@@ -77,6 +79,8 @@ def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, sec
                     role=section.role, declared=declared)
     if made.constant and is_block(kind) and section.kind == "VAR_IN_OUT" and context.project.dialect.instances_are_values:
         made.constant = False  # CODESYS lets such an instance be called
+    elif made.constant and section.kind == "VAR_INPUT" and context.project.dialect.constant_inputs_are_written:
+        made.constant = False
     elif made.constant and is_block(kind):
         report.add("S0206", source, name, "an instance cannot be CONSTANT")
     elif made.constant and section.kind not in ("VAR_INPUT", "VAR_IN_OUT"):  # these the caller gives

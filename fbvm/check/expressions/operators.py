@@ -392,6 +392,7 @@ def _power(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
     """`a ** b`: a real base keeps its type, an integer one gives LREAL."""
     if is_untyped(left) and is_untyped(right):
         return _folded(scope, expr, UNTYPED_REAL, UNTYPED_REAL)
+    left, right = as_number(left, scope.dialect), as_number(right, scope.dialect)
     if not all(is_untyped(k) or is_any(k, "ANY_NUM") for k in (left, right)):
         report_undefined(scope, expr, left, right, want)
         return None
