@@ -174,7 +174,7 @@ def _signature(scope: Scope, call: tree.Call, row: Signature, fixed: Elementary 
                        functions.OTHER_NAMES.get(row.key, ())).in_order()
     if values is None:
         return None
-    if row.key == "TRUNC" and scope.dialect.narrowing and (whole := _whole(scope, call, values[0])) is not None:
+    if (whole := _whole(scope, call, row, values)) is not None:
         return whole
     wanted = _parameter_types(row, len(values))
     variable: Type | None = fixed
@@ -196,8 +196,11 @@ def _signature(scope: Scope, call: tree.Call, row: Signature, fixed: Elementary 
     return ELEMENTARY[row.result] if row.result else ""
 
 
-def _whole(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
+def _whole(scope: Scope, call: tree.Call, row: Signature, values: list[tree.Expr]) -> Type | None:
     """The type of TRUNC of a whole number, which is that number: CODESYS 2.3 takes it as a REAL without a message."""
+    if row.key != "TRUNC" or not scope.dialect.narrowing:
+        return None
+    value = values[0]
     kind = scope.infer(value)
     if kind is None or not is_any(kind, "ANY_INT", "ANY_BIT") or kind == BOOL:
         return None
