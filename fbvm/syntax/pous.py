@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.st.declarations import Settings
-from fbvm.syntax.st.jumps import Jumps, Tangled
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.statements import Items, Members
 from fbvm.syntax.tree import (
@@ -138,7 +137,8 @@ class SourceBuilder(SfcElements):
         self._add_ladders(word, actions, declared)
         declared += self._sections_of_lists()
         self.numbered = dict(self.numbered_everywhere)
-        body = self._without_jumps(body, declared)
+        body = self.without_jumps(body)
+        declared += self._sections_of_jumps()
         if self.charted or any(isinstance(each, Step | Transition) for each in elements):
             body, actions = self._charts(word, body, elements, actions, declared)
         self.generic_types = {}
@@ -200,18 +200,18 @@ class SourceBuilder(SfcElements):
     def _apart(self, start: int) -> Iterator[None]:
         """Build what was read from `start` on as a POU of its own, inside the POU that is being read."""
         ladders, lists, targets, labels = self.ladders, self.lists, self.targets, self.labels
-        blocks, numbered, charted = dict(self.blocks), self.numbered, self.charted
+        blocks, numbered, charted, jump_sections = dict(self.blocks), self.numbered, self.charted, self.jump_sections
         self.ladders = [each for each in ladders if each.start >= start]
         self.lists = [each for each in lists if each.start >= start]
         self.targets = {each: name for each, name in targets.items() if each.start >= start}
         self.labels = {each: name for each, name in labels.items() if each.start >= start}
-        self.charted = {}
+        self.charted, self.jump_sections = {}, []
         yield
         self.ladders = [each for each in ladders if each.start < start]
         self.lists = [each for each in lists if each.start < start]
         self.targets = {each: name for each, name in targets.items() if each.start < start}
         self.labels = {each: name for each, name in labels.items() if each.start < start}
-        self.blocks, self.numbered, self.charted = blocks, numbered, charted
+        self.blocks, self.numbered, self.charted, self.jump_sections = blocks, numbered, charted, jump_sections
 
     def _add_ladders(self, word: Token, actions: list[Action], declared: list[VarSection]) -> None:
         """Add to `actions` the subroutines of the POU's LADDERs, and to `declared` what their rungs need."""
@@ -225,21 +225,10 @@ class SourceBuilder(SfcElements):
         declared += hidden_sections(self.ladders, declared, self.report)
         self.ladders.clear()
 
-    def _without_jumps(self, body: Block, declared: list[VarSection]) -> Block:
-        """The body of a POU with conditions and loops in place of its jumps, whose variables are added to `declared`; the same
-        body if conditions and loops cannot do the same."""
-        jumps = Jumps(self.targets, self.labels)
-        for jump in jumps.astray():
-            self.report("S0201", jump.start, jump.end, f"there is no label {self.targets[jump]} here",
-                        "write `name:` in front of the statement to go on with")
-        try:
-            made = jumps.body(body) if self.targets or self.labels else body
-        except Tangled:
-            made = body
-        else:
-            declared += [jumps.section(body)] if jumps.flags else []
-        self.targets.clear()
-        self.labels.clear()
+    def _sections_of_jumps(self) -> list[VarSection]:
+        """The hidden sections with the variables of the jumps in the POU's body, its actions and its transitions."""
+        made = [*self.jump_sections]
+        self.jump_sections.clear()
         return made
 
     def _charts(self, word: Token, body: Block, elements: Iterable[Element], actions: list[Action],
@@ -280,7 +269,7 @@ class SourceBuilder(SfcElements):
 
     def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None, items: Items,
                end: Token) -> Action:
-        body = self.block(items)
+        body = self.without_jumps(self.block(items), word.start)
         return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
 
     def action_chart(self, word: Token, token: Token, colon: Token, items: Items, parts: list[Part], end: Token) -> Action:

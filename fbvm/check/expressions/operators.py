@@ -106,7 +106,8 @@ def _unary_hint(op: str, kind: Type, want: Type | None) -> str:
 def binary(scope: Scope, expr: tree.Binary, want: Type | None) -> Type | None:
     hint = want if expr.op not in COMPARISONS else None
     left = scope.infer(expr.left, hint)
-    right = scope.infer(expr.right, hint)
+    is_bits = hint is None and expr.op in ("AND", "OR", "XOR") and left is not None and is_any(left, "ANY_BIT")
+    right = scope.infer(expr.right, left if is_bits else hint)  # w XOR NOT 16#F0
     if left is None or right is None:
         return None
     left, right = base(left), base(right)

@@ -56,5 +56,10 @@ def _replaces(instruction: Instruction) -> bool:
 
 
 def is_formal(instruction: Instruction) -> bool:
-    """Whether an instruction calls a function with all its arguments in brackets: the current result is none of these."""
-    return instruction.name not in OPERATORS and bool(instruction.operands) and instruction.operands[0].text == "("
+    """Whether an instruction calls a function, or a method, with all its arguments in brackets: the current result is none of
+    these."""
+    called = 0
+    while [token.text for token in instruction.operands[called:called + 1]] == ["."]:
+        called += 2
+    behind = instruction.operands[called:]
+    return instruction.name not in OPERATORS and bool(behind) and behind[0].text == "("

@@ -54,12 +54,16 @@ class ListLowering:
         self.out: list[tree.Statement] = []
         self.result: Expr | None = None
         """The current result."""
+        self.is_unused = False
+        """Whether no statement has used the current result yet."""
         self.operations = 0
         """Operations of `result`."""
         self.first = 0
         """Where the instructions begin that the next statement stands for."""
         self.open: list[_Open] = []
         self.temporaries: list[tree.VarDecl] = []
+        self.others = sum(len(each.temporaries) for each in builder.lists)
+        """How many temporaries the other lists of the POU have."""
         self.at_labels: dict[str, str] = {}
         """Folded label -> the temporary with the current result there."""
         self.needed_at: dict[str, bool] = {}
@@ -90,7 +94,9 @@ class ListLowering:
                 self._report(error.token or each, error.message, error.hint)
         for one in self.open:
             self._report(one.instruction, f"the bracket behind {one.instruction.name} is not closed", "a line with `)` closes it")
-        return InstructionList(start, end, tuple(self.out), tuple(self.temporaries), self.result)
+        written = len(self.out)
+        self._use_up()
+        return InstructionList(start, end, tuple(self.out), tuple(self.temporaries), self.result, len(self.out) > written)
 
     def _report(self, place: Token | Instruction, message: str, hint: str) -> None:
         self.is_wrong = True
@@ -107,9 +113,9 @@ class ListLowering:
             self._rules[operator.kind](each, operator, needed)
             return
         self.open.append(_Open(each, self._current(each)))
-        self.result, self.operations = None, 0
+        self.result, self.operations, self.is_unused = None, 0, False
         if each.operands:
-            self.result = self._operand(each)
+            self.result, self.is_unused = self._operand(each), True
 
     # --- the current result ---
 
@@ -127,18 +133,35 @@ class ListLowering:
 
         What is made of constants alone has the type of the `target` that it is stored in."""
         result = self._current(each)
+        self.is_unused = False
         if needed and not isinstance(result, tree.Literal) and not self._is_temporary(result):
-            result = self.result = self._temporary(each, result, f"$CR{len(self.temporaries) + 1}",
-                                                    target if target is not None and _is_untyped(result) else result)
+            result = self.result = self._temporary(each, result, target if target is not None and _is_untyped(result) else result)
             self.operations = 0
         return result
 
-    def _temporary(self, each: Instruction, value: Expr, name: str, typed: Expr) -> Expr:
+    def _use_up(self) -> None:
+        """Execute what the current result is made of, before it is lost: it may be a call, or name what there is not."""
+        result, self.is_unused = self.result if self.is_unused else None, False
+        if result is None or self.is_wrong or isinstance(result, tree.Literal) or self._is_temporary(result):
+            return
+        start = min(self.first, result.start)
+        if isinstance(result, tree.Call):
+            self._add(tree.CallStatement(start, result.end, result))
+            return
+        target = self._declared(start, result.end, result)
+        self._add(tree.Assign(start, result.end, (target,), ":=", result))
+
+    def _temporary(self, each: Instruction, value: Expr, typed: Expr) -> Expr:
         """Assign a value to a new temporary of the type of `typed`; returns the temporary."""
-        spec = TypeOf(each.start, each.end, typed)
-        self.temporaries.append(tree.VarDecl(each.start, each.end, (Name(each.start, each.end, name),), None, spec, None))
-        self._assign(each, NameRef(each.start, each.end, name), ":=", value)
-        return NameRef(each.start, each.end, name)
+        made = self._declared(each.start, each.end, typed)
+        self._assign(each, made, ":=", value)
+        return NameRef(each.start, each.end, made.text)
+
+    def _declared(self, start: int, end: int, typed: Expr) -> NameRef:
+        """A new temporary of the type of `typed`, declared between two positions."""
+        name = f"$CR{self.others + len(self.temporaries) + 1}"
+        self.temporaries.append(tree.VarDecl(start, end, (Name(start, end, name),), None, TypeOf(start, end, typed), None))
+        return NameRef(start, end, name)
 
     def _is_temporary(self, expr: Expr) -> bool:
         return isinstance(expr, NameRef) and expr.text.startswith("$")
@@ -158,11 +181,12 @@ class ListLowering:
     # --- loads, stores, operations ---
 
     def _load(self, each: Instruction, operator: Operator, needed: bool) -> None:
+        self._use_up()
         if not self.open:
             self.first = each.word.start if each.word else each.start
         value = self._operand(each)
         self.result = self._inverse(each, value) if operator.negated else value
-        self.operations = 1
+        self.operations, self.is_unused = 1, True
         self.is_wrong = False
 
     def _store(self, each: Instruction, operator: Operator, needed: bool) -> None:
@@ -192,7 +216,7 @@ class ListLowering:
         self._combine(each, tree.Binary(left.start, right.end, operator.sign, left, right, each.word.start))
 
     def _combine(self, each: Instruction, value: Expr) -> None:
-        self.result = value
+        self.result, self.is_unused = value, True
         self.operations += 1
         if self.operations > LONGEST and not self.open:
             self._kept(each, True)
@@ -246,9 +270,10 @@ class ListLowering:
         if each.word.type in ("RPAR", "NUMBER") or not each.word.text[0].isidentifier():
             raise InstructionError(f"an operator is expected, but `{each.word.text}` found", "", each.word)
         if is_formal(each):
+            self._use_up()
             self._begin(each)
             self.result = self._parsed(each, [each.word, *each.operands])[0]
-            self.operations = 1
+            self.operations, self.is_unused = 1, True
             return
         arguments = (self._current(each), *self._operands(each, each.operands))
         name = NameRef(each.word.start, each.word.end, each.word.text)
@@ -299,10 +324,14 @@ class ListLowering:
         if self.needed_at.get(fold(label.text)):
             self._kept(each, True)
             carried = self._carried(each, label)
+        elif not operator.condition:
+            self._use_up()
         self._when(each, operator, needed, *carried, jump)
         self.is_reached = self.is_reached and bool(operator.condition)
 
     def _return(self, each: Instruction, operator: Operator, needed: bool) -> None:
+        if not operator.condition:
+            self._use_up()
         self._when(each, operator, needed, tree.Return(each.start, each.end, None))
         self.is_reached = self.is_reached and bool(operator.condition)
 
@@ -313,6 +342,7 @@ class ListLowering:
         if needed and self.is_reached and self.result is not None:
             for statement in self._carried(each, label):
                 self._add(statement)
+        self._use_up()
         mark = tree.RefusedStatement(label.start, label.end, f"label `{label.text}`")
         self.builder.labels[mark] = label.text
         self._add(mark)
@@ -323,12 +353,10 @@ class ListLowering:
 
     def _carried(self, each: Instruction, label: Token) -> list[tree.Statement]:
         """The assignment that gives the current result to the instructions behind a label."""
-        value = self._current(each)
+        value, self.is_unused = self._current(each), False
         name = self.at_labels.get(fold(label.text))
         if name is None:
-            name = self.at_labels[fold(label.text)] = f"$CR {fold(label.text)}"
-            spec = TypeOf(each.start, each.end, value)
-            self.temporaries.append(tree.VarDecl(each.start, each.end, (Name(each.start, each.end, name),), None, spec, None))
+            name = self.at_labels[fold(label.text)] = self._declared(each.start, each.end, value).text
         return [tree.Assign(each.start, each.end, (NameRef(each.start, each.end, name),), ":=", value)]
 
 

@@ -64,10 +64,17 @@ def _add_gap(lines: list[str], gap: str, indent: str) -> None:
         else:
             if ends > 1 and lines:
                 lines.append("")
-            lines.append(indent + found[0])
+            lines += [indent + row for row in _from_its_column(gap, found.start(), found[0])]
             ends = 0
     if ends > 1 and lines:
         lines.append("")
+
+
+def _from_its_column(gap: str, start: int, comment: str) -> list[str]:
+    """The lines of a comment without the indentation that all have in front of the first one."""
+    first, *others = comment.split("\n")
+    column = start - (gap.rfind("\n", 0, start) + 1)
+    return [first, *(line[min(column, len(line) - len(line.lstrip())):] for line in others)]
 
 
 def _remarks(text: str, row: list[Token]) -> list[str]:

@@ -8,6 +8,7 @@ from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.statements import Items
 from fbvm.syntax.tree import Action, Assign, Block, Call, CallStatement, Expr, Literal, Name, NameRef
 from fbvm.syntax.tree.il import InstructionList
+from fbvm.syntax.tree.node import changed
 from fbvm.syntax.tree.sfc import QUALIFIERS, Association, Step, Transition
 
 Part = Step | Transition
@@ -48,7 +49,7 @@ class SfcElements(Declarations):
 
     def transition_body(self, word: Token, token: Token | None, priority: int | None, from_: Token, sources: list[Name],
                         to: Token, targets: list[Name], colon: Token, items: Items, end: Token) -> Transition:
-        body = self.block(items)
+        body = self.without_jumps(self.block(items), word.start)
         only = body[0] if len(body) == 1 else None
         if isinstance(only, InstructionList):
             return self._condition_of_list(word, token, priority, sources, targets, only, end)
@@ -66,6 +67,8 @@ class SfcElements(Declarations):
                            made: InstructionList, end: Token) -> Transition:
         """A transition whose condition is the current result at the end of an instruction list (table 54)."""
         truth = made.result
+        if made.ends_with_result:
+            made = changed(made, body=made.body[:-1], ends_with_result=False)
         if truth is None:
             self.report("S0111", made.start, made.end, "this instruction list has no current result at its end",
                         "the condition is the last current result")

@@ -8,7 +8,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.tree import Expr, Form, Name, Statement
+from fbvm.syntax.tree import Expr, Form, Name, Statement, VarSection
 from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 
@@ -69,6 +69,8 @@ class Builder:
         """JMPs of the POU that is being read -> the label that each names."""
         self.labels: dict[Statement, str] = {}
         """Labels of the POU that is being read -> their names."""
+        self.jump_sections: list[VarSection] = []
+        """Hidden sections with the variables of jumps in actions and transitions of the POU that is being read."""
         self.depths: dict[Expr, int] = {}
         """Depth of expressions under construction, if it is not 1."""
 

@@ -32,11 +32,14 @@ class Row:
 
 
 class Jumps:
-    """The jumps of one body; `targets` and `labels` say which statements are jumps and labels, and of what name."""
+    """The jumps of one body; `targets` and `labels` say which statements are jumps and labels, and of what name.
 
-    def __init__(self, targets: Mapping[Statement, str], labels: Mapping[Statement, str]) -> None:
+    `others` is how many bodies of the POU have jumps besides, which have their own variables for labels of the same name."""
+
+    def __init__(self, targets: Mapping[Statement, str], labels: Mapping[Statement, str], others: int = 0) -> None:
         self.targets = targets
         self.labels = labels
+        self.others = others
         self.flags: dict[str, str] = {}
         """Names of the variables that jumps set, by folded label."""
 
@@ -151,7 +154,7 @@ class Jumps:
         return NameRef(at.start, at.end, self._name(label))
 
     def _name(self, label: str) -> str:
-        return self.flags.setdefault(label, f"$JMP {label}")
+        return self.flags.setdefault(label, f"$JMP{self.others or ''} {label}")
 
 
 def _leaves_loop(statement: Statement) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise, zip_longest
 
 from fbvm.syntax.st.expressions import Expressions
+from fbvm.syntax.st.jumps import Jumps, Tangled
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY
 from fbvm.syntax.tree import (
@@ -90,6 +91,28 @@ class Statements(Expressions):
             elif not self._no_label(item, behind):
                 made.append(self._outside_case(item))
         return tuple(made)
+
+    def without_jumps(self, body: Block, start: int = 0) -> Block:
+        """A body that is read from `start` on, with conditions and loops in place of its jumps; the same body if conditions and
+        loops cannot do the same."""
+        targets = {each: name for each, name in self.targets.items() if each.start >= start}
+        labels = {each: name for each, name in self.labels.items() if each.start >= start}
+        if not targets and not labels:
+            return body
+        jumps = Jumps(targets, labels, len(self.jump_sections))
+        for jump in jumps.astray():
+            self.report("S0201", jump.start, jump.end, f"there is no label {targets[jump]} here",
+                        "write `name:` in front of the statement to go on with")
+        try:
+            made = jumps.body(body)
+        except Tangled:
+            made = body
+        else:
+            self.jump_sections += [jumps.section(body)] if jumps.flags else []
+        for known, read in ((self.targets, targets), (self.labels, labels)):
+            for each in read:
+                del known[each]
+        return made
 
     def _no_label(self, label: Label, behind: Label | Statement | Members | None) -> bool:
         """Whether a label is none, since `a : INT;` or `a : 5;` is written; that is reported."""

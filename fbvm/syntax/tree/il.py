@@ -19,8 +19,10 @@ class InstructionList(Statement):
     """A body in the instruction list: `body` are the statements that its instructions stand for.
 
     `temporaries` keep current results that are used more than once; no program can write their names.  `result` is the
-    current result at the end, None if there is none: a transition takes it as its condition."""
+    current result at the end, None if there is none: a transition takes it as its condition.  `ends_with_result` if the last
+    statement is there only to work it out."""
 
     body: Block
     temporaries: tuple[VarDecl, ...]
     result: Expr | None
+    ends_with_result: bool = False

@@ -404,6 +404,14 @@ def test_an_instruction_list_stands_in_columns() -> None:
     assert formatted(Source("x.st", WRITTEN_LIST)) == (WRITTEN_LIST, [])
 
 
+def test_a_comment_of_several_lines_in_a_list_keeps_its_shape() -> None:
+    loose = "PROGRAM Main\nVAR a : BOOL; END_VAR\n  LD a\n      (* of two\n         lines,\n   or three *)\n  ST a\nEND_PROGRAM\n"
+    written, _ = formatted(Source("x.st", loose))
+    assert written.splitlines()[4:-1] == [
+        "    LD      a", "    (* of two", "       lines,", "    or three *)", "    ST      a"]
+    assert formatted(Source("x.st", written)) == (written, [])
+
+
 def test_an_instruction_list_with_a_mistake_stays_as_it_is() -> None:
     text = "PROGRAM Main\nVAR a, b : BOOL; END_VAR\n  LD a\n  AND b + 1\n  ST a\nEND_PROGRAM\n"
     written, wrong = formatted(Source("x.st", text))
