@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.imported import Imported
@@ -90,6 +92,9 @@ def imported(*pous: str) -> Imported:
 
 
 def codes(made: Imported) -> list[str]:
+    """The codes of the messages, each of which marks the name of an element."""
+    marked = [diagnostic.source.text[diagnostic.start : diagnostic.end] for diagnostic in made.diagnostics]
+    assert [text for text in marked if not re.fullmatch(r"<[\w:]+", text)] == []
     return [diagnostic.code for diagnostic in made.diagnostics]
 
 

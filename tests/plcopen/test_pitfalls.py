@@ -241,6 +241,13 @@ def test_edges_of_contacts_and_coils() -> None:
     assert "@LD" in made.files["Main.st"]
 
 
+@each_of(("edge", "seen"), [("falling", ["0", "0", "1", "0"]), ("rising", ["0", "1", "0", "0"])])
+def test_edges_of_inputs_of_a_block(edge: str, seen: list[str]) -> None:
+    both = block(3, "AND", "IN1=1 IN2=2", "OUT").replace('formalParameter="IN1"', f'formalParameter="IN1" edge="{edge}"', 1)
+    made = imported(pou(value(1, "a") + value(2, "b") + both + result(4, "3.OUT", "x"), "a b x", language="FBD"))
+    assert codes(made) == [] and states(made, "x", ["b=1", "a=1", "a=0", ""]) == seen
+
+
 def test_a_loop_through_a_block_takes_what_was_there_a_pass_before() -> None:
     made = imported(pou(value(1, "a") + block(2, "XOR", "IN1=1 IN2=2.OUT", "OUT") + result(3, "2.OUT", "x"),
                         "a x", language="FBD"))

@@ -104,8 +104,9 @@ def test_a_system_runs_its_project_with_its_own_cycle(tmp_path: Path, project: s
     made = within(path)
     assert made is not None
     assert "TASK PlcTask(INTERVAL := T#4000us, PRIORITY := 5);" in made.sources[-1].text
-    assert [(found.code, found.message) for found in made.diagnostics if found.code == "X0292"] == [
-        ("X0292", "the system gives the task PlcTask 4000 us and priority 5, its own file 20000 us and 20")]
+    differs = [found for found in made.diagnostics if found.code == "X0292"]
+    assert [(found.source.text[found.start : found.end], found.message) for found in differs] == [
+        ("<", "the system gives the task PlcTask 4000 us and priority 5, its own file 20000 us and 20")]
     assert made.errors == []
     assert usual_dialect([path]) == "twincat"
 
