@@ -221,6 +221,7 @@ def test_a_reader_gives_what_read_gives_for_each_type(plc: Plc) -> None:
 @each_of(("text", "names"), [
     ("CIO 30.14..CIO 31.01", ["CIO 30.14", "CIO 30.15", "CIO 31.00", "CIO 31.01"]),
     ("%MX0.6..%MX1.1", ["%MX0.6", "%MX0.7", "%MX1.0", "%MX1.1"]),
+    ("CIO 30.14..CIO 31.00", ["CIO 30.14", "CIO 30.15", "CIO 31.00"]),
     ("D5..D5", ["D5"]), ("D5.03..D5.03", ["D5.03"]), ("W1..W3", ["W1", "W2", "W3"]),
 ])  # fmt: skip
 def test_a_range_has_both_its_ends(plc: Plc, text: str, names: list[str]) -> None:
