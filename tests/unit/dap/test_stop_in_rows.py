@@ -207,3 +207,19 @@ def test_log_points_speak_again_behind_a_change_of_memory(tmp_path: Path) -> Non
     client.ask("writeMemory", memoryReference="Main.N", data=b64encode(b"\x09\x00").decode())
     client.go("fbvm/stepScan")
     assert len([row for row in client.events("output") if "n 9" in row["output"]]) == 1
+
+
+@pytest.mark.slow
+def test_why_it_stands_at_a_breakpoint(tmp_path: Path) -> None:
+    client, file = begun(tmp_path), str(tmp_path / "pump.st")
+    client.ask("setBreakpoints", source={"path": file}, breakpoints=[{"line": 33}])
+    stop = client.go("continue")
+    assert (stop["reason"], stop["description"], stop["hitBreakpointIds"]) == ("breakpoint", f"breakpoint {file}:33", [1])
+    client.ask("setBreakpoints", source={"path": file}, breakpoints=[{"line": 33, "condition": "N > 6"}])
+    stop = client.go("continue")
+    assert (stop["reason"], stop["description"]) == ("breakpoint", f"breakpoint {file}:33 when N > 6") and client.value("N") == "7"
+    client.ask("setBreakpoints", source={"path": file}, breakpoints=[])
+    data = client.ask("dataBreakpointInfo", name="Total")["dataId"]
+    client.ask("setDataBreakpoints", breakpoints=[{"dataId": data}])
+    stop = client.go("continue")
+    assert (stop["reason"], stop["description"]) == ("data breakpoint", "Total was 40004, is 40005, by pump.st:34 in Main")
