@@ -217,7 +217,8 @@ def test_why_it_stands_at_a_breakpoint(tmp_path: Path) -> None:
     assert (stop["reason"], stop["description"], stop["hitBreakpointIds"]) == ("breakpoint", f"breakpoint {file}:33", [1])
     client.ask("setBreakpoints", source={"path": file}, breakpoints=[{"line": 33, "condition": "N > 6"}])
     stop = client.go("continue")
-    assert (stop["reason"], stop["description"]) == ("breakpoint", f"breakpoint {file}:33 when N > 6") and client.value("N") == "7"
+    assert (stop["reason"], stop["description"]) == ("breakpoint", f"breakpoint {file}:33 when N > 6")
+    assert client.value("N") == "7"
     client.ask("setBreakpoints", source={"path": file}, breakpoints=[])
     data = client.ask("dataBreakpointInfo", name="Total")["dataId"]
     client.ask("setDataBreakpoints", breakpoints=[{"dataId": data}])
