@@ -145,7 +145,9 @@ KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
          "--journal", "out.journal"),
     )),
     "xml": ("text.xml", (("import", "-o", "out", "--force"), ("import", "-o", "out", "--force", "--json"), ("check",))),
-    "project": ("fbvm.toml", (("check",), ("check", "--json"), ("run",), ("run", "--json"), ("step",))),
+    "project": ("fbvm.toml", (  # a good one may ask for hours, and gets them
+        ("check",), ("check", "--json"), ("run", "--for", "1s"), ("run", "--for", "1s", "--json"), ("step",),
+    )),
     "library": ("own/library.toml", (("check", "use.st", "--library", "own", "--"),)),
     "journal": ("run.journal", (("replay",), ("replay", "--show", "Main.n", "--json"))),
     "recording": ("run.fbtrace", (
