@@ -42,6 +42,20 @@ def test_objects_that_a_project_cannot_have(tmp_path: Path, include: str, said: 
     assert len(made.sources) == 4
 
 
+@pytest.mark.parametrize(("include", "file"), [
+    ("POUs %28all%29\\MAIN.TcPOU", "POUs (all)/MAIN.TcPOU"), ("pous\\Main.tcPOU", "POUs/MAIN.TcPOU"),
+    ("POUs\\100%.TcPOU", "POUs/100%.TcPOU")])  # fmt: skip
+def test_names_of_files_are_those_of_msbuild_and_windows(tmp_path: Path, include: str, file: str) -> None:
+    path = write_project(tmp_path)
+    object_ = (tmp_path / "POUs/MAIN.TcPOU").read_bytes()
+    (tmp_path / "POUs/MAIN.TcPOU").unlink()
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_bytes(object_)
+    path.write_text(PROJECT.replace("POUs\\MAIN.TcPOU", include), encoding="utf-8")
+    made = read_project(path)
+    assert made.errors == [] and Path(made.sources[0].name) == tmp_path / file
+
+
 def test_what_is_no_project(tmp_path: Path) -> None:
     path = tmp_path / "Plant.plcproj"
     path.write_text("<TcSmProject/>", encoding="utf-8")

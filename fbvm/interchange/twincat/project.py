@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
+from urllib.parse import unquote
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.files import SOURCE_BYTES, read_file, reason
@@ -101,7 +102,7 @@ def _is_excluded(item: Element) -> bool:
 def _object(project: Path, xml: Source, item: Element) -> ImportedObject:
     """The object that an entry of a project names."""
     written = item.get("Include")
-    inside = PureWindowsPath(written)
+    inside = PureWindowsPath(unquote(written))  # MSBuild writes ( and other signs as %28
     suffix = inside.suffix.lower()
 
     def refused(code: str, message: str, hint: str = "") -> ImportedObject:
@@ -111,11 +112,28 @@ def _object(project: Path, xml: Source, item: Element) -> ImportedObject:
         return refused("X0501", f"{written} lies outside of the project", "copy it into the project's folder")
     if suffix not in (*OBJECT_SUFFIXES, TASK_SUFFIX):
         return refused("X0190", f"{written} holds no program, and is left out")
-    file = project.parent.joinpath(*inside.parts)
+    file = _file(project.parent, inside.parts)
     try:
         return read_object(read_file(file, SOURCE_BYTES), str(file))
     except OSError as error:
         return refused("X0501", f"{written} cannot be read: {reason(error)}")
+
+
+def _file(folder: Path, parts: tuple[str, ...]) -> Path:
+    """A file below a folder: where the system tells small letters from large ones, any that Windows takes for the same."""
+    found = folder.joinpath(*parts)
+    if found.exists():
+        return found
+    here = folder
+    for part in parts:
+        try:
+            like = [each for each in sorted(here.iterdir()) if each.name.lower() == part.lower()]
+        except OSError:
+            return found
+        if not like:
+            return found
+        here = here / part if (here / part) in like else like[0]
+    return here
 
 
 def configuration(tasks: list[Element], application: str = "", settings: Mapping[str, TaskSettings] | None = None) -> str:
