@@ -102,7 +102,9 @@ def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:
     if isinstance(target, tree.NamedType):
         entry = scope.project.type_entry(target.text, scope.source)
         pou = scope.project.pou(target.text, scope.source) if entry is None else None
-        awaiting = entry if entry is not None and entry.busy else pou if pou is not None and pou.busy else None
+        awaiting: TypeEntry | Pou | None = entry if entry is not None and entry.busy else None
+        if awaiting is None and pou is not None and (pou.busy or scope.context.waits_for(pou, scope.source)):
+            awaiting = pou
         if awaiting is not None and not (pou is not None and pou.kind == "INTERFACE"):
             name = awaiting.name
             made = RefType(f"{spec.kind} {name}", 8, 8, None, spec.kind == "POINTER TO", spec.kind == "REFERENCE TO")

@@ -99,6 +99,10 @@ class Context:
         self._blocks: dict[int, Pou] = {}
         self._identifiers = 0
         self._anonymous = 0
+        self._resolving = 0
+        """How many interfaces are being resolved, one within the other."""
+        self._awaited: list[Pou] = []
+        """Blocks that references wait for until no interface is being resolved."""
 
     def address(self, text: str, source: Source) -> Address:
         """The address that a text of the program names.  Raises AddressError."""
@@ -268,6 +272,7 @@ class Context:
                             "an instance can hold instances of other blocks only")
             return False
         pou.busy = True
+        self._resolving += 1
         outer, self.project.dependencies = self.project.dependencies, Dependencies()
         self.rules.interface(self, pou)
         pou.busy = False
@@ -279,7 +284,21 @@ class Context:
             self.project.dependencies = Dependencies()
             self.check_body(pou)
         self.project.dependencies = outer
+        self._resolving -= 1
+        while self._awaited and not self._resolving:
+            awaited = self._awaited.pop()
+            self.interface(awaited, awaited.source, awaited.tree.name)
         return True
+
+    def waits_for(self, pou: Pou, source: Source) -> bool:
+        """True if a reference to a block that is declared now gets its target later, when nothing else is being resolved.
+
+        The block may hold instances of what is derived from the one that declares the reference."""
+        waits = self._resolving > 0 and not pou.resolved and pou.kind in ("FUNCTION_BLOCK", "CLASS") and \
+            not source.library and not pou.source.library
+        if waits and pou not in self._awaited:
+            self._awaited.append(pou)
+        return waits
 
     def program_instance(self, pou: Pou, node: tree.Node) -> Variable | None:
         """The one instance of a program that is called or looked into by its name; None if a CONFIGURATION has several."""
