@@ -6,7 +6,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.syntax.st.declarations import Declarations
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.statements import Items
-from fbvm.syntax.tree import Action, Assign, Block, Call, CallStatement, Expr, Literal, Name, NameRef
+from fbvm.syntax.tree import Action, Assign, Block, Call, CallStatement, Expr, Literal, Name, NameRef, Statement
 from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.node import changed
 from fbvm.syntax.tree.sfc import QUALIFIERS, Association, Step, Transition
@@ -49,7 +49,7 @@ class SfcElements(Declarations):
 
     def transition_body(self, word: Token, token: Token | None, priority: int | None, from_: Token, sources: list[Name],
                         to: Token, targets: list[Name], colon: Token, items: Items, end: Token) -> Transition:
-        body = self.without_jumps(self.block(items), word.start)
+        body = self.without_jumps(tuple(map(self._with_open_result, self.block(items))), word.start)
         only = body[0] if len(body) == 1 else None
         if isinstance(only, InstructionList):
             return self._condition_of_list(word, token, priority, sources, targets, only, end)
@@ -63,12 +63,19 @@ class SfcElements(Declarations):
             token = word
         return self._transition(word, token, priority, sources, targets, NameRef(token.start, token.end, token.text), body, end)
 
+    def _with_open_result(self, made: Statement) -> Statement:
+        """An instruction list without the statement that only works out its last current result."""
+        if not isinstance(made, InstructionList) or not made.ends_with_result:
+            return made
+        kept = made.temporaries[:-1] if isinstance(made.body[-1], Assign) else made.temporaries
+        at = self.lists.index(made)
+        self.lists[at] = changed(made, body=made.body[:-1], temporaries=kept, ends_with_result=False)
+        return self.lists[at]
+
     def _condition_of_list(self, word: Token, token: Token | None, priority: int | None, sources: list[Name], targets: list[Name],
                            made: InstructionList, end: Token) -> Transition:
         """A transition whose condition is the current result at the end of an instruction list (table 54)."""
         truth = made.result
-        if made.ends_with_result:
-            made = changed(made, body=made.body[:-1], ends_with_result=False)
         if truth is None:
             self.report("S0111", made.start, made.end, "this instruction list has no current result at its end",
                         "the condition is the last current result")
