@@ -224,3 +224,16 @@ def test_why_it_stands_at_a_breakpoint(tmp_path: Path) -> None:
     client.ask("setDataBreakpoints", breakpoints=[{"dataId": data}])
     stop = client.go("continue")
     assert (stop["reason"], stop["description"]) == ("data breakpoint", "Total was 40004, is 40005, by pump.st:34 in Main")
+
+
+@pytest.mark.slow
+def test_memory_is_written_up_to_its_last_byte(tmp_path: Path) -> None:
+    client = begun(tmp_path)
+    size = client.adapter.debug.plc().memory.size
+    for offset, data, good in ((size - 2, b"\x01\x02", True), (size - 1, b"\x01\x02", False), (-1, b"\x01", False)):
+        arguments = {"memoryReference": "0x0", "offset": offset, "data": b64encode(data).decode()}
+        if good:
+            assert client.ask("writeMemory", **arguments)["bytesWritten"] == len(data)
+        else:
+            with pytest.raises(RefusedError, match="outside of the memory"):
+                client.ask("writeMemory", **arguments)

@@ -14,6 +14,7 @@ from fbvm.run import project_reader as reader
 from fbvm.run import real_pace, slices, time_limit
 from fbvm.run.plc_names import PlcNames
 from fbvm.run.real_pace import RealPace
+from fbvm.run.running import Running, TimedWrite
 from fbvm.run.slices import SLICE_NS, TOLD_NS, Slices
 from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.link import Peer
@@ -149,3 +150,15 @@ def test_what_kinds_are_called() -> None:
         "a whole number from 1 to 9, or a list of two, the first and the last",
         'a time above 0, such as "10ms", or a list of such',
         "a time from 10 ms to 1 s"]  # fmt: skip
+
+
+def test_what_somebody_else_has_written_is_not_written_again() -> None:
+    """As a run that a debugger has carried on: what was due up to the last scan is done, and the goal may be reached."""
+    plc = Plc(counter_image())
+    rows = [TimedWrite(plc.find("D5"), value, at_ns) for value, at_ns in ((1, 0), (2, 10_000_000), (3, 10_000_001))]
+    run = Running(plc, writes=rows, scans=2)
+    run.resume()
+    assert ([row.value for row in run.writes], run.reason) == ([1, 2, 3], "")
+    plc.run(scans=2)
+    run.resume()
+    assert plc.now_ns == 10_000_000 and ([row.value for row in run.writes], run.reason) == ([3], "scans")
