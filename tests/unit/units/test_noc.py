@@ -18,7 +18,7 @@ from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopLink, LoopNetwork
 from fbvm.net.peers import Fin, Reset, Say, ScriptedPeer
 from fbvm.units.contract import Unit
-from fbvm.units.port.noc import ERRNO, FTP, HTTP, RESTART_NS, Noc, Statistic
+from fbvm.units.port.noc import ERRNO, FTP, HTTP, RESTART_NS, Noc, Statistic, _services
 from fbvm.wire.link import (
     Broken,
     Close,
@@ -433,3 +433,10 @@ def test_the_errors_of_the_stack_that_both_generations_have() -> None:
              "ECONNABORTED": "35", "ECONNRESET": "36", "ENOBUFS": "37", "EISCONN": "38", "ENOTCONN": "39", "ETIMEDOUT": "3C",
              "ECONNREFUSED": "3D", "EHOSTUNREACH": "41"}  # fmt: skip
     assert {name: f"{number:02X}" for name, number in ERRNO.items()} == table
+
+
+@each_of("ftp, http, word", [(False, False, 0), (True, False, FTP), (False, True, HTTP), (True, True, FTP | HTTP)])
+def test_the_word_of_the_services(ftp: bool, http: bool, word: int) -> None:
+    noc = Noc()
+    noc.ftp, noc.http = ftp, http
+    assert _services(noc) == word
