@@ -480,3 +480,31 @@ def test_variables_of_python_beside_a_document_begin_with_their_values(tmp_path:
         machine = plc(made)
         machine.scan()
         assert (machine.read("Main.n"), machine.read("Main.x"), machine.read("Mode")) == (5, True, "fast")
+
+
+TWO = RAIL + contact(2, "1", "a") + coil(3, "2", "x")
+WRONG: dict[str, tuple[str, str, str, str]] = {  # body, language, declared, message
+    "no edge of this name": (RAIL + contact(2, "1", "a", 'edge="both"') + coil(3, "2", "x"), "LD", "a x",
+                             "there is no edge 'both'"),
+    "no storage of this name": (RAIL + contact(2, "1", "a") + coil(3, "2", "x", 'storage="keep"'), "LD", "a x",
+                                "there is no storage 'keep'"),
+    "a jump to nowhere": (RAIL + contact(2, "1", "a") + '<jump localId="3" label="Far">' + wires("2") + "</jump>", "LD", "a x",
+                          "there is no label Far"),
+    "an element of charts": (TWO + '<step localId="4" name="s"/>', "LD", "a x", "step stands in a body of LD"),
+    "two of one number": (TWO + contact(2, "1", "x"), "LD", "a x", "localId 2 is there twice"),
+    "two connectors": (TWO + f'<connector localId="4" name="far">{wires("2")}</connector>'
+                       f'<connector localId="5" name="FAR">{wires("2")}</connector>', "LD", "a x",
+                       "there are two connectors FAR"),
+    "a block without a type": (TWO + '<block localId="4"><inputVariables/><outputVariables/></block>', "LD", "a x",
+                               "<block> has no typeName"),
+    "an instruction outside": (value(1, "n") + block(2, "MOVE", "IN=1", "OUT") + result(3, "2.OUT", ""), "FBD",
+                               variable("n", "INT"), "it has no variable"),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@each_of("what", WRONG)
+def test_what_is_wrong_with_an_element_is_said_where_it_stands(what: str) -> None:
+    body, language, declared, message = WRONG[what]
+    made = imported(pou(body, declared, language=language))
+    assert codes(made) and any(message in error.message for error in made.errors), [each.message for each in made.diagnostics]

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from fbvm.base.diagnostics import Source
+from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.spans import divided
+from fbvm.interchange.plcopen.write.exporting import export_xml
 
 
 @pytest.mark.parametrize(("program", "places"), [
@@ -26,3 +29,19 @@ from fbvm.interchange.plcopen.read.spans import divided
 def test_statements_among_rungs_that_belong_together(program: str, places: tuple[int, ...]) -> None:
     rungs = [None if part.strip() == "-" else [step.strip() for step in part.split(";")] for part in program.split("|")]
     assert divided(rungs) == set(places)
+
+
+@pytest.mark.slow
+def test_a_network_that_is_no_rung_is_not_executed_within_an_interlock() -> None:
+    rungs = "RUNG 1\nLD a\nIL\nRUNG 2 between\nLD b\nOUT c\nRUNG 3\nILC\n"
+    declared = "VAR a, b, c : BOOL; v : ARRAY[0..3] OF BOOL; n : INT; END_VAR"
+    source = f"PROGRAM Main\n{declared}\nLADDER\n{rungs}END_LADDER\nEND_PROGRAM\n"
+    text = export_xml([Source("Main.st", source)]).text
+    assert text is not None
+    made = import_xml(text.replace("<variable>b</variable>", "<variable>v[n + 1]</variable>").encode())
+    lines = [" ".join(line.split()) for line in made.files["Main.st"].splitlines()]
+    assert lines[lines.index("LADDER"):] == [
+        "LADDER", "RUNG 1", "LD a", "IL", "END_LADDER", "// between", "// network 2 was not taken over", "LADDER",
+        "RUNG 2", "ILC", "END_LADDER", "END_PROGRAM"]  # fmt: skip
+    [error] = made.errors
+    assert error.code == "X0202" and "stands among rungs that belong together" in error.message
