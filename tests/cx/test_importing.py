@@ -350,7 +350,8 @@ def test_what_is_no_ladder_protected_or_in_no_task_is_told() -> None:
 
 @each_of(("task", "why"), [(0, "it belongs to interrupt task 0,"), (-1, "it is given to no task"), (255, "interrupt task 255")])
 def test_a_program_that_no_cyclic_task_runs_is_named(task: int, why: str) -> None:
-    made = imported(Cxt(sections=(("Main", ("LD 0.00\nOUT 1.00",)),), task=task))
+    made = imported(Cxt(sections=(("Main", ("LD 0.00\nOUT 1.00", "LD 0.01\n@TKON(820) 3")),), task=task))
+    assert not any("IF NOT CX_Task" in text for text in made.files.values())
     assert [d.code for d in made.diagnostics if why in d.message] == ["X0190"]
 
 

@@ -128,7 +128,7 @@ class _Rung:
         merged: list[Series] = []
         for group in groups.values():
             rest = [way[1:] for way in group]
-            merged.append([group[0][0], *self._merged(rest)] if len(group) > 1 else group[0])
+            merged.append([group[0][0], *self._merged(rest)])
         return merged[0] if len(merged) == 1 else [Parallel(merged)]
 
     def _hang(self, branch: Branch, series: Series, output: Object) -> None:
