@@ -105,6 +105,22 @@ def test_an_instance_may_lie_where_the_program_stores() -> None:
     assert [rig.slot("i16", 2 * n) for n in range(4)] == [5] * 4
 
 
+@pytest.mark.parametrize(("instance", "seen"), [(0, [5, 6, 6, 7]), (32, [5, 5, 6, 6])])
+def test_a_body_for_any_instance_forgets_what_may_be_the_same_place(instance: int, seen: list[int]) -> None:
+    """The first instance begins at the slot 4096, the second does not: a store to the one may be a store to the other."""
+    def look(place: Any, to: int) -> Node:
+        return "store", "i16", at(to), ("load", "i16", place)
+
+    inner = (("store", "i16", own(0), const("i16", 5)), look(own(0), 0), ("store", "i16", at(4096), const("i16", 6)),
+             look(own(0), 2), look(at(4096), 4), ("store", "i16", own(0), const("i16", 7)), look(at(4096), 6))  # fmt: skip
+    program = image((("call", 1, own(0)), ("call", 1, own(32))), inner)
+    program = replace(program, tasks=program.tasks[:1])
+    engine = PythonEngine(program, memory := power_on(program))
+    assert "i16_0" in engine.source and "i16_at_" in engine.source, "both are held"
+    assert engine.call(1, INSTANCE + instance) is None
+    assert [memory.read(SLOTS_OFFSET + 2 * n, "i16") for n in range(4)] == seen
+
+
 def test_branches_agree_or_it_is_forgotten() -> None:
     rows = (load("b", 20), (store("i16", 0, const("i16", 5)),)), (load("b", 21), (store("i16", 0, const("i16", 6)),))
     code = (("if", rows, ()), store("i16", 2, X), store("i16", 4, X))
