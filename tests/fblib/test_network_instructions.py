@@ -229,7 +229,7 @@ def test_the_own_unit_echoes_to_cmnd() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("control", "end_code", "fins"), [
     ([1, 3, NODE_2, 0, 0], 0x0502, True), ([1, 0, NODE_2, 0, 0], 0x0101, False), ([1, 0, 0x0011, 0, 0], 0x0202, True),
-    ([1, 0, 0x0010, 0, 0], 0x0202, False),
+    ([1, 0, 0x0010, 0, 0], 0x0202, False), ([1, 3, NODE_2, 0x8000, 0], 0x0502, True),
 ])  # fmt: skip
 def test_where_nothing_can_be_sent(control: list[int], end_code: int, fins: bool) -> None:
     pair = Pair("@SEND D100 D200 D0", fins=fins, other=False)

@@ -23,6 +23,11 @@ def test_every_switch_has_its_question_and_somebody_who_turns_it() -> None:
         assert QUESTIONS[switch][0] in page()
 
 
+def test_the_page_says_whose_programs_each_dialect_is_for() -> None:
+    assert [line for line in page().splitlines() if line.startswith("- ")][:len(DIALECTS)] == [
+        f"- {row.name}: {row.for_whom}." for row in DIALECTS.values()]
+
+
 def test_a_name_that_there_is_not() -> None:
     assert dialect("CODESYS").name == "codesys"
     with pytest.raises(ValueError, match="there is no dialect siemens"):

@@ -276,3 +276,25 @@ def test_libraries(windows: None, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (host.math_library(), host.links_in_place()) == ("ucrtbase", False)
     monkeypatch.setattr(host, "sys", SimpleNamespace(platform="darwin"))
     assert (host.math_library(), host.links_in_place()) == (None, True)
+
+
+def test_under_windows_a_byte_is_locked_that_nobody_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the place in the file is afterwards what it was, also if another process has it."""
+    asked: list[tuple[int, int, int]] = []
+
+    def locking(number: int, how: int, count: int) -> None:
+        asked.append((os.lseek(number, 0, os.SEEK_CUR), how, count))
+        if len(asked) > 1:
+            raise PermissionError(errno.EACCES, "another process has it")
+
+    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(LK_NBLCK=5, locking=locking))
+    monkeypatch.setattr(host, "LOCKED_AT", 1000)  # where the real place is, files of this host may not reach
+    with (tmp_path / "file").open("w+b", buffering=0) as file:
+        file.write(b"abcdef")
+        file.seek(3)
+        monkeypatch.setattr(sys, "platform", "win32")
+        taken = [host.taken_alone(file), host.taken_alone(file)]
+        place = os.lseek(file.fileno(), 0, os.SEEK_CUR)
+        monkeypatch.undo()
+    assert taken == [True, False] and place == 3
+    assert asked == [(1000, 5, 1)] * 2

@@ -88,6 +88,20 @@ def test_what_is_asked_of_a_command_before_it_is_executed(code: int) -> None:
     assert changes(code) == ("changes" in refused)
 
 
+def test_cycle_times_are_the_average_of_the_last_eight_the_longest_and_the_least() -> None:
+    layout = counter_image().layout
+    registers = Registers(Memory(layout.size, layout.areas))
+    assert registers.cycle_times_ns == (0, 0, 0)
+    seen = []
+    for time_ns in (90, 10, 20, 30, 40, 50, 60, 70, 81):
+        registers.measure(time_ns)
+        seen.append(registers.cycle_times_ns)
+    assert seen[:3] == [(90, 90, 90), (50, 90, 10), (40, 90, 10)]
+    assert seen[-1] == ((10 + 20 + 30 + 40 + 50 + 60 + 70 + 81) // 8, 90, 10)
+    registers.forget_cycle_times()
+    assert registers.cycle_times_ns == (0, 0, 0)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["python", "auto"])
 def test_a_journal_with_fins_is_done_again_to_the_bit(engine: str) -> None:
