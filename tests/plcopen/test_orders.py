@@ -282,3 +282,18 @@ def test_a_function_that_is_not_enabled_gives_what_its_tool_gives(order: str, ex
     made = import_xml(document(pou(drawn, declared)), order=order)
     assert not made.errors
     assert states(made, "x y n", ["", "a=1", "a=0"]) == expected
+
+
+def test_what_came_back_through_a_loop_is_kept_for_who_reads_it_behind_the_loop() -> None:
+    body = (value(1, "n") + value(2, "INT#3") + block(3, "ADD", "IN1=1 IN2=4", "OUT", marks='executionOrderId="1"')
+            + result(5, "4", "m") + result(6, "3", "k") + block(4, "SUB", "IN1=2 IN2=4", "OUT"))
+    declared = variable("n", "INT", "5") + variable("m", "INT") + variable("k", "INT")
+    made = import_xml(document(pou(body, declared, language="FBD")), order="document")
+    assert states(made, "m k", ["", "", ""]) == ["3 5", "0 8", "3 5"]
+
+
+def test_a_variable_that_is_read_and_written_at_one_place_in_the_order_of_numbers() -> None:
+    body = (f'<inOutVariable localId="1">{wires("4")}<connectionPointOut/><expression>n</expression></inOutVariable>'
+            + result(2, "1", "m", 'executionOrderId="1"') + value(3, "INT#2") + block(4, "ADD", "IN1=3 IN2=1", "OUT"))
+    made = import_xml(document(pou(body, variable("n", "INT") + variable("m", "INT"), language="FBD")), order="ids")
+    assert states(made, "n m", ["", "", ""]) == ["2 0", "4 2", "6 4"]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
 from fbvm.interchange.plcopen.read.document import Reading
 from fbvm.interchange.plcopen.read.networks import Network
+from fbvm.interchange.plcopen.read.producer import NETWORK
 from fbvm.interchange.plcopen.read.scope import SHARED, Scope
 from fbvm.interchange.plcopen.read.values import (
     ATOM,
@@ -50,6 +51,8 @@ class NetworkContext:
         self.reading, self.scope = reading, scope
         self.generates = reading.producer.generates
         """Whether drawings are executed as the generator of Beremiz and OpenPLC Editor writes them."""
+        self.reads_in_outs = reading.producer.order != NETWORK
+        """Whether a variable that a diagram reads and writes at one place is read where its value is used (`sequence.py`)."""
         self.apart = False
         """Whether the statements are executed apart from what reads their values: variables last to the next call then."""
         self._clear()
@@ -133,7 +136,7 @@ class NetworkContext:
             return TRUE
         if (consumer, wire) in self.network.cut:
             return self._from_pass_before(wire)
-        if item.kind == "inOutVariable" and self.generates:
+        if item.kind == "inOutVariable" and self.reads_in_outs:
             return self.modified(item, self.expression(item.text), item.negated, item.edge)
         if key not in self.held and item.kind == "inVariable":
             self.set_output(wire, self.modified(item, self.expression(item.text), item.negated, item.edge))
@@ -159,14 +162,14 @@ class NetworkContext:
                 keep and uses > 1 and value.level < ATOM and not self._is_reread(wire)):
             value = self.in_variable(wire, value)
         if memory := self.memories.get((wire.source, wire.pin)):
-            self.lines.append(f"{memory} := {value.text};")
+            self.write(f"{memory} := {value.text};", frozenset((memory.upper(),)))
             value = variable(memory)
         if uses > 0:
             self.held[wire.source, wire.pin] = Held(value, wire, uses)
 
     def in_variable(self, wire: Wire, value: Value) -> Value:
         """The value in a variable of its own; the value itself, with a warning, if its type is not known."""
-        kind = self.scope.wire_type(wire)
+        kind = self.scope.wire_type(wire) or self.sink_type(wire)
         if not kind:
             if len(value.text) > LONGEST:
                 raise Unexecutable(wire.source, "it is used in several places, and its type is not known",

@@ -91,7 +91,7 @@ class Statements:
             text = f"{target} := {context.value_at(item, item.inputs[0]).text};"
             guard = self.calls.guard(item.inputs[0])
             context.write(when(guard, text) if guard else text, writes)
-        if not context.generates:  # a generator reads the variable wherever it is used
+        if not context.reads_in_outs:
             context.set_output(Wire(item, ""), context.modified(item, context.expression(item.text), item.negated, item.edge))
 
     def _label(self, item: Object) -> None:
