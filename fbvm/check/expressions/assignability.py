@@ -64,6 +64,9 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
             return True
     if dialect.instances_are_values and isinstance(target, StructType) and target.block:
         return kind == target
+    if dialect.bounds_are_not_compared and isinstance(target, ArrayType) and isinstance(kind, ArrayType):
+        sizes = [[high - low for low, high in each.bounds] for each in (kind, target)]
+        return sizes[0] == sizes[1] and same(kind.element, target.element) and not (kind.packed or target.packed)
     kind, target = base(kind), base(target)
     if isinstance(kind, RefType) and kind.moves and isinstance(target, Elementary):
         return _holds_pointer(target, dialect)
