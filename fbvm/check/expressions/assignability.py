@@ -64,9 +64,6 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
             return True
     if dialect.instances_are_values and isinstance(target, StructType) and target.block:
         return kind == target
-    if dialect.bounds_are_not_compared and isinstance(target, ArrayType) and isinstance(kind, ArrayType):
-        sizes = [[high - low for low, high in each.bounds] for each in (kind, target)]
-        return sizes[0] == sizes[1] and same(kind.element, target.element) and not (kind.packed or target.packed)
     kind, target = base(kind), base(target)
     if isinstance(kind, RefType) and kind.moves and isinstance(target, Elementary):
         return _holds_pointer(target, dialect)
@@ -102,7 +99,16 @@ def _holds_nanoseconds(kind: Type, target: Type) -> bool:
                               for time, each in zip(times, (kind, target), strict=True))
 
 
-_BY_DIALECT = (("times_are_numbers", _holds_nanoseconds), ("narrowing", _narrows), ("integers_and_bits", _holds_bits))
+def _has_as_many(kind: Type, target: Type) -> bool:
+    """True for two arrays that have as many elements of one type in each dimension."""
+    if not isinstance(kind, ArrayType) or not isinstance(target, ArrayType) or kind.packed or target.packed:
+        return False
+    sizes, wanted = ([high - low for low, high in each.bounds] for each in (kind, target))
+    return sizes == wanted and same(kind.element, target.element)
+
+
+_BY_DIALECT = (("bounds_are_not_compared", _has_as_many), ("times_are_numbers", _holds_nanoseconds), ("narrowing", _narrows),
+               ("integers_and_bits", _holds_bits))
 """Switches of dialects, and between which types each of them converts."""
 
 
