@@ -175,6 +175,7 @@ class Rig:
 
     def find(self, name: str) -> Place | Span:
         """The place or span that a name denotes.  Raises UnknownPlace."""
+        __tracebackhide__ = True
         symbols, areas = self.plc.image.symbols, self.plc.memory.areas
         try:
             return find_place(symbols, areas, self.subject.path(name.strip()))
@@ -185,6 +186,7 @@ class Rig:
                 raise UnknownPlace(self.subject.plain(str(inner if self.subject.prefix else outer))) from None
 
     def __getattr__(self, name: str) -> Any:
+        __tracebackhide__ = True
         if name.startswith("__"):
             raise AttributeError(name)
         try:
@@ -193,9 +195,11 @@ class Rig:
             raise AttributeError(str(error)) from None
 
     def __getitem__(self, name: str) -> Any:
+        __tracebackhide__ = True
         return value_of(self.plc, self.find(name), self._reads.add)
 
     def __setattr__(self, name: str, value: object) -> None:
+        __tracebackhide__ = True
         try:
             self[name] = value
         except UnknownPlace as error:
@@ -214,6 +218,7 @@ class Rig:
 
     def write(self, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
         """Writes variables by name; names that are no Python identifiers by a mapping: `{"CIO 0.00": True}`."""
+        __tracebackhide__ = True
         for name, value in {**(inputs or {}), **named}.items():
             self[name] = value
         return self

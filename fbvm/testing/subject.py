@@ -132,6 +132,7 @@ def _build(sources: list[Source], name: str | None, libraries: Sequence[Path], s
 
 def _only(sources: Sequence[Source]) -> str:
     """The name of the only POU of some sources, or of the POU with the name of the first file."""
+    __tracebackhide__ = True
     names = [node.name.text for source in sources for node in pous(source)]
     stem = fold(Path(sources[0].name).stem) if sources else ""
     chosen = names if len(names) == 1 else [name for name in names if fold(name) == stem]
@@ -201,6 +202,7 @@ def _blanked(text: str, nodes: Iterable[tree.Pou]) -> str:
 
 def _read(path: Path) -> list[Source]:
     """The source in a file, or those within a project of another tool."""
+    __tracebackhide__ = True
     name = os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path)
     try:
         project = within(Path(name))
@@ -218,6 +220,7 @@ def _read(path: Path) -> list[Source]:
 
 def pous(source: Source) -> list[tree.Pou]:
     """The POUs that a text declares.  Raises SubjectError for syntax errors."""
+    __tracebackhide__ = True
     text, diagnostics = parse(source)
     if wrong := errors(diagnostics):
         raise SubjectError("\n".join(message.render() for message in wrong))
@@ -225,6 +228,7 @@ def pous(source: Source) -> list[tree.Pou]:
 
 
 def _declared(sources: Sequence[Source], name: str, libraries: Sequence[Path], dialect: str) -> tuple[tree.Pou, Source]:
+    __tracebackhide__ = True
     known = [(node, source) for source in sources for node in pous(source)]
     for node, source in known:
         if fold(node.name.text) == fold(name):
@@ -260,6 +264,7 @@ def _wrapper(pou: tree.Pou, source: Source) -> str:
     """The text of a program that calls a block, or a function with variables of the names of its inputs and outputs.
 
     In-outs are connected to variables of the program, which a test names as the in-outs."""
+    __tracebackhide__ = True
     name = pou.name.text
     in_outs = _variables(pou, "VAR_IN_OUT", source)
     if open_ones := [f"{each} : {kind}" for each, kind in in_outs if _OPEN.search(kind)]:

@@ -16,6 +16,7 @@ from fbvm.testing import coverage_plugin, golden, warning_plugin
 from fbvm.testing.course.class_report import _cell
 from fbvm.testing.course.lessons import Lesson, Result
 from fbvm.testing.coverage_plugin import CoveragePlugin
+from fbvm.testing.plant_rig import PlantRig, project_near
 from fbvm.testing.rig import Rig
 from fbvm.testing.warning_plugin import WarningPlugin
 
@@ -99,3 +100,34 @@ def test_how_a_rig_is_named(what: str, pin: str, out: str, tmp_path: Path) -> No
     rig = Rig.of(what, folders=[tmp_path])
     rig.scan(**{pin: True})
     assert getattr(rig, out) is True
+
+
+@pytest.mark.slow
+def test_what_pytest_shows_of_a_failure_ends_in_the_test_itself(tmp_path: Path) -> None:
+    """Every function of the plugin between the test and what is wrong hides its frame."""
+    (tmp_path / "lamp.st").write_text(TEXT.replace("q : BOOL;", "q : BOOL; n : INT;").replace("q := on;", "n := 1 / n;"))
+    (tmp_path / "fbvm.toml").write_text('[plc.a]\nsources = ["main.st"]\n')
+    (tmp_path / "main.st").write_text("PROGRAM Main VAR n : INT; END_VAR n := 1 / n; END_PROGRAM\n")
+
+    def rig() -> Rig:
+        return Rig.of("lamp.st::Lamp", folders=[tmp_path])
+
+    wrong: dict[str, Any] = {
+        "scan": lambda: rig().scan(), "run": lambda: rig().run("1s"), "until": lambda: rig().until("q", max="1s"),
+        "write": lambda: rig().write(nobody=1), "set": lambda: setattr(rig(), "n", "x"), "item": lambda: rig()["nobody"],
+        "set item": lambda: rig().__setitem__("on", "x"), "force": lambda: rig().force(nobody=1),
+        "of": lambda: Rig.of("lamp.st::Nobody", folders=[tmp_path]), "file": lambda: Rig.of("none.st", folders=[tmp_path]),
+        "golden": lambda: golden.check(tmp_path / "none.txt", cast(Any, Recorder(Plc(counter_image()), ["D0"])), False),
+        "project": lambda: project_near([tmp_path], "none.toml"), "plant": lambda: PlantRig(tmp_path / "none.toml"),
+        "plant scan": lambda: PlantRig(tmp_path).scan(), "plant run": lambda: PlantRig(tmp_path).run("1s"),
+        "plant until": lambda: PlantRig(tmp_path).until("a.Main.n = 5", max="1s"),
+    }  # fmt: skip
+    shown = {}
+    for name, call in wrong.items():
+        with pytest.raises(Exception) as raised:
+            call()
+        frames = [(entry.path.name, entry.locals) for entry in raised.traceback if "/fbvm/testing/" in entry.path.as_posix()]
+        assert frames, name
+        if visible := [file for file, local in frames if not local.get("__tracebackhide__")]:
+            shown[name] = visible
+    assert shown == {}
