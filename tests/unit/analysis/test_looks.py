@@ -141,3 +141,13 @@ def test_addresses_stand_behind_names_and_elements() -> None:
     hints = address_hints(program, program.files["pump.st"], 0, len(PLANT))
     assert [(PLANT[each.at - 4:each.at], each.text) for each in hints][:2] == [("s[3]", "D102"), ("Lamp", "%QX0.0")]
     assert all(each.text != "D100" for each in hints), "an element whose number is not known has no address"
+
+
+def test_names_of_programs_blocks_actions_and_functions_have_their_colours() -> None:
+    text = ("FUNCTION_BLOCK B\nVAR n : INT; END_VAR\nACTION Stop: n := 0; END_ACTION\nEND_FUNCTION_BLOCK\n"
+            "FUNCTION F : INT F := 1; END_FUNCTION\n"
+            "PROGRAM Main VAR b : B; i : INT; END_VAR b(); b.Stop(); i := F() + i; END_PROGRAM\n")
+    file = plant(text=text)
+    colours = {(text[each.start:each.end], each.type) for each in tokens(file, file.files["pump.st"])}
+    assert {("B", "class"), ("Stop", "method"), ("F", "function"), ("Main", "class"), ("b", "variable")} <= colours
+    assert not {("Stop", "class"), ("B", "method"), ("F", "class")} & colours

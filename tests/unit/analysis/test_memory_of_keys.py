@@ -115,3 +115,11 @@ def test_growth_counts_from_the_last_collection(monkeypatch: pytest.MonkeyPatch)
         assert collections(known.checked, 5_300_000, 5_400_000, 5_500_000) == [5_400_000]
     finally:
         known.end()
+
+
+def test_python_collects_by_itself_again_at_the_end() -> None:
+    before = gc.get_threshold()
+    kept = garbage.Garbage()
+    assert gc.get_threshold() == (*before[:2], garbage.NEVER)
+    kept.end()
+    assert gc.get_threshold() == before

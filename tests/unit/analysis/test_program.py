@@ -284,3 +284,9 @@ def test_errors_of_a_library_are_told_apart(tmp_path: Path) -> None:
     assert program.library_errors() == []
     program.check_all()
     assert [message.code for message in program.library_errors()] == ["S0201"]
+
+
+def test_whether_a_file_has_another_text_is_told() -> None:
+    program = Program()
+    assert [program.replace("a.st", text) for text in ("", "PROGRAM Main END_PROGRAM", "PROGRAM Main END_PROGRAM", "")] == [
+        True, True, False, True]

@@ -164,3 +164,11 @@ def test_an_input_with_an_edge_has_a_declaration() -> None:
             "IF Up THEN n := n + Level; END_IF;\nEND_FUNCTION_BLOCK\n")
     check_declaration(text, "IF Up", "Up", 4, 2)
     check_declaration(text, "n + Level", "Level", 3, 2)
+
+
+def test_the_member_of_an_enumeration_behind_its_type_has_a_declaration() -> None:
+    program, offset = at_mark("TYPE Mode : (Off, Filling); END_TYPE\n"
+                              "PROGRAM Main VAR m : Mode; END_VAR m := Mode.Fil‸ling; END_PROGRAM\n", "codesys")
+    declared = declared_at(program, "pump.st", offset)
+    assert declared is not None and declared.key == ("member", "", "MODE", "FILLING")
+    assert len(references(program, declared.key)) == 2

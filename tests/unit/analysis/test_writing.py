@@ -87,6 +87,17 @@ def test_completion_in_a_section_offers_types_and_free_addresses(line: str, some
     assert some <= {item.label for item in complete(program, "pump.st", offset)}
 
 
+@each_of("text, offered", [
+    ("PROGRAM Other VAR Level : INT; END_VAR END_PROGRAM\n"
+     "PROGRAM Main VAR x : INT; END_VAR x := Other.‸ END_PROGRAM\n", ["Level"]),
+    ("TYPE S : STRUCT a : INT; END_STRUCT END_TYPE FUNCTION_BLOCK Base VAR deep : S; END_VAR END_FUNCTION_BLOCK\n"
+     "FUNCTION_BLOCK Top EXTENDS Base VAR i : INT; END_VAR i := deep.‸ ; END_FUNCTION_BLOCK\n", ["a"]),
+])
+def test_completion_knows_the_parts_of_programs_and_of_what_is_inherited(text: str, offered: list[str]) -> None:
+    program, offset = at_mark(text, "codesys")
+    assert [item.label for item in complete(program, "pump.st", offset)] == offered
+
+
 def test_what_completion_offers_as_a_type_comes_in_its_order_with_its_kind() -> None:
     program, offset = at_mark("TYPE Own : INT; END_TYPE\nFUNCTION_BLOCK Mine END_FUNCTION_BLOCK\n"
                               "PROGRAM Main\nVAR\n    x : ‸\nEND_VAR\nEND_PROGRAM\n")
