@@ -169,7 +169,9 @@ class NetworkContext:
 
     def in_variable(self, wire: Wire, value: Value) -> Value:
         """The value in a variable of its own; the value itself, with a warning, if its type is not known."""
-        kind = self.scope.wire_type(wire) or self.sink_type(wire)
+        kind = self.scope.wire_type(wire)
+        if not kind and not value.reads.isdisjoint(name.upper() for name in self.memories.values()):
+            kind = self.sink_type(wire)  # later the loop has another value
         if not kind:
             if len(value.text) > LONGEST:
                 raise Unexecutable(wire.source, "it is used in several places, and its type is not known",
