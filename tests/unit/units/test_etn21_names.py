@@ -63,3 +63,24 @@ def test_what_is_described_lies_in_the_words_of_the_unit(number: int) -> None:
     own = {address.number for address in found if address.area == "D"}
     assert own <= set(range(m + 1, m + 100)) and {m + 27 + 10 * area for area in range(8)} <= own
     assert {int(key[1:]) for key in unit.meanings} == {*range(m + 9, m + 17), *(m + 27 + 10 * area for area in range(8))}
+
+
+def test_the_bits_and_words_of_a_socket_and_an_area_are_those_of_the_manuals() -> None:
+    """Status words W420 4-1 p80-82, switches p84, error status p84, parameter areas W421 6-7-4 p117; of unit 1, whose n is 1525
+    and whose m is 30100."""
+    found = Etn21(1).descriptions
+    assert [found.get(f"CIO 1534.{bit:02}", "") for bit in range(16)] == [
+        "TCP Opening Flag", "TCP Receiving Flag", "TCP Sending Flag", "TCP Closing Flag", *[""] * 9, "TCP Data Received Flag", "",
+        "TCP Open Flag"]  # fmt: skip
+    assert [found.get(f"CIO 1527.{bit:02}", "") for bit in (0, 4, 15)] == ["UDP Opening Flag 2", "", "UDP Open Flag 2"]
+    assert [found.get(f"CIO 1544.{bit:02}", "") for bit in range(16)] == [
+        f"{name} Request Switch{number}" if name else "" for number in ("", " 2")
+        for name in ("UDP Open", "TCP Passive Open", "TCP Active Open", "Send", "Receive", "Close", "", "")]  # fmt: skip
+    assert [found.get(f"CIO 1543.{bit:02}", "") for bit in range(16)] == [
+        "", "", "IP Address Setting Error", "IP Address Table Error", "IP Router Table Error", "DNS Server Error",
+        "Routing Table Error", "", "", "", "", "SNTP Server Error", "SMTP Server Error", "POP Server Error",
+        "Address Disagreement", "EEPROM Error"]  # fmt: skip
+    assert [found.get(f"D{word}", "") for word in range(30118, 30129)] == [
+        "Option and Socket Number", "Local Port", "Remote IP Address, high", "Remote IP Address, low", "Remote Port",
+        "Number of Bytes to Send or Receive", "Send or Receive Data Address, high", "Send or Receive Data Address, low",
+        "Time-out Value", "Response Code", "Option and Socket Number 2"]  # fmt: skip
