@@ -26,7 +26,10 @@ from fbvm.testing.pytest_process import run_pytest
 PROGRAM, GIVEN, TEXT, SOLUTION = "program.st", "given.st", "lesson.md", "solution"
 OF_THE_LEARNER = (PROGRAM, ANSWERS)
 DONE = ".done"
-QUIET = ("-q", "-rN", "--tb=short", "--import-mode=importlib", "-p", "no:cacheprovider", "--fbvm-no-warn", "all")
+QUIET = ("-q", "-rN", "--tb=short", "--import-mode=importlib", "-p", "no:cacheprovider", "-p", "no:hypothesispytest",
+         "--fbvm-no-warn", "all")  # fmt: skip
+"""Without the plugin of hypothesis, where that is installed: it imports all of hypothesis at the end of a session, which takes
+a fifth of the time of a check."""
 WORDS = ("-p", "fbvm.testing.course.words")
 PREDICTION = "test_prediction"
 

@@ -25,9 +25,11 @@ from fbvm.testing.course.lessons import (
     PROGRAM,
     Lesson,
     answer,
+    check,
     check_class,
     is_done,
     lessons,
+    prediction_mistake,
     program_mistakes,
     questions,
 )
@@ -102,6 +104,21 @@ def test_solutions_pass_and_what_is_given_does_not(tmp_path: Path) -> None:
     for names in failed.values():
         assert "test_prediction" in names
         assert len(names) > 1
+
+
+def test_no_check_waits_for_plugins_that_lessons_do_not_need(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sessions: list[list[str]] = []
+
+    def begun(arguments: list[str], cwd: Path | None = None, quiet: bool = False) -> int:
+        sessions.append(arguments)
+        return 0
+
+    monkeypatch.setattr("fbvm.testing.course.lessons.run_pytest", begun)
+    first = lessons()[0]
+    first.begin(tmp_path)
+    assert (prediction_mistake(first, tmp_path), check(first, tmp_path), program_mistakes(first, tmp_path)) == ("", 0, [])
+    assert len(sessions) == 3 and all("no:hypothesispytest" in arguments for arguments in sessions)
+    assert not any("hypothesis" in path.read_text(encoding="utf-8") for path in first.folder.parent.rglob("*.py"))
 
 
 @pytest.mark.slow
