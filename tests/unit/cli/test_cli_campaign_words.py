@@ -13,9 +13,11 @@ import click
 import pytest
 from rows import each_of
 
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.campaign.fleet.shard import Figures
 from fbvm.campaign.judge import Failure
-from fbvm.cli.projects import campaign, fleet, mutate
+from fbvm.campaign.work import Mismatch, Unreachable
+from fbvm.cli.projects import campaign, fleet, mutate, planned_runs
 from fbvm.cli.shared import status
 
 # --- fleets -----------------------------------------------------------------------------------------------------------
@@ -267,6 +269,46 @@ def test_one_run_is_told_with_what_was_drawn_for_it(failure: Failure | None, rep
         assert said == lines
         with pytest.raises(click.UsageError, match="--only 5: there are runs 0 to 4"):
             campaign._execute_one(bench, 5, folder)
+
+
+@each_of("error, ended", [(Unreachable("no scheduler"), status.NETWORK), (Mismatch("another version"), status.NETWORK)])
+def test_a_cluster_that_cannot_be_used_ends_the_verbs(error: Exception, ended: int) -> None:
+    said: list[str] = []
+
+    def fails(*_: object) -> None:
+        raise error
+
+    store = SimpleNamespace(known=(), close=lambda: said.append("closed"))
+    outcome: Any = SimpleNamespace(plan=outcome_of().plan, add=lambda found: None)
+    options = {"write_golden": False, "only": None, "folder": Path("out"), "fresh": False, "json_lines": False, "jobs": 1,
+               "cluster": "auto", "parquet_file": None}  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign, "bench_of_tests", lambda *_: (SimpleNamespace(plan=outcome.plan, mark=""), Path()))
+        patch.setattr("fbvm.campaign.runs.Outcome", lambda plan: outcome)
+        patch.setattr(campaign, "_open", lambda *_: store)
+        patch.setattr(campaign, "ShownProgress", lambda *_: None)
+        patch.setattr(campaign, "_conduct", fails)
+        patch.setattr(campaign, "_finish", lambda *_: said.append("finished"))
+        for module in (campaign, mutate):
+            patch.setattr(module, "say", lambda text, **style: said.append(text))
+        with pytest.raises(SystemExit) as exit_:
+            campaign.command.callback((), None, (), False, **options)  # type: ignore[misc]
+        assert (exit_.value.code, said) == (ended, ["finished", "closed", str(error)])
+
+
+def test_what_is_wrong_with_the_files_of_a_campaign_ends_it(capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = Diagnostic("S0201", Source("a.st", "x := 1;"), 0, 1, "x is not declared")
+    with pytest.raises(SystemExit) as ended:
+        planned_runs.refuse([wrong])
+    assert ended.value.code == status.PROGRAM_ERRORS
+    shown = capsys.readouterr()
+    assert "S0201" in shown.out + shown.err and "x is not declared" in shown.out + shown.err
+
+
+def test_processes_are_as_many_as_processors_or_as_one_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    for count, jobs, made in ((8, None, 8), (8, 3, 3), (None, None, 1)):
+        monkeypatch.setattr("os.cpu_count", lambda count=count: count)
+        assert planned_runs.processes(jobs) == made
 
 
 # --- mutants ----------------------------------------------------------------------------------------------------------

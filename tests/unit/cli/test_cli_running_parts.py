@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -15,7 +16,10 @@ from images import counter_image
 from rows import each_of
 
 from fbvm.cli.running import live, peer, run, serve
+from fbvm.cli.shared.debug import launch
 from fbvm.cli.shared.files import OutputError
+from fbvm.cli.shared.live import page
+from fbvm.cli.shared.run_result import RunResult
 from fbvm.machine.plc import Plc
 from fbvm.net.notices import Notice, NoticeKind
 from fbvm.wire import registers
@@ -113,6 +117,21 @@ def test_the_memory_is_saved_when_a_signal_asks_and_at_the_end(plc: Plc, ends: l
         served = Served(patch, signals, *ends)
         assert serve._serve(plc, "", signals, None, Path(image), lambda: None) == (reason, good)
         assert served.saved == [Path(image)] * saves and not signals.save
+
+
+@each_of("wants_end, heard, runs", [(True, [""], 1), (False, ["", "end"], 2)])
+def test_a_debugger_that_wants_the_end_has_it(plc: Plc, wants_end: bool, heard: list[str], runs: int) -> None:
+    served: list[str] = []
+
+    def serving(debugged: Any, meanwhile: Any) -> bool:
+        served.extend(each.name for each in debugged())
+        return wants_end
+
+    with pytest.MonkeyPatch.context() as patch:
+        stand_in = Served(patch, signals := serve.Signals(), *[("", each) for each in heard])
+        debugging = cast(Any, SimpleNamespace(is_called=False, serve=serving))
+        assert serve._serve(plc, "", signals, debugging, Path("image"), lambda: None) == ("", True)
+    assert served == ["plc"] * runs and stand_in.saved == [Path("image")] and signals.end
 
 
 def test_a_run_that_a_trap_has_ended_at_the_start_is_not_begun(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,6 +236,40 @@ def test_a_run_under_a_page_has_the_options_of_a_run(monkeypatch: pytest.MonkeyP
         run._run_live(counter_image(), 1, (), files=(Path("a.st"),), program=None, libraries=(), **wrong)
     with pytest.raises(click.UsageError, match="nowhere"):
         served[1][0].bound(plc)
+
+
+@each_of("reason, ended", [("", False), ("trap", False), ("scans", True), ("until", True), ("interrupted", True)])
+def test_what_a_page_takes_for_ended(reason: str, ended: bool) -> None:
+    assert page._has_ended(cast(Any, SimpleNamespace(reason=reason))) is ended
+
+
+# --- what a debugger and an import are given -----------------------------------------------------------------------------
+
+
+def test_a_folder_with_a_project_file_and_the_file_itself_are_projects(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "plant").mkdir()
+    (tmp_path / "plant" / "fbvm.toml").write_text("", encoding="utf-8")
+    assert [launch._is_project(tmp_path / name) for name in ("empty", "plant", "plant/fbvm.toml", "none", "a.st")] == [
+        False, True, True, False, False]
+
+
+def test_the_name_of_an_encoding_is_taken_in_any_spelling() -> None:
+    verb = import_module("fbvm.cli.programs.import")
+    assert [verb._encoding(name) for name in ("", "CP932", "UTF8")] == ["", "cp932", "utf-8"]
+    with pytest.raises(click.BadParameter, match="cp9321 is no encoding"):
+        verb._encoding("cp9321")
+
+
+@pytest.mark.parametrize("scan_time", [True, False])
+def test_how_long_scans_took_is_no_part_of_the_result(plc: Plc, scan_time: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    plc.scan_times.note(0, 1_000_000)
+    result = RunResult(plc, "scans", {}, None, False, "", scan_time)
+    result.print()
+    assert capsys.readouterr() == ("", f"{plc.scan_times}\n" if scan_time else "")
+    plc.lateness.note(0, 5)
+    result.print()
+    assert capsys.readouterr().err == (f"{plc.scan_times}\n{plc.lateness}\n" if scan_time else "")
 
 
 # --- the peer ---------------------------------------------------------------------------------------------------------
