@@ -68,6 +68,14 @@ def test_a_store_elsewhere_that_is_here_too_is_seen(change: Block, wanted: int) 
     assert rig.trap is None and (rig.slot("i16", 4), rig.slot("i16", 6)) == (5, wanted)
 
 
+def test_a_store_of_what_is_held_itself_is_seen_in_what_overlaps_it() -> None:
+    high, low = load("u8", 1), load("u8", 0)
+    code = (store("i16", 0, const("i16", 5)), store("i16", 4, X), store("u8", 1, const("u8", 1)), store("u8", 9, high),
+            store("u8", 11, high), store("i16", 6, X), store("u8", 13, low))  # fmt: skip
+    rig = execute(code)
+    assert [rig.slot("i16", 4), rig.slot("i16", 6), rig.slot("u8", 9), rig.slot("u8", 13)] == [5, 256 + 5, 1, 5]
+
+
 def test_a_call_is_seen_with_all_that_the_body_calls() -> None:
     deep = (("store", "i16", at(0), const("i16", 30)),)
     code = (store("i16", 0, const("i16", 5)), store("i16", 2, const("i16", 6)), ("call", 1, own(0)), store("i16", 4, X),
