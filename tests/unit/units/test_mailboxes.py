@@ -187,6 +187,7 @@ def test_what_a_library_cannot_mean(tmp_path: Path) -> None:
         ("global = ['A.st']", "did you mean globals?"), ("by_dialects = true", "did you mean by_dialect?"),
         ("spaces = 'Standard'", "spaces must be a list of names"), ("by_dialect = 'yes'", "by_dialect must be true or false"),
         ("writes = ['X']", "writes must be a list of areas"), ("globals = [1]", "globals must be a list of file names"),
+        ("lists = ['gone.st']", "gone.st cannot be read"), ("task = 5", "task must be the name of a function"),
         ("[pins]\nA = 1", "pins has for each POU a table"), ("x =", "Invalid value"),
     ):
         (tmp_path / "library.toml").write_text(text, encoding="utf-8")
