@@ -237,3 +237,10 @@ def test_memory_is_written_up_to_its_last_byte(tmp_path: Path) -> None:
         else:
             with pytest.raises(RefusedError, match="outside of the memory"):
                 client.ask("writeMemory", **arguments)
+
+
+def test_what_is_put_out_ends_with_one_line_end() -> None:
+    client = Client()
+    for text in ("a", "b\n", ""):
+        client.adapter._output(text)
+    assert [row["output"] for row in client.events("output")] == ["a\n", "b\n", "\n"]

@@ -104,3 +104,10 @@ def test_pages_are_told_and_a_restart_ends_the_run(edited: Edited) -> None:
 def test_a_page_that_may_only_look_does_not_restart(edited: Edited) -> None:
     page = Page(changes=edited.changes, read_only=True)
     assert "only look" in page.ask("restart")["error"]
+
+
+def test_so_many_mistakes_are_told_and_no_more(edited: Edited) -> None:
+    rows = [f"n := missing{number};" for number in range(60)]
+    edited.save("\n".join(["PROGRAM Main VAR n : INT; END_VAR", *rows, "END_PROGRAM\n"]))
+    state = edited.state()
+    assert state is not None and [row["line"] for row in state["mistakes"]] == list(range(2, 52)) and not state["ready"]
