@@ -340,12 +340,15 @@ def test_what_is_no_ladder_protected_or_in_no_task_is_told() -> None:
     text = SAMPLE.text
     for changed, code, words in (
             (text.replace("IEC1131Type:=11;", "IEC1131Type:=12;", 1), "X0203", "section Pumping is not taken over"),
-            (text.replace('"FBLadder"', '"FBSt"'), "X0203", "its body is no ladder (FBSt)"),
+            (text.replace('"FBLadder"', '"FBSt"'), "X0203",
+             "function block DOUBLE: the function block is not taken over: its body is no ladder (FBSt)"),
             (text.replace("TaskID:=256;", "TaskID:=140;"), "X0190", "interrupt task 140"),
             (text.replace("TaskID:=256;", "TaskID:=-1;"), "X0190", "given to no task"),
             (text.replace("1,X,1,", "3,X,1,"), "X0203", "usage 3")):  # fmt: skip
         made = import_project(changed.encode(), "line.cxt")
         assert any(d.code == code and words in d.message for d in made.diagnostics), words
+        marked = [d.source.text[d.start : d.end] for d in made.diagnostics]
+        assert all(text == text.rstrip() and len(text) <= 80 and "\n" not in text for text in marked)
 
 
 @each_of(("task", "why"), [(0, "it belongs to interrupt task 0,"), (-1, "it is given to no task"), (255, "interrupt task 255")])

@@ -493,7 +493,8 @@ WRONG: dict[str, tuple[str, str, str, str]] = {  # body, language, declared, mes
     "an element of charts": (TWO + '<step localId="4" name="s"/>', "LD", "a x", "step stands in a body of LD"),
     "two of one number": (TWO + contact(2, "1", "x"), "LD", "a x", "localId 2 is there twice"),
     "two connectors": (TWO + f'<connector localId="4" name="far">{wires("2")}</connector>'
-                       f'<connector localId="5" name="FAR">{wires("2")}</connector>', "LD", "a x",
+                       f'<connector localId="5" name="FAR">{wires("2")}</connector>'
+                       '<continuation localId="6" name="far"/>' + coil(7, "6", "x"), "LD", "a x",
                        "there are two connectors FAR"),
     "a block without a type": (TWO + '<block localId="4"><inputVariables/><outputVariables/></block>', "LD", "a x",
                                "<block> has no typeName"),
@@ -508,3 +509,4 @@ def test_what_is_wrong_with_an_element_is_said_where_it_stands(what: str) -> Non
     body, language, declared, message = WRONG[what]
     made = imported(pou(body, declared, language=language))
     assert codes(made) and any(message in error.message for error in made.errors), [each.message for each in made.diagnostics]
+    assert "was not taken over" in made.files["Main.st"]

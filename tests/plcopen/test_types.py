@@ -8,8 +8,14 @@ from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.plcopen.read.scope import _library_pins
 from fbvm.interchange.plcopen.read.types import duration
 from fbvm.interchange.plcopen.write.exporting import export_xml
+
+
+def test_types_of_pins_are_those_of_the_library() -> None:
+    assert _library_pins("TON") == {"IN": "BOOL", "PT": "TIME", "Q": "BOOL", "ET": "TIME"}
+    assert _library_pins("NOBODY") == {}
 
 
 @each_of(("written", "meant"), [

@@ -175,6 +175,8 @@ class _DiagramReader:
             if joined is None:
                 self.reading.report("X0201", source.element, f"there is no connector {source.text}")
                 return False
+            if joined.broken:  # of two of one name nobody knows which is meant
+                return False
             source = joined
         elif source.kind == "block":
             found = self._output(source, name, at)
