@@ -79,11 +79,11 @@ SEEDS = [
     "2262-04-11-23:47:16.854775808", "LDT#1970-01-01-00:00", "STRING#'a'", "", " ", "#", "INT#", "INT#x", "_1", "1_",
 ]  # fmt: skip
 MORE = """
-    1. 1.e5 .5 1e 1e+ 1E-5x 1.5_0 1_ 1__0 1_.5 2.5e1_0 1e5_ +5 -5 + - +-1 --1 127 128 -129 256 32767 32768 -32768 -32769
-    65535 -2147483648 2147483648 -2147483649 4294967295 -1 9223372036854775807 16#7F 16#80 16#FF_FF 16#8000 16# 16#G 16#_F
-    16#F_ 2#2 2# 8#8 10#1 10#1_000 10# 10#_1 10#A 10#1.5 10#18446744073709551616 -10#5 REAL#10#5 1#0 +16#1 -16#1 26#1 3#1
-    16#7FFFFFFFFFFFFFFF 16#FFFFFFFFFFFFFFFF 16#10000000000000000 2#1_1 BOOL#1 BOOL#TRUE bool#2 2 TRUEX TRU REAL#1.0
-    REAL#16#10 LREAL#INF INT#INF DINT#5 ULINT#5 3.4028235677973365e38 3.4028235677973366e38 1.7976931348623157e308
+    16#1 16#0 2#1 1. 1.e5 .5 1e 1e+ 1E-5x 1.5_0 1_ 1__0 1_.5 2.5e1_0 1e5_ +5 -5 + - +-1 --1 127 128 -129 256 32767 32768
+    -32768 -32769 65535 -2147483648 2147483648 -2147483649 4294967295 -1 9223372036854775807 16#7F 16#80 16#FF_FF 16#8000
+    16# 16#G 16#_F 16#F_ 2#2 2# 8#8 10#1 10#1_000 10# 10#_1 10#A 10#1.5 10#18446744073709551616 -10#5 REAL#10#5 1#0 +16#1
+    -16#1 26#1 3#1 16#7FFFFFFFFFFFFFFF 16#FFFFFFFFFFFFFFFF 16#10000000000000000 2#1_1 BOOL#1 BOOL#TRUE bool#2 2 TRUEX TRU
+    REAL#1.0 REAL#16#10 LREAL#INF INT#INF DINT#5 ULINT#5 3.4028235677973365e38 3.4028235677973366e38 1.7976931348623157e308
     1.7976931348623159e308 16#20000000000001 16#20000000000003 16#7FFFFFFFFFFFFC00 16#FFFFFFFFFFFFF800 0e0 00012 -0.0e5 NANX
     +NAN 1d1d 1h1d 1s500ms 1.5m2s 1m2.5s 1us1ns 1ms1ms 5 1x 1ds 1msx d _1d 1_d 1d_2h 1d__2h -_5s 1.s 1._5s 1.5_0s 0.5ns
     0.1ns 0.001us 1.0000000000000001s 0.3333333333333333d 106751d 106752d 2562047h 2562048h 9223372036854775808ns
@@ -98,6 +98,9 @@ MORE = """
     1111111111111111111s 0.555555555555555555555555555555
 """
 SEEDS += [*MORE.split(), "CHAR#'a'", "WSTRING#\"a\"", "a" * 401, "0" * 401]
+ALIKE = {"USINT", "UINT", "UDINT", "BYTE", "WORD", "DWORD", "INT", "DINT", "LTIME", "LDATE", "LTIME_OF_DAY", "LTOD", "LDT", "DT",
+         "LDATE_AND_TIME", "TOD"}
+"""Types that the routines read as another one, but for the range: every third text will do."""
 LETTERS = st.sampled_from("0123456789_.-+:#eEdhmsnuTDOLFAIR x\xff")
 EDITS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 2), LETTERS), max_size=3)
 
@@ -113,8 +116,8 @@ def edited(seed: str, edits: list[tuple[int, int, str]]) -> bytes:
 @pytest.mark.slow
 @each_of("data_type", TYPES)
 def test_every_seed_is_read(data_type: str) -> None:
-    seen = {seed: read(data_type, seed.encode()) for seed in SEEDS}
-    assert seen == {seed: wanted(data_type, seed.encode()) for seed in SEEDS}
+    seeds = SEEDS[:: 3 if data_type in ALIKE else 1]
+    assert {seed: read(data_type, seed.encode()) for seed in seeds} == {seed: wanted(data_type, seed.encode()) for seed in seeds}
 
 
 OUT = ctypes.create_string_buffer(reading.CLEANED + reading.LONGEST + 8)
@@ -139,11 +142,6 @@ def rounded(data_type: str, bits: int) -> int:
     """The bits of a double behind the rounding to REAL, if that is the type."""
     value: float = struct.unpack("<d", bits.to_bytes(8, "little"))[0]
     return bits_of(data_type, single(value)) if data_type == "REAL" else bits
-
-
-ALIKE = {"USINT", "UINT", "UDINT", "BYTE", "WORD", "DWORD", "INT", "DINT", "LTIME", "LDATE", "LTIME_OF_DAY", "LTOD", "LDT", "DT",
-         "LDATE_AND_TIME", "TOD"}
-"""Types that the routines read as another one, but for the range: every third text will do."""
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import click
 import pytest
+from click.testing import CliRunner
 from images import counter_image
 from rows import each_of
 
@@ -236,6 +237,24 @@ def test_a_run_under_a_page_has_the_options_of_a_run(monkeypatch: pytest.MonkeyP
         run._run_live(counter_image(), 1, (), files=(Path("a.st"),), program=None, libraries=(), **wrong)
     with pytest.raises(click.UsageError, match="nowhere"):
         served[1][0].bound(plc)
+
+
+@each_of("options, said", [
+    (["--frame", "nonsense"], "--frame nonsense: write a scheme or an origin"), (["--frame", "vscode-webview:"], ""),
+    (["--frame", "http://127.0.0.1:8080"], ""), (["--debug", "0", "--trace", "t"], "--debug looks into scans itself"),
+    (["--debug", "0"], ""), (["--trace", "t"], ""),
+    (["--door", "1502", "--net", "loop"], "leave memory: add --net tcp"),
+])
+def test_options_of_a_page_that_do_not_go_together(options: list[str], said: str, tmp_path: Path) -> None:
+    file, served = tmp_path / "a.st", []
+    file.write_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM", encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(live, "check_live_installed", lambda: None)
+        patch.setattr(live, "serve_page", lambda origin, control, options, recording: served.append(options))
+        result = CliRunner().invoke(live.command, [str(file), *options])
+    assert (result.exit_code, len(served)) == ((2, 0) if said else (0, 1)), result.output
+    assert said in result.output
+    assert not served or served[0].frames == tuple(options[1:]) * ("--frame" in options)
 
 
 @each_of("reason, ended", [("", False), ("trap", False), ("scans", True), ("until", True), ("interrupted", True)])

@@ -11,6 +11,7 @@ import pytest
 from depth import times
 from rows import each_of
 
+from fbvm.base import strings
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.library import routines
 
@@ -97,6 +98,69 @@ def test_a_part_calls_only_parts_before_it() -> None:
     assert parts_of([]) == [] and parts_of(["put_real"]) == [0] and parts_of(["read_value", "put_real"]) == [0, 1]
     assert len({name for part in range(len(PARTS)) for name in routines_of(part)}) == sum(
         len(routines_of(part)) for part in range(len(PARTS)))
+
+
+# --- bytes and characters -----------------------------------------------------------------------------------------------
+
+
+WIDE = ["", "a", "ab", "a\xe9", "a\u20acb", "\U0001f600", "a\U0001f600b\U0001f600", "\ud83d", "\ud83dx", "\ude00\ud83d",
+        "\ud83d\ud83d\ude00", "b"]
+
+
+def at(content: bytes) -> int:
+    """The address of bytes that stay for the test's time."""
+    KEPT.append(ctypes.create_string_buffer(content, len(content) + 8))
+    return ctypes.addressof(KEPT[-1])
+
+
+KEPT: list[Any] = []
+
+
+@each_of("text", WIDE)
+def test_characters_of_two_bytes_are_counted_as_the_python_engine_counts_them(text: str) -> None:
+    units = text.encode("utf-16-le", "surrogatepass")
+    count, place = len(units) // 2, at(units)
+    assert routines.wide_length(place, 40) == count and routines.wide_length(place, 1) == min(count, 1)
+    assert routines.wide_characters(place, count) == strings.characters(strings.units(units))
+    for number in range(-1, count + 2):
+        assert routines.wide_units(place, count, number) == strings.units_of(strings.units(units), number), number
+
+
+def sign(number: int) -> int:
+    return (number > 0) - (number < 0)
+
+
+@pytest.mark.parametrize("width", [1, 2])
+def test_texts_are_ordered_by_their_codes(width: int) -> None:
+    form, routine = (("latin-1", routines.text_order), ("utf-16-le", routines.wide_order))[width - 1]
+    texts = ["", "a", "b", "ab", "ac", "abc", "\xff", "a\xff"] + (["\u0161", "a\u0100"] if width == 2 else [])
+    for one in texts:
+        for other in texts:
+            a, b = one.encode(form), other.encode(form)
+            order = routine(at(a), len(one), at(b), len(other))
+            assert sign(order) == (one > other) - (one < other), (one, other)
+
+
+def test_characters_are_made_wide_and_narrow() -> None:
+    out = at(bytes(16))
+    assert routines.widen(out, at(b"a\xe9"), 2) == 2 and ctypes.string_at(out, 5) == b"a\0\xe9\0\0"
+    assert routines.narrow(out, at("a\u20ac\xe9".encode("utf-16-le")), 3) == 3 and ctypes.string_at(out, 3) == b"a?\xe9"
+
+
+@each_of("count, stride, size", [(1, 2, 2), (1, 4, 4), (3, 8, 8), (2, 3, 3), (2, 8, 2), (0, 2, 2), (3, 5, 1)])
+def test_bytes_of_items_are_reversed(count: int, stride: int, size: int) -> None:
+    content = bytearray(range(1, 41))
+    place = at(bytes(content))
+    assert routines.reverse_items(place, count, stride, size) == 0
+    for item in range(count):
+        content[item * stride : item * stride + size] = content[item * stride : item * stride + size][::-1]
+    assert ctypes.string_at(place, 40) == content
+
+
+@each_of("number", [0, 1, 9, 10, 99, 100, 12345678, 10**16 - 1])
+def test_decimal_digits_are_nibbles(number: int) -> None:
+    assert routines.bcd_digits(number) == int(str(number), 16) and routines.bcd_number(int(str(number), 16)) == number
+    assert routines.bcd_number(int(str(number), 16) & ~15 | 10) == -1
 
 
 # --- search -----------------------------------------------------------------------------------------------------------
