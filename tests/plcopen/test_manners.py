@@ -28,6 +28,14 @@ ROWS: dict[str, tuple[str, list[Scan]]] = {
         ({}, [False, 0, 0, 0, False, 0]), ({"MAIN.bStart": True}, [True, 10, 2, 0, False, 0]),
         ({"MAIN.bStart": False}, [True, 10, 4, 0, True, 20]), ({}, [True, 10, 6, 1, True, 20]), ({}, [True, 10, 2, 1, True, 20]),
         ({"MAIN.bStop": True}, [False, 0, 2, 1, False, 0])]),
+    # OpenPLC Editor until 2025: outputs in the order of the document, although a rung is drawn above; a sum that feeds itself.
+    "openplc": ("%QX0.0 instance0.relay instance0.late instance0.n", [
+        ({}, [False, False, False, 2]), ({"%IX0.0": True}, [False, True, False, 4]), ({}, [True, True, False, 6]),
+        ({}, [True, True, True, 8]), ({"%IX0.0": False}, [True, False, False, 10]), ({}, [False, False, False, 12])]),
+    # The newer editor: the namespace twice, scaling 16, outputs and blocks from top to bottom.
+    "openplc_editor": ("%QX0.0 instance0.relay instance0.late instance0.n", [
+        ({}, [False, False, False, 2]), ({"%IX0.0": True}, [True, True, False, 4]), ({}, [True, True, False, 6]),
+        ({}, [True, True, True, 8]), ({"%IX0.0": False}, [False, False, False, 10]), ({}, [False, False, False, 12])]),
     # pouInstance type=, an interval as a time of day, executionId, a block changes its in-out before a variable takes it.
     "tc6_101": ("tank1.level tank1.done tank1.was", [
         ({}, [25, False, 25]), ({"tank1.valve": True}, [50, False, 50]), ({}, [75, False, 75]), ({}, [100, True, 100]),

@@ -75,6 +75,9 @@ _LIBRARIES = (
     (r"FB_SQL\w+|FB_PLCDB\w+", "TwinCAT's Tc3_Database"),
     (r"FB_MB(?:Read|Write|Diagnose)\w*", "TwinCAT's Tc2_ModbusSrv"),
     (r"Button|Led|TextCtrl|GetBoolString", "the svgui of older versions of Beremiz"),
+    (r"CLOUD_(?:BEGIN|ADD_\w+)|DS18B20(?:_[2-5]_OUT)?|PWM_CONTROLLER|ADC_CONFIG|(?:ARDUINO|STM32)CAN_\w+|P1AM_INIT|P1_\d\w+|"
+     r"MQTT_(?:(?:DIS)?CONNECT(?:_AUTH)?|RECEIVE|SEND|(?:UN)?SUBSCRIBE)|SM_(?:\d+\w+|BAS|HOME|INDUSTRIAL|RTD)|"
+     r"TCP_(?:CLOSE|CONNECT|RECEIVE|SEND)", "OpenPLC Editor's libraries for boards, CAN, MQTT and TCP"),
     (r"FB_(?:EcSoE|EcCoE|EcGet|EcSet|EcMaster)\w*|ST_Ec\w+|Tc2_EtherCAT", "TwinCAT's Tc2_EtherCAT"),
     (r"FB_Json\w+|SJsonValue|SJsonAIterator", "TwinCAT's Tc3_JsonXml"),
     (r"FB_TcMessage|FB_TcAlarm|FB_TcEvent|TcEventSeverity|TcEventEntry|I_TcMessage|I_TcSourceInfo", "TwinCAT's Tc3_EventLogger"),
