@@ -105,6 +105,7 @@ class Dialect:
     jumps_in_text: bool = False
     exceptions: bool = False
     conditional_returns: bool = False
+    empty_structures: bool = False
     bounds_are_not_compared: bool = False
     persistent_parameters: bool = False
     constant_inputs_are_written: bool = False
@@ -250,6 +251,7 @@ QUESTIONS = {
                                     "an error (S0501)", "written, as any other input"),
     "bounds_are_not_compared": ("a := b, where a is ARRAY[0..9] and b is ARRAY[1..10] of the same type", "an error (S0301)",
                                 "the elements are copied in their order"),
+    "empty_structures": ("p : Point := ()", "an error (S0101)", "as without an initial value"),
     "conditional_returns": ("RETURN(done); with parentheses around the whole value", "the result is done, and the POU is left",
                             "the POU is left if done is TRUE, with the result that it has"),
     "constant_in_outs_take_texts": ("F('abc'), where F declares VAR_IN_OUT CONSTANT s : STRING", "an error (S0407)",
@@ -301,7 +303,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
                    own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
                    conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
-                   bounds_are_not_compared=True,
+                   bounds_are_not_compared=True, empty_structures=True,
                    short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (

@@ -246,5 +246,8 @@ class TypeLayout(StatementLayout):
     def struct_init(self, opener: Token, fields: list[Phrase], closer: Token) -> Phrase:
         return Phrase(opener.start, self.leaf(opener), self.listed(fields), self.closer(closer), level="list")
 
+    def empty_struct(self, opener: Token, closer: Token) -> Phrase:
+        return Phrase(opener.start, self.leaf(opener), self.leaf(closer))
+
     def struct_field(self, token: Token, sign: Token, value: Phrase) -> Phrase:
         return self.argument_named(token, sign, value)

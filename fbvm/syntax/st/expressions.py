@@ -221,6 +221,11 @@ class Expressions(Builder):
         self.deepen_over(node, [value for _, value in fields])
         return node
 
+    def empty_struct(self, opener: Token, closer: Token) -> StructInit:
+        self.forms.append(Form("empty_structures", opener.start, closer.end, (
+            "S0101", "() is no initial value", "leave it out: what has no initial value begins with that of its type")))
+        return StructInit(opener.start, closer.end, ())
+
     def deepen_over(self, node: Expr, values: list[Expr]) -> None:
         """Note the depth of a new node over any number of parts."""
         deepest = max(values, key=self.depth, default=None)
