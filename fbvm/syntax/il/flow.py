@@ -20,10 +20,11 @@ class Needs(NamedTuple):
     behind: list[bool]
 
 
-def needs(instructions: Sequence[Instruction]) -> Needs:
-    """Where the current result is needed: where some way on leads to an instruction that uses it before one replaces it."""
+def needs(instructions: Sequence[Instruction], at_end: bool) -> Needs:
+    """Where the current result is needed: where some way on leads to an instruction that uses it before one replaces it, or to
+    the end of the list, if it is needed `at_end`."""
     labels = {fold(each.label.text): at for at, each in enumerate(instructions) if each.label is not None}
-    front = [False] * (len(instructions) + 1)
+    front = [False] * len(instructions) + [at_end]
     while True:
         before = list(front)
         behind = [_behind(at, each, front, labels) for at, each in enumerate(instructions)]

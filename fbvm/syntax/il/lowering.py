@@ -6,6 +6,7 @@ what it was computed from may change before, a temporary keeps its value.  Jumps
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -29,6 +30,10 @@ _OPERANDS = (tree.NameRef | tree.Literal | tree.Member | tree.Index | tree.Part 
              | tree.NullLiteral)  # fmt: skip
 RUNGS_STAND = "rungs stand between LADDER and END_LADDER"
 _RUNG_WORDS = {"OUT", "OUTNOT", "LDNOT", "ANDNOT", "ORNOT", "TIM", "CNT", "ANDLD", "ORLD", "KEEP", "DIFU", "DIFD"}
+
+
+_BEHIND_CONDITION = re.compile(r"(?is)(?:\s|//[^\n]*|\(\*.*?\*\))*END_TRANSITION\b")
+"""What stands behind a list whose last current result is the condition of a transition."""
 
 
 class InstructionError(Exception):
@@ -79,7 +84,7 @@ class ListLowering:
 
     def lower(self, instructions: list[Instruction], start: int, end: int) -> InstructionList:
         """The node of the list from `start` to `end`; what cannot be executed is reported to the builder."""
-        needed = needs(instructions)
+        needed = needs(instructions, bool(_BEHIND_CONDITION.match(self.builder.source.text, end)))
         for at, each in enumerate(instructions):
             if each.label is not None:
                 self.needed_at[fold(each.label.text)] = needed.front[at]
