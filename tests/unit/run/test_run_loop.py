@@ -5,7 +5,6 @@ The host's clock is a stand-in that never waits.
 
 from __future__ import annotations
 
-import gc
 import heapq
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -295,35 +294,49 @@ def test_many_plcs_are_switched_on_one_after_another(clock: Clock) -> None:
     assert all(run.plc.lateness.missed == 0 for run in runs)
 
 
-def frozen_between_scans(clock: Clock) -> list[int]:
-    """How many objects the garbage collector left alone behind each scan of eight PLCs that make an object in each."""
-    plcs, network, kept, made = [Plc(counter_image(), 100 * MS) for _ in range(8)], RealNetwork(clock), [], []
+class Collector:
+    """Stands in for the module `gc`, of which the loop is told that so many objects are frozen."""
+
+    def __init__(self, frozen: int) -> None:
+        self.frozen, self.calls = frozen, list[str]()
+
+    def get_freeze_count(self) -> int:
+        return self.frozen
+
+    def freeze(self) -> None:
+        self.calls.append("freeze")
+
+    def unfreeze(self) -> None:
+        self.calls.append("unfreeze")
+
+
+def freezes_up_to_scans(clock: Clock, monkeypatch: pytest.MonkeyPatch, collector: Collector) -> list[int]:
+    """How often what is there was kept from the garbage collector up to each scan of eight PLCs, 40 of each."""
+    monkeypatch.setattr(loop, "gc", collector)
+    plcs, network, calls = [Plc(counter_image(), 100 * MS) for _ in range(8)], RealNetwork(clock), list[int]()
     for plc in plcs:
         plc.attach(Idle(), network)
 
     def between() -> bool:
-        made.append([len(made)])
-        kept.append(gc.get_freeze_count())
+        calls.append(len(collector.calls))
         return False
 
     run_all([Running(plc, for_ns=4_000 * MS, phase_ns=number * 10 * MS) for number, plc in enumerate(plcs)], until=between)
-    return kept
+    assert len(calls) == 8 * 40
+    return calls
 
 
-def test_the_garbage_collector_leaves_alone_what_plcs_make_when_they_are_switched_on(clock: Clock) -> None:
-    gc.unfreeze()
-    kept = frozen_between_scans(clock)
-    after = gc.get_freeze_count()
-    gc.freeze()
-    assert after == 0 and len(kept) == 8 * 40
-    assert 0 < kept[0] < kept[8] < kept[40] < kept[80], "each of the first ten scans of each PLC adds what it has made"
-    assert max(kept[100:]) == kept[100], "but what is made later may become garbage"
+def test_the_garbage_collector_leaves_alone_what_plcs_make_when_they_are_switched_on(
+        clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    calls = freezes_up_to_scans(clock, monkeypatch, collector := Collector(0))
+    assert calls[:80] == list(range(2, 82)), "behind each of the first ten scans of each PLC"
+    assert calls[88:] == [calls[88]] * 232, "but what is made later may become garbage"
+    assert collector.calls == ["freeze"] * calls[-1] + ["unfreeze"]
 
 
-def test_what_the_host_keeps_from_the_garbage_collector_stays_as_it_is(clock: Clock) -> None:
-    gc.freeze()
-    before = gc.get_freeze_count()
-    assert max(frozen_between_scans(clock)) <= before and 0 < gc.get_freeze_count() <= before
+def test_what_the_host_keeps_from_the_garbage_collector_stays_as_it_is(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    freezes_up_to_scans(clock, monkeypatch, collector := Collector(7))
+    assert collector.calls == []
 
 
 def test_news_wake_only_whose_they_are(clock: Clock) -> None:
