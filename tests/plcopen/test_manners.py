@@ -36,6 +36,10 @@ ROWS: dict[str, tuple[str, list[Scan]]] = {
     "openplc_editor": ("%QX0.0 instance0.relay instance0.late instance0.n", [
         ({}, [False, False, False, 2]), ({"%IX0.0": True}, [True, True, False, 4]), ({}, [True, True, False, 6]),
         ({}, [True, True, True, 8]), ({"%IX0.0": False}, [False, False, False, 10]), ({}, [False, False, False, 12])]),
+    # A tool that keeps to the schema: jump, label, return, connectors, VAR_CONFIG, VAR_ACCESS, a type with a value, RETAIN.
+    "strict": ("counter1.n counter1.m counter1.k", [
+        ({}, [3, 6, 1]), ({"%IX0.4": True}, [3, 6, 2]), ({"counter1.done": True}, [3, 6, 2]), ({"%IX0.4": False}, [6, 12, 2]),
+        ({"counter1.done": False}, [9, 18, 3])]),
     # pouInstance type=, an interval as a time of day, executionId, a block changes its in-out before a variable takes it.
     "tc6_101": ("tank1.level tank1.done tank1.was", [
         ({}, [25, False, 25]), ({"tank1.valve": True}, [50, False, 50]), ({}, [75, False, 75]), ({}, [100, True, 100]),
