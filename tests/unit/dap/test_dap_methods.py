@@ -51,7 +51,9 @@ def test_properties_are_rows_whose_accessors_run_when_they_are_opened(tmp_path: 
     row = client.rows(main["variablesReference"])["Twice"]
     assert row["presentationHint"]["lazy"] and row["value"] == ""
     assert client.rows(row["variablesReference"])["Twice"]["value"] == "6"
-    assert client.ask("evaluate", expression="Main.slow.Twice", context="watch")["result"] == "6"
+    assert client.ask("evaluate", expression="Main.slow.Twice", context="watch") == {
+        "result": "6", "type": "INT", "variablesReference": 0,
+        "presentationHint": {"kind": "property", "attributes": ["readOnly"]}}  # fmt: skip
     assert [each["label"] for each in client.ask("completions", text="Main.slow.T", column=12)["targets"]] == ["Main.slow.Twice"]
 
 
