@@ -244,3 +244,18 @@ def test_what_is_put_out_ends_with_one_line_end() -> None:
     for text in ("a", "b\n", ""):
         client.adapter._output(text)
     assert [row["output"] for row in client.events("output")] == ["a\n", "b\n", "\n"]
+
+
+@pytest.mark.slow
+def test_what_the_console_completes_and_what_a_move_invalidates(tmp_path: Path) -> None:
+    client = begun(tmp_path)
+    frame, scope = client.frames[0]["id"], client.scopes()["Locals"]["variablesReference"]
+    found = client.ask("completions", text="fo", column=3, frameId=frame)["targets"]
+    assert [(row["label"], row["type"], row["start"], row["length"]) for row in found] == [("force", "keyword", 1, 2)]
+    assert client.ask("completions", text="qui", column=4, frameId=frame)["targets"] == [], "the editor has that"
+    rows = client.ask("completions", text="print Main.Fe", column=14, frameId=frame)["targets"]
+    assert [(row["label"], row["start"], row["length"]) for row in rows] == [("Main.Few", 7, 7)]
+    client.ask("continue", threadId=1)
+    with pytest.raises(RefusedError):
+        client.ask("variables", variablesReference=scope)
+    client.ask("pause", threadId=1)

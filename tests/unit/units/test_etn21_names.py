@@ -84,3 +84,7 @@ def test_the_bits_and_words_of_a_socket_and_an_area_are_those_of_the_manuals() -
         "Option and Socket Number", "Local Port", "Remote IP Address, high", "Remote IP Address, low", "Remote Port",
         "Number of Bytes to Send or Receive", "Send or Receive Data Address, high", "Send or Receive Data Address, low",
         "Time-out Value", "Response Code", "Option and Socket Number 2"]  # fmt: skip
+
+
+def test_the_words_that_ask_something_of_the_unit_are_watched() -> None:
+    assert Etn21(1).watched == (("CIO", 1525), ("CIO", 1542), ("CIO", 1544), ("A", 501))
