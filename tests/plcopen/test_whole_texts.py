@@ -57,6 +57,8 @@ ACTION Count:
 END_ACTION
 END_PROGRAM
 """
+DOCUMENTS = sorted((HERE / "documents").glob("*.xml"))
+"""A document is compared if it has a text; an empty one takes it in."""
 SOURCES = {"declared": DECLARED, "words": f"{HEAD}{WORDS}END_LADDER\nEND_PROGRAM\n", "rungs": RUNGS, "chart": CHART}
 
 
@@ -89,6 +91,6 @@ def test_what_a_source_is_exported_to(name: str) -> None:
 
 
 @pytest.mark.slow
-@each_of("path", sorted((HERE / "documents").glob("*.xml")), ids=lambda path: path.stem)
+@each_of("path", [path for path in DOCUMENTS if (HERE / "texts" / f"{path.stem}.txt").exists()], ids=lambda path: path.stem)
 def test_what_a_document_is_imported_to(path: Path) -> None:
     check(HERE / "texts" / f"{path.stem}.txt", whole(import_xml(path)))
