@@ -47,9 +47,12 @@ KEPT = {kept: CORPUS / kept.replace(".", "/", 1) for kept in sorted(path.name fo
 """The kept files, each with the file of the corpus whose mistakes it has."""
 
 
-def told(found: Diagnostic) -> str:
-    """A message on one line: `line:column: code ! what is marked ! message ! hint`; `~` if some text was passed over."""
+def told(found: Diagnostic, first_line: int) -> str:
+    """A message on one line: `line:column: code ! what is marked ! message ! hint`; `~` if some text was passed over.
+
+    Lines are those of the program, which begins at `first_line` of its file."""
     line, column = found.source.place(found.start)
+    line -= first_line
     marked = found.source.text[found.start : found.end]
     lost = "" if found.lossless else "~"
     parts = [f"{line}:{column}: {lost}{found.code}", marked, found.message, found.hint]
@@ -67,6 +70,6 @@ def test_places_of_mistakes_and_how_much_is_read(name: str) -> None:
         if not is_wrong or titles is not None and program.title not in titles:
             continue
         tree, diagnostics = parse(Source(program.path.name, program.text))
-        if wrong := [told(found) for found in diagnostics]:
+        if wrong := [told(found, program.line) for found in diagnostics]:
             lines += [f"--- {program.title}", *wrong, f"{sum(1 for _ in walk(tree))} nodes"]
     check_golden(PLACES / name, "\n".join([*lines, ""]))
