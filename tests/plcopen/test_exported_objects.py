@@ -104,10 +104,21 @@ def test_parts_of_a_block_stand_in_the_text_again(line: str) -> None:
     ("{attribute 'strict'} TYPE T : (a, b); END_TYPE", "the pragma {attribute 'strict'} is kept as CODESYS and TwinCAT have it"),
     ("FUNCTION_BLOCK A VAR r : REFERENCE TO INT; END_VAR END_FUNCTION_BLOCK", "REFERENCE TO is written as CODESYS has it"),
     ("FUNCTION_BLOCK A VAR b : B(1); END_VAR END_FUNCTION_BLOCK", "what the variable gives FB_init is kept as CODESYS has it"),
+    ("FUNCTION_BLOCK B END_FUNCTION_BLOCK FUNCTION_BLOCK A VAR k : INT; b : ARRAY[1..2] OF B(k); END_VAR END_FUNCTION_BLOCK",
+     "what the variable gives FB_init is kept as CODESYS has it"),
 ])  # fmt: skip
 def test_what_only_codesys_reads_is_said(text: str, message: str) -> None:
     made = export_xml([Source("Main.st", text)])
     assert [(found.code, found.message.partition(";")[0].partition(",")[0]) for found in made.diagnostics] == [("X0390", message)]
+
+
+@each_of("given", ["(k)", "(n := k)", "(2 + 3)", ""])
+def test_what_fb_init_is_given_comes_back(given: str) -> None:
+    again = back(f"FUNCTION_BLOCK B END_FUNCTION_BLOCK PROGRAM Main VAR k : INT; b, c : B{given}; d : ARRAY[1..2] OF B{given}; "
+                 "END_VAR END_PROGRAM\n")
+    text = "".join("".join(again.files.values()).split())
+    written = given.replace(" ", "")
+    assert f"b:B{written};" in text and f"c:B{written};" in text and f"d:ARRAY[1..2]OFB{written};" in text
 
 
 def test_settings_of_a_configuration_and_actions_outside_of_their_pou_come_back() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.digits import whole_number
+from fbvm.check.declarations.construction import arguments
 from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.schema import CODESYS, ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
 from fbvm.interchange.plcopen.write.layout import own_data
@@ -97,9 +98,7 @@ class Types:
         if isinstance(spec, tree.ArraySpec):
             return self._array(spec)
         if isinstance(spec, tree.EnumSpec):
-            values = [element("value", name=name.text, **({"value": self.text(value)} if value is not None else {}))
-                      for name, value in spec.members]
-            return element("enum", element("values", *values), element("baseType", self.spec(spec.base)) if spec.base else None)
+            return self._enumeration(spec)
         if isinstance(spec, tree.StructSpec) and not spec.overlap:
             return self._struct(spec)
         if isinstance(spec, tree.RefSpec):
@@ -107,6 +106,13 @@ class Types:
         if isinstance(spec, tree.ConstructedSpec) and spec.values is None:
             return self.spec(spec.base)
         raise self._unknown(spec)
+
+    def _enumeration(self, spec: tree.EnumSpec) -> Element:
+        if spec.base is not None and self._is_pou(spec.base):
+            return self.spec(spec.base)  # `F(x)` is an instance, and x the argument of FB_init
+        values = [element("value", name=name.text, **({"value": self.text(value)} if value is not None else {}))
+                  for name, value in spec.members]
+        return element("enum", element("values", *values), element("baseType", self.spec(spec.base)) if spec.base else None)
 
     def _unknown(self, spec: tree.TypeSpec) -> NotExportable:
         return NotExportable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
@@ -161,15 +167,15 @@ class Types:
                 self._location(made, declared.location)
             if declared.initial is not None:
                 made.content.insert(1, element("initialValue", self.value(declared.initial)))
-            if isinstance(declared.spec, tree.ConstructedSpec):
-                made.content.append(self._assignments(declared.spec))
+            if given := self._arguments(declared.spec):
+                made.content.append(self._assignments(declared.spec, given))
             if remark := _REMARK.match(self.source.text, declared.end):
                 made.content.append(documentation(remark[1].strip()))
             yield made
 
     def _kind(self, declared: tree.VarDecl) -> Element:
         """The element of a variable's type; an enumeration or subrange without a name gets one."""
-        if not isinstance(declared.spec, tree.EnumSpec | tree.SubrangeSpec):
+        if not isinstance(declared.spec, tree.EnumSpec | tree.SubrangeSpec) or self._arguments(declared.spec):
             return self.spec(declared.spec)
         name = stem = f"{self.owner}_{declared.names[0].text}" if self.owner else f"{declared.names[0].text}_type"
         number = 1
@@ -180,11 +186,23 @@ class Types:
         self.made[name] = element("dataType", element("baseType", self.spec(declared.spec)), name=name)
         return element("derived", name=name)
 
-    def _assignments(self, spec: tree.ConstructedSpec) -> Element:
-        """What a variable gives FB_init, as CODESYS has it."""
+    def _is_pou(self, named: tree.NamedType) -> bool:
+        return named.text.upper() in self.outputs
+
+    def _arguments(self, spec: tree.TypeSpec) -> tuple[tree.Argument, ...]:
+        """What a variable gives FB_init, also those of an array."""
+        own = spec
+        while isinstance(own, tree.ArraySpec):
+            own = own.element
+        is_instance = isinstance(own, tree.ConstructedSpec) or \
+            isinstance(own, tree.EnumSpec) and own.base is not None and self._is_pou(own.base)
+        return arguments(own) if is_instance else ()
+
+    def _assignments(self, spec: tree.TypeSpec, given: tuple[tree.Argument, ...]) -> Element:
+        """The arguments of FB_init as CODESYS has them."""
         self.foreign.append((spec, "what the variable gives FB_init is kept as CODESYS has it; other tools do not read it"))
         rows = [element("InputAssignment", element("Name", each.name.text) if each.name is not None else None,
-                        element("Value", self.text(each.value))) for each in spec.arguments if each.value is not None]
+                        element("Value", self.text(each.value))) for each in given if each.value is not None]
         return element("addData", element("data", element("InputAssignments", *rows), name=f"{CODESYS}inputassignments",
                                           handleUnknown="implementation"))
 
