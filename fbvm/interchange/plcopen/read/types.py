@@ -91,7 +91,7 @@ def value_text(holder: Element | None, kind: str = "", family: str = "") -> str:
     if inner.name == "arrayValue":
         items = []
         for value in inner.all("value"):
-            text, times = value_text(value), value.get("repetitionValue", "1")
+            text, times = value_text(value) or "()", value.get("repetitionValue", "1")
             items.append(f"{times}({text})" if times != "1" else text)
         return f"[{', '.join(items)}]" if items else ""
     if inner.name == "structValue":
