@@ -234,10 +234,12 @@ class StatementLayout(ExpressionLayout):
         phrase.parts += (lines(self.before_end(end)), HARD, self.ended(end))
         return phrase
 
-    def try_statement(self, word: Token, items: list[Phrase], catch: Token, opening: Token, code: Phrase, closing: Token,
-                      handler: list[Phrase], last: Token | None, final: list[Phrase] | None, end: Token) -> Phrase:
-        phrase = Phrase(word.start, self.leaf(word), self.branch(items, catch), self.leaf(catch), self.leaf(opening),
-                        self.hung(code), self.closer(closing))
+    def try_statement(self, word: Token, items: list[Phrase], catch: Token, opening: Token | None, code: Phrase | None,
+                      closing: Token | None, handler: list[Phrase], last: Token | None, final: list[Phrase] | None,
+                      end: Token) -> Phrase:
+        phrase = Phrase(word.start, self.leaf(word), self.branch(items, catch), self.leaf(catch))
+        if opening and code and closing:
+            phrase.parts += (self.leaf(opening), self.hung(code), self.closer(closing))
         if last and final is not None:
             phrase.parts += (self.branch(handler, last), self.leaf(last), self.block(final, end))
         else:
