@@ -234,11 +234,14 @@ def _without_escapes(inner: str, quote: str, digits: int) -> str:
 
 
 def _without_fractions(text: str) -> str:
-    """Advice for a duration with several fractions: the same one without any."""
+    """Advice for a duration with several fractions: the same one without any, or "" if there is none."""
     if len(text) > LONGEST:
         return ""
     parts = re.findall(_DURATION_PART, text)
-    rest, written = sum(_scaled(whole, fraction, UNITS_NS[unit.lower()], text) for whole, fraction, unit in parts), ""
+    try:
+        rest, written = sum(_scaled(whole, fraction, UNITS_NS[unit.lower()], text) for whole, fraction, unit in parts), ""
+    except OutOfRange:
+        return ""
     for unit, size_ns in UNITS_NS.items():
         count, rest = divmod(rest, size_ns)
         written += f"{count}{unit}" if count else ""
