@@ -86,15 +86,16 @@ def test_files_that_are_none_are_named(tmp_path: Path, verb: list[str]) -> None:
 
 
 @pytest.mark.slow
-def test_an_object_is_exported_and_what_plcopen_has_no_place_for_is_named(tmp_path: Path) -> None:
+def test_an_object_is_exported_with_its_methods_of_which_others_are_warned(tmp_path: Path) -> None:
     file, out = tmp_path / "FB_Counter.TcPOU", tmp_path / "out.xml"
     plain = COUNTER[: COUNTER.index("    <Method")] + COUNTER[COUNTER.index("    <Action") :]
-    missing = f"{file}:13:43: error X0301: FB_Counter: METHOD Reset is not exported"
-    for text, status, said in ((COUNTER, 3, missing), (plain, 0, "")):
+    warned = f"{file}:5:16: warning X0390: the objects of FB_Counter are kept as CODESYS and TwinCAT have them"
+    for text, is_object in ((COUNTER, True), (plain, False)):
         file.write_text(text, encoding="utf-8")
         done = CliRunner().invoke(main, ["export", str(file), "-o", str(out)])
-        assert (done.exit_code, said in done.output) == (status, True)
-    assert '<pou name="FB_Counter"' in out.read_text(encoding="utf-8")
+        assert (done.exit_code, warned in done.output) == (0, is_object), done.output
+        written = out.read_text(encoding="utf-8")
+        assert '<pou name="FB_Counter"' in written and ('<Method name="Reset">' in written) == is_object
 
 
 def test_what_the_system_calls_before_the_first_cycle_is_not_warned_of() -> None:
