@@ -81,7 +81,7 @@ PROCESSES = SimpleNamespace(
 
 def test_every_script_is_tried() -> None:
     tried = {name.removeprefix("test_the_script_") for name in globals() if name.startswith("test_the_script_")}
-    assert tried | {"mutants", "reached", "large_text"} == set(SCRIPTS)  # test_mutants.py; a text for other scripts
+    assert tried | {"mutants", "reached", "forked", "large_text"} == set(SCRIPTS)  # test_mutants.py; a text for other scripts
 
 
 def test_the_script_latencies(load: Load) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -128,6 +129,36 @@ def test_a_copy_runs_the_mutant_and_is_restored(tmp_path: Path) -> None:
     same = m.Mutant(path, len(text), len(text), "\n")
     assert not copy.finds(same, *run)
     assert (HOUSE / path).read_text(encoding="utf-8") == (copy.folder / path).read_text(encoding="utf-8") == text
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="POSIX only")
+def test_a_mutant_within_functions_is_tried_in_a_fork(tmp_path: Path) -> None:
+    """Also one of an inner function and of a method; what stands outside of functions is left to a new process."""
+    copy = m.Copy(tmp_path)
+    for file in (copy.folder / "tests").rglob("test_*.py"):
+        file.unlink()
+    path = Path("fbvm/wire/made.py")
+    text = ("LIMIT = 1\n\ndef outer():\n    def inner():\n        return 2\n    return inner\n\n"
+            "class Made:\n    size = 3\n    def get(self):\n        return 4\n    def unseen(self):\n        return 5\n")
+    (copy.folder / path).write_text(text, encoding="utf-8")
+    (copy.folder / "tests" / "unit" / "wire" / "test_made.py").write_text(
+        "import pytest\nfrom fbvm.wire import made\nKEPT = made.outer()\n\n"
+        "def test_outer():\n    assert (KEPT(), made.outer()()) == (2, 2)\n\n"
+        "@pytest.mark.slow\ndef test_get():\n    assert made.Made().get() == 4\n", encoding="utf-8")
+
+    def found(number: int, marks: str) -> bool:
+        at = text.index(f" {number}\n") + 1
+        return bool(copy.finds_in_fork(m.Mutant(path, at, at + 1, "0"), ["tests/unit/wire/test_made.py"], marks, 20))
+
+    try:
+        assert found(2, "not slow") and not found(4, "not slow") and found(4, "slow") and not found(5, "slow")
+        for number in (1, 3):
+            with pytest.raises(NotImplementedError):
+                found(number, "slow")
+        assert (copy.folder / path).read_text(encoding="utf-8") == text
+    finally:
+        copy.close()
 
 
 @pytest.mark.slow

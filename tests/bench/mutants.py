@@ -1,6 +1,6 @@
 """Breaks fbvm in small ways and counts how many of them the tests find.  It gates nothing.
 
-    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--quick] [--reach FILE]
+    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--quick] [--reach FILE] [--fork]
 
 ROOM is a folder or file of `fbvm/` or `fblib/`: `check`, `units/etn21`, `omron/mtcp_etn`, `record/draw/why.py`.  A mutant is
 one edit of one file: another relation, AND for OR, a constant plus one, a condition negated, a statement removed, None for a
@@ -12,6 +12,9 @@ Which tests of the whole suite execute a line is known with `--reach FILE`, the 
 pytest-cov`) of `pytest -n auto --cov=fbvm --cov-context=test --cov-report= -W ignore`: then only those of the room's tests run
 that execute the changed statement, and a mutant that they do not find is tried with those of other rooms.  The sources of that
 run stay where they were: what was changed since is told by comparing.
+
+With `--fork` a mutant within functions is first tried in forks of one session of pytest that has collected all tests, which takes
+a fraction of a second; only what is not found there is tried in new processes (forked.py; POSIX).
 
 A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).
 Those that were looked at and stay are in mutants_survivors.md, each with its reason."""
@@ -32,7 +35,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +43,7 @@ from pathlib import Path
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(HOUSE), str(HOUSE / "tests" / "bench")]
 
+from forked import WAITING, Forked  # noqa: E402
 from reached import Reached  # noqa: E402
 
 from fbvm.base.diagnostics import Source, errors  # noqa: E402
@@ -86,8 +90,6 @@ STAGES = {"quick": ("not slow", 60), "slow": ("slow", 200)}
 processor time a process of theirs may take: a mutant that takes longer runs for ever, and is found."""
 ELSEWHERE = "others'"
 """The stage of the tests of other rooms that execute the changed statement."""
-WAITING = 10
-"""Times the processor time that tests may take in real time: others use the machine, too."""
 DISTURBED = 3
 """So many tests that fail without the mutant, too, are left out; with more of them, nothing is found."""
 NO_TEST = 5
@@ -249,6 +251,7 @@ class Copy:
     def __init__(self, folder: Path) -> None:
         self.folder = folder / "fbvm"
         self._environment = {**os.environ, "PYTHONPATH": str(self.folder), "XDG_CACHE_HOME": str(folder / "cache")}
+        self._forked: Forked | None = None
         for name in COPIED:
             if (HOUSE / name).is_dir():
                 shutil.copytree(HOUSE / name, self.folder / name, ignore=shutil.ignore_patterns("__pycache__", "node_modules"))
@@ -279,6 +282,24 @@ class Copy:
         failed = FAILED.search(said.read_text(encoding="utf-8", errors="replace"))
         return failed[1] if failed else ""
 
+    def finds_in_fork(self, mutant: Mutant, tests: list[str], marks: str, limit_s: int) -> bool:
+        """As `finds`, in forks of one session.  Raises NotImplementedError for a mutant outside of functions."""
+        self._forked = self._forked or Forked(self.folder, self._environment)
+        file = self.folder / mutant.path
+        text = file.read_text(encoding="utf-8")
+        try:
+            _write(file, mutant.apply(text))  # for the processes that tests start
+            failed = self._forked.failure(mutant.path, text, mutant.apply(text), tests, marks, limit_s)
+        finally:
+            _write(file, text)
+        again = [failed] if failed else tests
+        return failed is not None and self._forked.failure(mutant.path, text, text, again, marks, limit_s) is None
+
+    def close(self) -> None:
+        """Ends the session of the forks."""
+        if self._forked is not None:
+            self._forked.close()
+
     def finds(self, mutant: Mutant, tests: list[str], marks: str, limit_s: int) -> bool:
         """True if one of the tests finds a mutant: fails with it, and passes without it.  Afterwards the file is as it was."""
         file = self.folder / mutant.path
@@ -306,19 +327,23 @@ def _write(file: Path, text: str) -> None:
     Path(importlib.util.cache_from_source(file)).unlink(missing_ok=True)
 
 
+Way = Callable[[Mutant, list[str], str, int], bool]
+"""How a mutant is tried: True if one of the tests with these marks finds it within a time."""
+
+
 class Stage:
     """The tests of a kind: the quick or the slow ones of the room, or those of other rooms."""
 
-    def __init__(self, copy: Copy, name: str, reached: Reached | None = None) -> None:
+    def __init__(self, copy: Copy, name: str, reached: Reached | None = None, way: Way | None = None) -> None:
         self.name = name
         self.found = 0
-        self._copy, self._reached = copy, reached
+        self._copy, self._reached, self._way = copy, reached, way or copy.finds
         self._runs = list(STAGES.values()) if name == ELSEWHERE else [STAGES[name]]
 
     def finds(self, mutant: Mutant) -> bool:
-        """True if one of the tests finds the mutant."""
+        """True if one of the tests finds the mutant.  Raises what its way raises."""
         tests = self._tests(mutant)
-        found = bool(tests) and any(self._copy.finds(mutant, tests, *run) for run in self._runs)
+        found = bool(tests) and any(self._way(mutant, tests, *run) for run in self._runs)
         self.found += found
         return found
 
@@ -347,6 +372,7 @@ def main() -> int:
     options.add_argument("--seed", type=int, default=0, help="which of all mutants (0)")
     options.add_argument("--seconds", type=float, default=600, help="none is begun after this time (600)")
     options.add_argument("--quick", action="store_true", help="only the quick tests of the room")
+    options.add_argument("--fork", action="store_true", help="try forks of one session of pytest first")
     options.add_argument("--reach", metavar="FILE", type=Path, help="which tests execute which lines: a .coverage with contexts")
     given = options.parse_args()
     begun = time.monotonic()
@@ -357,24 +383,35 @@ def main() -> int:
         copy = Copy(Path(folder))
         reached = Reached(given.reach, copy.folder) if given.reach else None
         names = ["quick"] if given.quick else [*STAGES, ELSEWHERE] if reached else [*STAGES]
-        stages = [Stage(copy, name, reached) for name in names]
+        ways = [copy.finds_in_fork, copy.finds] if given.fork else [copy.finds]
+        stages = [Stage(copy, name, reached, way) for way in ways for name in names]
         survivors, tried = 0, 0
         for mutant in chosen:
             if time.monotonic() - begun > given.seconds:
                 break
             tried += 1
-            if not any(stage.finds(mutant) for stage in stages):
+            if not any(_finds(stage, mutant) for stage in stages):
                 survivors += 1
                 print(difference(mutant, texts[mutant.path]), end="\n\n", flush=True)
+        copy.close()
     print(f"{given.room}: {told(stages, tried)}, {survivors} survived; "
           f"{len(found)} exist, seed {given.seed}, {time.monotonic() - begun:.0f} s")
     return 0
 
 
+def _finds(stage: Stage, mutant: Mutant) -> bool:
+    with suppress(NotImplementedError):
+        return stage.finds(mutant)
+    return False
+
+
 def told(stages: list[Stage], tried: int) -> str:
     """How many mutants each stage found: "31 of 40 by quick tests, 6 by slow ones, 1 by others' ones"."""
-    quick, *slow = stages
-    return ", ".join([f"{quick.found} of {tried} by {quick.name} tests", *(f"{one.found} by {one.name} ones" for one in slow)])
+    found: dict[str, int] = {}
+    for stage in stages:
+        found[stage.name] = found.get(stage.name, 0) + stage.found
+    (name, count), *slow = found.items()
+    return ", ".join([f"{count} of {tried} by {name} tests", *(f"{more} by {other} ones" for other, more in slow)])
 
 
 if __name__ == "__main__":

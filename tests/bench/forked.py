@@ -1,0 +1,197 @@
+"""Tries mutants in forks of one session of pytest, which has imported fbvm and collected all tests once.
+
+A mutant within functions is put into their code; one of a table, a class or a default value is left to a new process, since
+others may hold copies of what was made of it.  What was kept by a cache when the tests were collected keeps what it is, too, so
+that a mutant that is not found here is to be tried in a new process.  POSIX only."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import time
+import types
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SOCKET = "FBVM_MUTANTS_SOCKET"
+"""The environment variable with the number of the socket on which the session is asked."""
+WAITING = 10
+"""Times the processor time that tests may take in real time."""
+
+
+class Forked:
+    """A session of pytest in a copy of the repository that is asked about mutants."""
+
+    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+        own, other = socket.socketpair()
+        path = os.pathsep.join([str(Path(__file__).parent), environment["PYTHONPATH"]])
+        pytest_args = ["-q", "-p", "forked", "-p", "no:cacheprovider", "-p", "no:xdist"]
+        self._running = subprocess.Popen([sys.executable, "-m", "pytest", *pytest_args], cwd=folder, pass_fds=[other.fileno()],
+                                         env={**environment, "PYTHONPATH": path, SOCKET: str(other.fileno())},
+                                         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        other.close()
+        self._socket, self._answers = own, own.makefile(encoding="utf-8")
+        self._answer()  # all sources have been imported
+
+    def failure(self, path: Path, then: str, now: str, tests: list[str], marks: str, limit_s: int) -> str | None:
+        """Which of the tests fails first if a source has another text, or None if all pass; "" if it took too long.
+
+        Raises NotImplementedError for a change outside of functions, and RuntimeError if the session has ended."""
+        question = {"path": path.as_posix(), "then": then, "now": now, "tests": tests, "slow": marks == "slow",
+                    "limit_s": limit_s}  # fmt: skip
+        self._socket.sendall((json.dumps(question) + "\n").encode())
+        found = self._answer()
+        if not found["is_within_functions"]:
+            raise NotImplementedError(path)
+        failed: str | None = found["failed"]
+        return failed
+
+    def _answer(self) -> dict[str, Any]:
+        line = self._answers.readline()
+        if not line:
+            raise RuntimeError("the session of pytest in which mutants are tried has ended")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def close(self) -> None:
+        """Ends the session."""
+        self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._running.wait(10)
+        self._running.kill()
+        self._running.wait()
+
+
+# --- within the session -----------------------------------------------------------------------------------------------
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session: pytest.Session) -> bool | None:
+    """Answers what is asked in place of running the tests."""
+    if SOCKET not in os.environ:
+        return None
+    asked = socket.socket(fileno=int(os.environ.pop(SOCKET)))
+    functions = _functions(Path.cwd())
+    gc.freeze()
+    with asked, asked.makefile(encoding="utf-8") as questions:
+        asked.sendall(b"{}\n")
+        for line in questions:
+            asked.sendall((json.dumps(_answer(session.items, functions, json.loads(line))) + "\n").encode())
+    return True
+
+
+Key = tuple[str, str, int]
+"""File, qualified name and first line of a piece of code."""
+
+
+def _functions(folder: Path) -> dict[Key, list[types.FunctionType]]:
+    found: dict[Key, list[types.FunctionType]] = {}
+    gc.unfreeze()  # what is frozen is not among the objects
+    for one in gc.get_objects():
+        if isinstance(one, types.FunctionType) and one.__code__.co_filename.startswith(str(folder)):
+            found.setdefault(_key(one.__code__), []).append(one)
+    return found
+
+
+def _key(code: types.CodeType) -> Key:
+    return code.co_filename, code.co_qualname, code.co_firstlineno
+
+
+def _answer(items: list[pytest.Item], functions: dict[Key, list[types.FunctionType]], question: dict[str, Any]) -> dict[str, Any]:
+    file = str(Path.cwd() / question["path"])
+    changed = list(_changed(*(compile(question[name], file, "exec", dont_inherit=True) for name in ("then", "now"))))
+    if any(new is None for _, new in changed):
+        return {"is_within_functions": False, "failed": ""}
+    chosen = list(_chosen(items, question["tests"], question["slow"]))
+    return {"is_within_functions": True, "failed": _in_fork(chosen, changed, functions, question["limit_s"])}
+
+
+Change = tuple[types.CodeType, types.CodeType | None]
+
+
+def _changed(old: types.CodeType, new: types.CodeType) -> Iterator[Change]:
+    """The pieces of code of functions that differ, each with its new one; None for one that is no function's own."""
+    inner = [[each for each in code.co_consts if isinstance(each, types.CodeType)] for code in (old, new)]
+    own = _own(old) == _own(new)
+    if old.co_flags & 1:  # CO_OPTIMIZED: a function
+        if old != new:
+            yield old, new if old.co_freevars == new.co_freevars else None
+    elif not own or len(inner[0]) != len(inner[1]):
+        yield old, None
+    for one, other in zip(*inner, strict=False):
+        yield from _changed(one, other)
+
+
+def _own(code: types.CodeType) -> tuple[object, ...]:
+    """What a piece of code does itself, without the functions in it."""
+    constants = tuple(None if isinstance(each, types.CodeType) else (type(each), repr(each)) for each in code.co_consts)
+    return code.co_code, constants, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
+
+
+def _chosen(items: list[pytest.Item], tests: list[str], slow: bool) -> Iterator[pytest.Item]:
+    order = {test: number for number, test in enumerate(tests)}
+    ranked = [(rank, item) for item in items if (item.get_closest_marker("slow") is not None) == slow
+              and (rank := order.get(item.nodeid, order.get(item.nodeid.partition("::")[0]))) is not None]
+    return (item for _, item in sorted(ranked, key=lambda one: one[0]))
+
+
+def _in_fork(items: list[pytest.Item], changed: list[Change], functions: dict[Key, list[types.FunctionType]],
+             limit_s: int) -> str | None:
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        _run(items, changed, functions, limit_s, writing)
+    os.close(writing)
+    status = _waited(child, limit_s * WAITING)
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(child, signal.SIGKILL)
+    with os.fdopen(reading, encoding="utf-8") as said:
+        failed = said.read() if status is not None else ""
+    return None if status == 0 else failed
+
+
+def _run(items: list[pytest.Item], changed: list[Change], functions: dict[Key, list[types.FunctionType]], limit_s: int,
+         writing: int) -> None:
+    """Changes the functions, runs the tests until one fails, and ends the process."""
+    from _pytest.runner import runtestprotocol
+
+    status = 1
+    try:
+        os.setsid()
+        resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
+        for old, new in changed:
+            for function in functions.get(_key(old), ()):
+                assert new is not None
+                function.__code__ = new
+        for item, following in zip(items, [*items[1:], None], strict=True):
+            if any(report.failed for report in runtestprotocol(item, nextitem=following, log=False)):
+                os.write(writing, item.nodeid.encode())
+                break
+        else:
+            status = 0
+    finally:
+        os._exit(status)
+
+
+def _waited(child: int, limit_s: float) -> int | None:
+    """The status with which a process ends; None if it does not within the time."""
+    until = time.monotonic() + limit_s
+    while time.monotonic() < until:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return status
+        time.sleep(0.01)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return None
