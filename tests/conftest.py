@@ -47,8 +47,6 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ[SWITCH] = "1"
 
 
-SLOW_TESTS = pytest.StashKey[int]()
-"""How many slow tests this process has run."""
 TOP = len(Path(__file__).parts)
 """Parts of the path of a test file that stands in no folder of the tests."""
 gc.set_threshold(100_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
@@ -82,22 +80,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_collection_finish() -> None:
     """Thousands of tests stay where they are until the end: the host need not look through them again and again."""
-    gc.freeze()
-
-
-SWEPT_EACH = 400
-"""So many slow tests are run until what was left behind is looked for among all that there is."""
-
-
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """What earlier tests have left, caches and reports, is no slow test's concern: sessions of pytest within it, and tests of
-    memory, collect garbage again and again."""
-    if item.get_closest_marker("slow") is None:
-        return
-    item.config.stash[SLOW_TESTS] = count = item.config.stash.get(SLOW_TESTS, 0) + 1
-    if count % SWEPT_EACH == 0:
-        gc.unfreeze()
-        gc.collect()
     gc.freeze()
 
 
