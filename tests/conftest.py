@@ -83,6 +83,13 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.fixture
+def frozen_heap() -> None:
+    """What earlier tests have left is not looked through by a test that collects garbage again and again."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Scheduling | None:
     """Each worker takes a part of the files, and at the end of what others have left: images and rigs that the tests of

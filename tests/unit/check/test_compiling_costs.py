@@ -38,10 +38,8 @@ def test_functions_that_call_the_next_twice_are_looked_at_once() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("frozen_heap")
 def test_what_a_compilation_leaves_does_not_wait_for_the_collector() -> None:
-    gc.collect()
-    gc.freeze()  # what other tests have left is not looked through again and again
-
     def left(statements: int) -> int:
         gc.collect()
         compile_text(TEXT.replace("a := a + 1;\n", "a := a + 1;\n" * statements))

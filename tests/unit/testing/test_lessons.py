@@ -86,6 +86,7 @@ def test_what_it_shows_of_a_program_stands_there(lesson: Lesson) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("frozen_heap")
 def test_solutions_pass_and_what_is_given_does_not(tmp_path: Path) -> None:
     (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
     for lesson in lessons():
@@ -195,6 +196,7 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("frozen_heap")
 def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     assert called("1", "--check")[0] == 1
