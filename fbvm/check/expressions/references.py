@@ -18,12 +18,17 @@ from fbvm.base.types import (
     fold,
     pointer,
     reference,
+    string,
 )
+from fbvm.check.expressions.constants import encode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import MAKERS, is_null
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Facts, Holder, StandardCall, Start, Variable
 from fbvm.syntax import tree
+
+_ROOM = 255
+"""Characters that the place of a constant text has at least."""
 
 
 def refer(scope: Scope, expr: tree.Expr, lasting: bool) -> Type | None:
@@ -108,12 +113,32 @@ def _short_lived(variable: Variable) -> str:
 
 def make(scope: Scope, call: tree.Call, name: str, value: tree.Expr) -> Type | None:
     """REF(x) and ADR(x)."""
-    kind = refer(scope, value, lasting=name == "REF")
+    kind = (_constant_text(scope, value) if name == "ADR" else None) or refer(scope, value, lasting=name == "REF")
     if kind is None:
         return None
     made = reference(kind) if name == "REF" else pointer(kind)
     scope.facts.calls[call] = StandardCall("REF", [(value, kind)], (made,))
     return made
+
+
+def _constant_text(scope: Scope, expr: tree.Expr) -> Type | None:
+    """The type of a text that is no variable and whose address a dialect takes; None for anything else.
+
+    It gets a place of its own, which equal texts share, with room for what a pointer to a longer STRING reads."""
+    kind, value = scope.infer(expr), scope.facts.constants.get(expr)
+    if not scope.dialect.texts_have_addresses or not isinstance(kind, StringType) or value is None or scope.is_variable(expr):
+        return None
+    texts = scope.context.texts
+    if value not in texts:
+        room = string(max(kind.capacity, _ROOM), kind.wide)
+        scope.project.size_limits.reserve(room.size, "the text takes", scope.source, expr)
+        texts[value] = Variable(f"$text {len(texts) + 1}", room, "VAR_STAT", scope.source, expr, place="abs",
+                                initial=encode(room, value), constant=True)
+        scope.context.global_order.append(texts[value])
+    scope.facts.variables[expr] = texts[value]
+    scope.facts.holders[expr] = _held(scope, expr, texts[value])
+    scope.project.dependencies.repeatable = False
+    return kind
 
 
 MARK = 0xFFFFFF << 40

@@ -94,6 +94,8 @@ class Context:
         """Of blocks that are resolved, whether they have something to construct in a phase (see declarations.construction)."""
         self.kept_values: Variable | None = None
         """Of a program with FB_init the hidden variable that says whether a start keeps RETAIN variables."""
+        self.texts: dict[Value, Variable] = {}
+        """Constant texts whose address the program takes, and the hidden variables that they lie in."""
         self._attributes: dict[Pou, dict[str, str]] = {}
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}

@@ -79,7 +79,8 @@ def lay_out(checker: Checker) -> Placement:
     placement.initial += _runs(slots)
     retaining = Containment(checker, lambda pou: any(variable.retain for variable in pou.order))
     for variable in checker.global_order:
-        placement.symbols.setdefault(fold(_path(variable)), _symbol(variable))
+        if "$" not in variable.name:
+            placement.symbols.setdefault(fold(_path(variable)), _symbol(variable))
         if variable.place == "abs" and not variable.reference:
             placement.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
     placement.frames = {fold(pou.name): found for pou in checker.bodies if (found := _in_frame(pou))}
