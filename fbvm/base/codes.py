@@ -170,5 +170,6 @@ CODES: dict[str, Code] = {
         "R0112": "watch cycle time exceeded",
         "R0120": "the program has stopped itself",
         "R0121": "calls nested too deep",
+        "R0122": "the program has raised an exception",
     }),
 }

@@ -104,6 +104,8 @@ class Dialect:
     short_circuit_words: bool = False
     jumps_in_text: bool = False
     exceptions: bool = False
+    raises_exceptions: bool = False
+    texts_have_addresses: bool = False
     conditional_returns: bool = False
     empty_structures: bool = False
     bounds_are_not_compared: bool = False
@@ -257,6 +259,10 @@ QUESTIONS = {
     "constant_in_outs_take_texts": ("F('abc'), where F declares VAR_IN_OUT CONSTANT s : STRING", "an error (S0407)",
                                     "a copy is passed; so it is with a text of another length"),
     "exceptions": ("__TRY .. __CATCH(code) .. __ENDTRY", "taken, with a warning (S0195)", "taken"),
+    "texts_have_addresses": ("ADR('abc'), ADR(CONCAT('a', 'b')): of a constant text that is no variable", "an error (S0407)",
+                             "points at the text, which lies in memory as long as the program"),
+    "raises_exceptions": ("F_RaiseException(code)", "an error (S0401)",
+                          "stops the program (R0122), or goes on behind __CATCH(code), which gets the code"),
     "functions_have_inputs": ("FUNCTION f : INT without an input", "taken", "taken, with a warning (S0195)"),
     "plain_names": ("names that begin with _ or P_", "taken", "taken, with a warning (S0195)"),
     "any_width_at": ("x AT %IW4 : DINT, x AT %ML2 : DWORD: an address of another size than the type", "an error",
@@ -303,7 +309,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
                    own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
                    conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
-                   bounds_are_not_compared=True, empty_structures=True,
+                   bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True,
                    short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (
@@ -312,6 +318,7 @@ _ROWS = (
     replace(_CODESYS, name="twincat", for_whom="programs for TwinCAT 3, whose compiler answers as that of CODESYS does",
             libraries=("codesys/blocks", "twincat/blocks", "twincat/tcunit", "twincat/write_protected",
                        "twincat/motion"), unsigned_ltime=True, constant_inputs_are_written=True,
+            raises_exceptions=True,
             large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
             libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True),

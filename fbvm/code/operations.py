@@ -158,6 +158,7 @@ reverse    | address size runs      |        |             | each item's bytes b
 charge     | count site             |        | R0104       | takes count from the step budget and stores it; below 0 traps
 due        | a                      |        |             | notes time a (ns) if it is earlier than what is noted
 stop       | code site              |        | code        | traps
+raise      | a site                 |        | R0122       | traps with the u32 a, which is above all of WAYS_OUT
 observe    | kind site detail       |        |             | statement, rung, contact, read or write; a plain build drops it
 count      | number                 |        |             | adds 1 to a counter beside the memory; the compiler makes none
 mark       | number rows a          |        |             | a (b or u8) into a byte beside the memory, by rows of instances
@@ -178,15 +179,18 @@ STATEMENTS = _rows(_STATEMENTS, "statement")
 WAYS_OUT = {"return": 1, "exit": 2, "next": 3}
 """Codes of `stop` that are no traps: jumps out of an attempt, to be done by the body around."""
 UNKNOWN_EXCEPTION = 0xFFFFFFFF
+RAISED = 0xFFFFFFFE
+"""In CAUGHT, in place of the number that the trap of a `raise` carries itself."""
 CAUGHT = WAYS_OUT | {
     "R0101": 0x102, "R0102": 0x101, "R0103": 0x103, "R0105": 0x103, "R0110": 0x51, "R0121": 0x54,
+    "R0122": RAISED,
     **dict.fromkeys(("R0106", "R0107", "R0108", "R0109", "R0111"), UNKNOWN_EXCEPTION)}  # fmt: skip
 """By code what an attempt gives: of traps the member of ExceptionCode (CODESYS Development System, data type
 __SYSTEM.ExceptionCode).  The watchdog and a program that stops itself are not caught."""
 
 
 def caught(code: str, traps: bool) -> int:
-    """What an attempt gives that a body has stopped with a code, 0 if it does not catch that."""
+    """What an attempt gives that a body has stopped with a code: 0 if it does not catch that, RAISED for what was raised."""
     number = CAUGHT.get(code, 0)
     return number if traps or code in WAYS_OUT else 0
 

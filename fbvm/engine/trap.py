@@ -57,6 +57,7 @@ _WORDS = {
     "R0112": "the scan took longer than the watch cycle time of {0} ms",
     "R0111": "text {0!r} cannot be converted to {1}",
 }
+_RAISED = "R0122"
 ENDLESS = "a loop waits for what does not change within a scan, or there is too much work for one"
 """The usual causes of R0104."""
 _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} outside {1}..{2}"}
@@ -73,6 +74,8 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), insta
         words = _CONVERSION[len(values)].format(*map(_shown, values))
     elif code in _WORDS and values:
         words = _WORDS[code].format(*map(_shown, values))
+    elif code == _RAISED:
+        words = f"the program has raised exception 16#{values[0]:X}"
     elif code == "R0104":
         words = f"{CODES[code].title}: {ENDLESS}"
     else:

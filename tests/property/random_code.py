@@ -340,7 +340,8 @@ class Maker:
             ("copy", at(place), at(64 * self.random.randrange(10) + self.random.randrange(9)), self.random.randrange(1, 60)),
             ("fill", at(place), self.pick((bytes(9), b"\1\2\3", b"\xff" * 20))), ("charge", 1, self.site()),
             ("reverse", at(place), 60, self.pick((((0, 5, 2, 2),), ((1, 3, 20, 8), (9, 2, 10, 4)), ((3, 7, 8, 3),)))),
-            ("due", self.value("i64", 1)), ("copy", (("ref", self.reference(), self.site()), 0, ()), at(place), 16)))
+            ("due", self.value("i64", 1)), ("if", ((self.value("b", 1), (("raise", ("max", "u32", self.value("u32", 1), const(
+                "u32", 4)), self.site()),)),), ()), ("copy", (("ref", self.reference(), self.site()), 0, ()), at(place), 16)))
 
     def case(self, depth: int) -> Node:
         form = self.pick(INTEGERS)

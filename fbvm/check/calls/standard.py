@@ -9,6 +9,7 @@ from fbvm.base.types import (
     ELEMENTARY,
     GENERIC,
     LREAL,
+    UDINT,
     ArrayType,
     Elementary,
     EnumType,
@@ -40,6 +41,9 @@ _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRI
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
 Passed = list[tuple[tree.Expr, Type]]
 """Arguments, each with the type of its parameter."""
+
+
+RAISE = "F_RAISEEXCEPTION"
 
 
 def is_known(name: str) -> bool:
@@ -75,6 +79,8 @@ def _fold(scope: Scope, call: tree.Call, called: StandardCall) -> None:
 def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
     if name in intrinsics.NAMES:
         return intrinsics.intrinsic(scope, call, name)
+    if name == RAISE and scope.dialect.raises_exceptions:
+        return _raise(scope, call)
     if name in MAKERS:
         values = Arguments(scope, call, ["IN"]).in_order()
         return references.make(scope, call, name, values[0]) if values is not None else None
@@ -106,6 +112,15 @@ def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value
                 vendor_names.FUNCTIONS.get(name) or vendor_names.library_of(callee(call)) or
                 project.nearest(callee(call), known))
     return None
+
+
+def _raise(scope: Scope, call: tree.Call) -> str | None:
+    """F_RaiseException(code), which has no result (Beckhoff Information System, Tc2_System)."""
+    values = Arguments(scope, call, ["EXCEPTIONCODE"]).in_order()
+    if values is None or not scope.fit(values[0], UDINT, "S0405"):
+        return None
+    scope.facts.calls[call] = StandardCall("__RAISE", [(values[0], UDINT)])
+    return ""
 
 
 # --- kinds ------------------------------------------------------------------------------------------------------

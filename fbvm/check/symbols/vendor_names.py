@@ -46,6 +46,7 @@ _BY_DIALECT = (
     (r"FRAC|LTRUNC|LMOD|MODABS|MODTURNS|(?:GET|SET|CSET|CLEAR)BIT32", "a function of TwinCAT: --dialect twincat brings it"),
     (r"AXIS_REF|ST_AxisStatus|MC_(?:Power|Reset|Move\w+|Home|Stop|Halt|Jog|Gear(?:In|InDyn|Out)|SetPosition|Direction|BufferMode)",
      "a name of TwinCAT's Tc2_MC2: --dialect twincat brings it, with axes that do not move"),
+    (r"F_RaiseException", "a function of TwinCAT: --dialect twincat brings it"),
     (r"TIME_TO_(?:[NUM]?S|[MHD])", "a function of STruC++: --dialect strucpp brings it"),
 )
 """Patterns of the names of types, blocks and functions that only a dialect brings, and what they are."""
@@ -71,7 +72,7 @@ _LIBRARIES = (
     (r"ST_(?:Plc)?DriveRef|FB_SoE\w+", "TwinCAT's Tc2_Drive"),
     (r"FB_CSVMemBuffer\w+|ARG_TO_CSVFIELD|CSVFIELD_TO_ARG|DEFAULT_CSV_FIELD_SEP|F_BIGTYPE|FB_HashTable\w+",
      "TwinCAT's Tc2_Utilities"),
-    (r"F_RaiseException|F_CheckMemoryArea|E_TcMemoryArea|F_GetTaskInfo", "TwinCAT's Tc2_System"),
+    (r"F_CheckMemoryArea|E_TcMemoryArea|F_GetTaskInfo", "TwinCAT's Tc2_System"),
     (r"FB_SQL\w+|FB_PLCDB\w+", "TwinCAT's Tc3_Database"),
     (r"FB_MB(?:Read|Write|Diagnose)\w*", "TwinCAT's Tc2_ModbusSrv"),
     (r"Button|Led|TextCtrl|GetBoolString", "the svgui of older versions of Beremiz"),

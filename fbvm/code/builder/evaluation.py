@@ -17,7 +17,7 @@ from fbvm.code.builder.functions import FUNCTIONS
 from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node
 from fbvm.syntax.st import texts
 
-VARYING = frozenset(("TIME", "LTIME", "__DUE", "__STOP"))
+VARYING = frozenset(("TIME", "LTIME", "__DUE", "__STOP", "__RAISE"))
 """Functions that have another value each time, or an effect."""
 
 

@@ -10,7 +10,7 @@ from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.builder import characters
 from fbvm.code.builder.conversions import as_count, convert, truncate
 from fbvm.code.builder.emitter import Emitter
-from fbvm.code.operations import SIZES, Node
+from fbvm.code.operations import SIZES, UNKNOWN_EXCEPTION, WAYS_OUT, Node
 
 Function = Callable[[Emitter, list[Node], StandardCall, int], Node]
 """Makes the expression of a call, from the arguments in the types that the call wants, the call and its site."""
@@ -156,6 +156,14 @@ def _stop(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Nod
     return ("const", "b", 0)
 
 
+def _raise(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Node:
+    """A number that says how a body was left, which is no exception of CODESYS, is told as an unknown one."""
+    number = emitter.to_temporary(a[0])
+    is_free = ("gt", "b", "u32", number, ("const", "u32", max(WAYS_OUT.values())))
+    emitter.emit(("raise", ("select", "u32", is_free, ("const", "u32", UNKNOWN_EXCEPTION), number), site))
+    return ("const", "b", 0)
+
+
 def _due(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> Node:
     emitter.emit(("due", a[0]))
     return ("const", "b", 0)
@@ -180,6 +188,7 @@ FUNCTIONS: dict[str, Function] = {
     "MAX": _chain("max"), "MIN": _chain("min"), "CONCAT": _chain("concat"),
     "LEN": _length, "FIND": _find,
     **dict.fromkeys(("TIME", "LTIME"), lambda emitter, a, call, site: ("now", "i64")), "__DUE": _due, "__STOP": _stop,
+    "__RAISE": _raise,
     "IS_VALID": lambda emitter, a, call, site: _finite(emitter, a[0], _form(call)),
     "IS_VALID_BCD": _valid_bcd,
     "TO_BIG_ENDIAN": _swapped, "FROM_BIG_ENDIAN": _swapped,

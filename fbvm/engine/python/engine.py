@@ -20,7 +20,7 @@ from weakref import finalize
 from fbvm.base.areas import BUDGET, MOST_FRAMES
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image, ProgramRun
-from fbvm.code.operations import Address, caught
+from fbvm.code.operations import RAISED, Address, caught
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.apart import run_apart
 from fbvm.engine.bases import base_ranges, recursive_bodies
@@ -413,6 +413,8 @@ def _caught(numbers: Mapping[str, int], parts: Set[int], system: memoryview, sto
     number = caught(stop.code, traps)
     if not number:
         raise stop
+    if number == RAISED:
+        number, = stop.values
     ended: dict[int, tuple[int, int]] = {}
     left, at = None, stop.__traceback__ and stop.__traceback__.tb_next
     while at is not None:

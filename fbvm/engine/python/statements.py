@@ -287,6 +287,11 @@ def _stop(w: BodyWriter, code: str, site: int) -> None:
     w.held.state = None
 
 
+def _raise(w: BodyWriter, a: Node, site: int) -> None:
+    w.line(f"stop('R0122', {site}, {bare(w.value(a))})")
+    w.held.state = None
+
+
 # --- observations ---------------------------------------------------------------------------------------------------
 
 
@@ -304,7 +309,7 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
     "begin": _begin, "end": _end, "attempt": _attempt,
-    "charge": _charge, "due": _due, "stop": _stop,
+    "charge": _charge, "due": _due, "stop": _stop, "raise": _raise,
     "observe": _observe, "count": _count, "mark": _mark,
 }
 """How each statement is written: called with the operands of its row."""

@@ -107,14 +107,15 @@ class Attempt:
 
     traps: bool
     begun: Contents
-    ended: list[tuple[Term, int, dict[Cell, Term], int]] = field(default_factory=list)
+    ended: list[tuple[Term, Term, dict[Cell, Term], int]] = field(default_factory=list)
     is_certain: bool = False
     """Whether the last of them stops it on every path."""
 
-    def note(self, state: State, condition: Term, code: str) -> None:
-        """Notes that a code stops the body here."""
+    def note(self, state: State, condition: Term, code: str, raised: Term | None) -> None:
+        """Notes that a code stops the body here; `raised` is the number of a `raise`."""
         cells = {cell: state.contents.get(cell) for cell in state.contents.written_since(self.begun)}
-        self.ended.append((condition, caught(code, self.traps), cells, state.used))
+        what = state.contents.terms.constant(32, caught(code, self.traps)) if raised is None else raised
+        self.ended.append((condition, what, cells, state.used))
 
     def join(self, state: State, number: int, end: State | None) -> None:
         """Makes `state` that behind the attempt; `end` is the state behind its body, None if nothing gets there."""
@@ -122,7 +123,7 @@ class Attempt:
         for condition, what, cells, used in self.ended:
             made = state.child(state.path)
             made.contents.written.update(cells)
-            made.temporaries[number], made.used = terms.constant(32, what), used
+            made.temporaries[number], made.used = what, used
             ends.append(made)
             conditions.append(condition)
         if end is not None:
@@ -170,12 +171,14 @@ class Execution:
         term: Term = self.expressions[node[0]](self, state, *node[1:])
         return term
 
-    def trap(self, state: State, condition: Term, code: str, site: int) -> None:
-        """Notes that a trap is reached if `condition` holds here.  Raises Trapped if that is certain."""
+    def trap(self, state: State, condition: Term, code: str, site: int, raised: Term | None = None) -> None:
+        """Notes that a trap is reached if `condition` holds here; `raised` is the number of a `raise`.
+
+        Raises Trapped if that is certain."""
         reached = self.terms.and_(state.path, condition)
         attempt = next((each for each in reversed(self.attempts) if caught(code, each.traps)), None)
         if attempt is not None and reached is not self.terms.false:
-            attempt.note(state, reached, code)
+            attempt.note(state, reached, code, raised)
             attempt.is_certain = reached is self.terms.true
             if attempt.is_certain:
                 raise Trapped(code, site)

@@ -348,6 +348,10 @@ def _stop(x: Execution, state: State, code: str, site: int) -> None:
     x.trap(state, x.terms.true, code, site)
 
 
+def _raise(x: Execution, state: State, a: Node, site: int) -> None:
+    x.trap(state, x.terms.true, "R0122", site, x.value(state, a))
+
+
 def _due(x: Execution, state: State, a: Node) -> None:
     """A note for who waits; what it evaluates has no effect."""
 
@@ -373,6 +377,6 @@ def _note_write(x: Execution, state: State, site: int, form: str | tuple[str, in
 STATEMENT_ROWS: dict[str, Row] = {
     "store": _store, "store_raw": _store, "store_bit": _store_bit, "store_flag": _store_flag, "store_text": _store_text,
     "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let, "call": _call, "attempt": _attempt, "charge": _charge,
-    "stop": _stop, "due": _due, "observe": _observe,
+    "stop": _stop, "raise": _raise, "due": _due, "observe": _observe,
 }  # fmt: skip
 """How each statement that does not part paths changes a state: called with the operands of its row."""

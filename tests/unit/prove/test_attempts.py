@@ -6,6 +6,7 @@ import pytest
 from rows import each_of
 from test_prover import FEW, image_of
 
+from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.prove.prover import prove
 from fbvm.prove.question import NEVER, NO_TRAP, REACH, Question
@@ -53,6 +54,26 @@ def test_paths_through_what_is_caught_are_those_of_the_engine(condition: str) ->
         plc = Plc(image, verdict.run.cycle_ns)
         repeated(plc, verdict.run)
         assert plc.scans == REACHED[condition]
+
+
+RAISING = """PROGRAM Main
+VAR_INPUT a : UDINT; END_VAR
+VAR code : __SYSTEM.ExceptionCode; seen : UDINT; END_VAR
+    __TRY
+        seen := 1;
+        IF a > 10 THEN F_RaiseException(a + 5); END_IF
+    __CATCH(code)
+        seen := code;
+    __ENDTRY
+END_PROGRAM"""
+
+
+def test_a_raised_number_is_what_the_handler_gets_in_proofs_too() -> None:
+    image = compile_text(RAISING, dialect="twincat").image
+    assert image is not None
+    conditions = ("Main.seen = 16 AND Main.a = 11", "Main.seen = 15", "Main.seen = 16#FFFFFFFF AND Main.a = 16#FFFFFFFC")
+    assert [prove(image, Question(REACH, each, ()), FEW).word == "reached" for each in conditions] == [True, False, True]
+    assert prove(image, Question(NO_TRAP, "", ()), FEW).word == "proved"
 
 
 def test_what_is_caught_is_no_trap_and_what_is_not_is_one() -> None:

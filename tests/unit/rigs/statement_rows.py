@@ -109,6 +109,7 @@ PROGRAMS: list[tuple[str, Block, dict[int, bytes], Any]] = [
     ("charge too much", (store("u8", 0, const("u8", 1)), ("charge", 1001, 3), store("u8", 0, const("u8", 2))), {},
      "R0104"),
     ("stop", (("stop", "R0109", 3),), {}, "R0109"),
+    ("raise", (store("u8", 0, const("u8", 1)), ("raise", load("u32", 0), 3)), {}, "R0122"),
     ("mark", (("mark", 1, (), const("b", True)), store("u8", 0, const("u8", 1)), ("mark", 0, (0, 8, 1, 2), const("b", False))),
      {}, b"\1"),
     ("count", (("count", 0), store("u8", 0, const("u8", 1)), ("count", 1)), {}, b"\1"),

@@ -79,7 +79,7 @@ class Counting:
 
 def leaves(node: Node, in_loop: bool = False) -> bool:
     """True if what stands behind a statement may not be executed although the statement was, without a trap."""
-    if node[0] in ("return", "stop") or (node[0] in ("exit", "next") and not in_loop):
+    if node[0] in ("return", "stop", "raise") or (node[0] in ("exit", "next") and not in_loop):
         return True
     inside: tuple[Block, ...] = blocks(node)
     return any(leaves(inner, in_loop or node[0] == "loop") for block in inside for inner in block)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE
-from fbvm.code.operations import SIZES, TEXT_UNITS, WAYS_OUT, Address, Block, Node
+from fbvm.code.operations import RAISED, SIZES, TEXT_UNITS, WAYS_OUT, Address, Block, Node
 from fbvm.engine.case_tables import FEW_VALUES, case_table
 from fbvm.engine.native.emit.expressions import flag_mask, place
 from fbvm.engine.native.emit.step_charges import charge
@@ -223,7 +223,9 @@ def _attempt(w: Writer, pou: int, address: Address | None, number: int, traps: b
         other = w.new(f"icmp uge i32 {w.new(f'sub i32 {what}, 1')}, {most}")
         w.emit(f"br i1 {other}, label %{passing}, label %{over}, {RARE}")
         w.emit(f"{over}:")
-        w.emit(f"store i32 {what}, ptr {slot}, align 4")
+        own = w.new(f"load i32, ptr {w.field('values')}, align 8")
+        is_raised = w.new(f"icmp eq i32 {what}, {RAISED}")
+        w.emit(f"store i32 {w.new(f'select i1 {is_raised}, i32 {own}, i32 {what}')}, ptr {slot}, align 4")
         w.emit(f"store i64 {w.system(BUDGET)}, ptr %budget")
         w.emit(f"br label %{after}")
     w.begin(good)
@@ -244,6 +246,11 @@ def _due(w: Writer, a: Node) -> None:
 
 def _stop(w: Writer, code: str, site: int) -> None:
     w.trap(code, site)
+
+
+def _raise(w: Writer, a: Node, site: int) -> None:
+    w.end("R0122", site, (("u32", w.value(a)),))
+    w.dead = True
 
 
 def _count(w: Writer, number: int) -> None:
@@ -272,7 +279,7 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
-    "attempt": _attempt, "charge": charge, "due": _due, "stop": _stop,
+    "attempt": _attempt, "charge": charge, "due": _due, "stop": _stop, "raise": _raise,
     "observe": _observe, "count": _count, "mark": _mark,
 }
 """How each statement is written: called with the operands of its row."""
