@@ -63,7 +63,7 @@ class RungLines:
         for line in rung.lines:
             if note := _NOTE.fullmatch(line):
                 text = _attached(rung, int(note[1] or note[2]))
-                if note[1] and lines:
+                if text and note[1] and lines:
                     lines[-1] += f"  // {text}"
                 elif text:
                     lines.append(f"' {text}")

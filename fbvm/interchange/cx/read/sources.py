@@ -79,9 +79,7 @@ class _Sources:
             head = f"{kind} CONSTANT" if symbol.is_constant else kind
             note = f" // {symbol.comment}" if symbol.comment else ""
             try:
-                if symbol.type == BLOCK and symbol.block.casefold() not in self.blocks:
-                    raise SymbolError(f"there is no definition of the function block {symbol.block}")
-                parts.setdefault(head, []).append(symbol.declaration + note)
+                parts.setdefault(head, []).append(symbol.declared(self._block_of(symbol)) + note)
             except SymbolError as error:
                 self.reading.report("X0203", symbol.row.start,
                                     f"{where}: symbol {symbol.name} is not taken over: {error.args[0]}")
@@ -90,6 +88,15 @@ class _Sources:
                 self.reading.report("X0190", symbol.row.start, f"{where}: the symbol {symbol.name} is called {symbol.own} here, "
                                     "as its name is no name of Structured Text, or stands twice")
         return [line for head, lines in parts.items() for line in (head, *lines, "END_VAR", "")]
+
+    def _block_of(self, symbol: Symbol) -> str:
+        """What the sources call the function block of an instance; "" for what is none.  Raises SymbolError."""
+        if symbol.type != BLOCK:
+            return ""
+        block = self.blocks.get(symbol.block.casefold())
+        if block is None:
+            raise SymbolError(f"there is no definition of the function block {symbol.block}")
+        return self.names[id(block)]
 
     def _rows(self, symbols: Iterable[Symbol], named: bool) -> Iterator[str]:
         """Rows of a table for what no declaration says: timers and counters, and comments of addresses."""
@@ -124,7 +131,7 @@ class _Sources:
         is_first = program is self.plc.programs[0]
         body = list(rungs.sections(sections))
         called = {line.split()[2] for line in body if line.startswith("FBCALL")}
-        outside = [f"{symbol.own} : {spelling(symbol.block)};" for symbol in self.plc.symbols
+        outside = [f"{symbol.own} : {self._block_of(symbol)};" for symbol in self.plc.symbols
                    if symbol.type == BLOCK and symbol.own in called]
         lines = [f"// {' '.join(program.comment.split())}"] if program.comment else []
         lines += [f"PROGRAM {name}", *(["VAR_EXTERNAL", *outside, "END_VAR"] if outside else []),
@@ -231,7 +238,8 @@ class _Sources:
 
 def _rows_by_name(symbols: Iterable[Symbol]) -> dict[str, Row]:
     """The rows of symbols, by the names that the sources have, in small letters; of comments of addresses, by these."""
-    return {(symbol.own or symbol.address).casefold(): symbol.row for symbol in symbols}
+    named = ((symbol.own or symbol.address, symbol.row) for symbol in symbols)
+    return {name.casefold(): row for name, row in named if name}
 
 
 class _Definitions:

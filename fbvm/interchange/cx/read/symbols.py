@@ -48,20 +48,17 @@ class Symbol:
         """Whether the row names a timer or a counter."""
         return self.type in NUMBERED
 
-    @property
-    def declaration(self) -> str:
-        """The declaration in Structured Text.  Raises SymbolError."""
+    def declared(self, block: str) -> str:
+        """The declaration in Structured Text; `block` is what the sources call its function block.  Raises SymbolError."""
         if self.is_constant:
             if not re.fullmatch(r"[+-]?\d{1,10}", self.address):
                 raise SymbolError(f"{self.address} is no number")
             value = whole_number(self.address)
             return f"{self.own} : {'UDINT' if value > 65535 else 'UINT' if value >= 0 else 'INT'} := {value};"
         place = f" AT {location(self.address, self.type)}" if self.address else ""
-        return f"{self.own}{place} : {self._spec()};"
+        return f"{self.own}{place} : {block or self._spec()};"
 
     def _spec(self) -> str:
-        if self.type == BLOCK:
-            return spelling(self.block)
         found = _ARRAY.fullmatch(self.type)
         kind = TYPES.get(found[1] if found else self.type)
         if kind is None:
