@@ -128,7 +128,8 @@ class Bodies:
         labels = {item.text.upper() for item in diagram.objects if item.kind == "label"}
         for item in diagram.objects:
             if item.kind == "jump" and item.text.upper() not in labels:
-                self.reading.report("X0202", item.element, f"there is no label {item.text}")
+                said = f"there is no label {item.text}" if item.text else "the jump names no label"
+                self.reading.report("X0202", item.element, said)
                 item.broken = True
 
     def _rung(self, network: Network, steps: list[str] | None) -> list[str] | None:

@@ -60,7 +60,8 @@ class Calls:
         context = self.context
         arguments = self._arguments(item, [pin for pin in item.inputs if pin.connected])
         root = context.scope.root(item.instance)
-        writes = {root, SHARED, *(context.scope.root(text) for text in self._in_outs(item, arguments))}
+        in_outs = self._in_outs(item, arguments)
+        writes = {root, SHARED, *map(context.scope.root, in_outs)}
         enabled = any(text.startswith("EN :=") for text in arguments)
         if enabled:
             for sink, wire in self._next_sinks(item):
@@ -71,6 +72,7 @@ class Calls:
         if eno:
             context.write(f"{eno.text} := FALSE;", eno.reads)
         context.write(f"{item.instance}({', '.join(arguments)});", frozenset(writes))
+        self._lead_on(item, in_outs)
         for pin in item.outputs:
             wire = Wire(item, pin.name)
             if pin.name.upper() == "ENO":
@@ -145,8 +147,12 @@ class Calls:
                 self.context.value_at(item, pin)
             names += texts
             arguments.append(f"{pin.name} := {texts[0]}")
-            self.context.set_output(Wire(item, pin.name), self.context.expression(texts[0]))
         return names
+
+    def _lead_on(self, item: Object, in_outs: list[str]) -> None:
+        """Behind a call, lead the variables at its in-outs on to what is wired to their right."""
+        for pin, text in zip(item.in_outs, in_outs, strict=True):
+            self.context.set_output(Wire(item, pin.name), self.context.expression(text))
 
     # --- functions ---
 
@@ -240,7 +246,8 @@ class Calls:
         context = self.context
         condition = self._enable(item)
         arguments = self._arguments(item, [pin for pin in item.inputs if pin.connected and pin.name.upper() != "EN"])
-        writes = {SHARED, *(context.scope.root(text) for text in self._in_outs(item, arguments))}
+        in_outs = self._in_outs(item, arguments)
+        writes = {SHARED, *map(context.scope.root, in_outs)}
         result = self._result_pin(item)
         self._take_outputs(item, result, arguments, keeps=condition is not None)
         wire = Wire(item, result.name if result else "")
@@ -250,6 +257,7 @@ class Calls:
             context.set_output(wire, negation(value) if result.negated else value)
             return
         self._as_statement(item, wire if context.uses[item, wire.pin] else None, condition, arguments, frozenset(writes))
+        self._lead_on(item, in_outs)
 
     def _result_pin(self, item: Object) -> Pin | None:
         """The output of a function that is its result: the first one that is neither ENO nor a VAR_OUTPUT."""

@@ -107,8 +107,6 @@ class Statements:
 
     def _leave(self, item: Object) -> None:
         context = self.context
-        if item.kind == "jump" and not item.text:
-            raise Unexecutable(item, "the jump names no label", "")
         power = context.held.pop((item, "jump")).value
         context.lines.append(when(power, f"JMP {item.text};" if item.kind == "jump" else "RETURN;"))
 
