@@ -51,9 +51,9 @@ PART = """<pou name="Part" pouType="functionBlock"><interface><inputVars><variab
 </outputVars><inOutVars><variable name="io"><type><INT/></type></variable></inOutVars><externalVars><variable name="shared">
 <type><INT/></type></variable></externalVars></interface><actions><action name="Stop"><body><ST><xhtml:p>done := FALSE;</xhtml:p>
 </ST></body></action></actions><body><ST><xhtml:p>shared := io; done := u;</xhtml:p></ST></body></pou>"""
-SPLIT = """<pou name="Split" pouType="function"><interface><returnType><INT/></returnType><inputVars><variable name="v"><type>
-<INT/></type></variable></inputVars><outputVars><variable name="rest"><type><INT/></type></variable></outputVars></interface><body>
-<ST><xhtml:p>Split := v / 10; rest := v MOD 10;</xhtml:p></ST></body></pou>"""
+SPLIT = """<pou name="Split" pouType="function"><interface><returnType><INT/></returnType><inputVars>
+<variable name="v"><type><INT/></type></variable></inputVars><outputVars><variable name="rest"><type><INT/></type></variable>
+</outputVars></interface><body><ST><xhtml:p>Split := v / 10; rest := v MOD 10;</xhtml:p></ST></body></pou>"""
 MEMORY = integers("n", "m", "k") + bits("a b c d x y z") + variable("t", "TON") + variable("s", "CTU") + variable("p", "Part") \
     + variable("time", "TIME") + variable("r", "REAL") + variable("q", "REAL")
 WAYS = RAIL + contact(2, "1", "a") + contact(3, "2", "b") + contact(4, "2", "c", 'negated="true"')
