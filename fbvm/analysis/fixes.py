@@ -49,8 +49,8 @@ def fixes(program: Program, name: str, start: int, end: int) -> list[Fix]:
         found += [Fix(fix.title, fix.diagnostic, fix.edits, fix is worked[0]) for fix in worked]
         if diagnostic.severity == "warning":
             found.append(_suppression(diagnostic))
-        elif diagnostic.code == "S0201" and not worked and (declared := _declared(program, name, diagnostic)) is not None:
-            found.append(declared)
+        elif diagnostic.code == "S0201" and "is not declared" in diagnostic.message and not worked:
+            found += _declared(program, name, diagnostic)
     return found
 
 
@@ -141,13 +141,13 @@ def _suppression(diagnostic: Diagnostic) -> Fix:
                 (end, end, f"\n{indent}{{warning restore {diagnostic.code}}}")))
 
 
-def _declared(program: Program, name: str, diagnostic: Diagnostic) -> Fix | None:
-    """Declares a name that is unknown, with the first type that fits."""
+def _declared(program: Program, name: str, diagnostic: Diagnostic) -> list[Fix]:
+    """Declares a name that is unknown, with the first type that fits; nothing if none does."""
     part = program.files[name].part_at(diagnostic.start)
     text, pou = program.files[name].text, part.pou
     written = text[diagnostic.start:diagnostic.end]
     if pou is None or not written.isidentifier():
-        return None
+        return []
     section = next((each for each in reversed(pou.sections) if each.kind == "VAR" and not each.hidden and not each.qualifiers),
                    None)
     for kind in TYPES:
@@ -159,5 +159,5 @@ def _declared(program: Program, name: str, diagnostic: Diagnostic) -> Fix | None
             edit = part.base + behind, part.base + behind, f"\nVAR\n    {written} : {kind};\nEND_VAR"
         fix = Fix(f"Declare {written} : {kind}", diagnostic, (edit,), True)
         if _helps(program, name, fix):
-            return fix
-    return None
+            return [fix]
+    return []

@@ -261,14 +261,21 @@ class Operands:
         return Contents(start, end, place, kind, converted)
 
     def _place(self, text: str, start: int, end: int) -> Expr:
-        """A symbol with its members and elements."""
-        first, *rest = re.findall(r"\w+|\[\d+\]", text)
-        place: Expr = NameRef(start, end, first)
+        """A symbol with its members and elements; each name has its own place if the operand stands in the text as it is here."""
+        first, *rest = re.finditer(r"\w+|\[\d+\]", text)
+        is_written = end - start == len(text)
+
+        def span(part: re.Match[str]) -> tuple[int, int]:
+            return (start + part.start(), start + part.end()) if is_written else (start, end)
+
+        place: Expr = NameRef(*span(first), first[0])
         for part in rest:
-            if part.startswith("["):
-                place = Index(start, end, place, (Literal(start, end, "int", whole_number(part[1:-1]), None, part[1:-1]),))
+            at, behind = span(part)
+            if part[0].startswith("["):
+                number = Literal(at, behind, "int", whole_number(part[0][1:-1]), None, part[0][1:-1])
+                place = Index(start, behind, place, (number,))
             else:
-                place = Member(start, end, place, Name(start, end, part))
+                place = Member(start, behind, place, Name(at, behind, part[0]))
         return place
 
 
