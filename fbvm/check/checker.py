@@ -18,9 +18,10 @@ from fbvm.check.symbols.context import Context, Evaluate, Rules
 from fbvm.check.symbols.dependencies import Dependencies
 from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
+from fbvm.syntax.tree import il
 
 RULES = Rules(
-    expressions={**rules.RULES, tree.Call: calls.value},
+    expressions={**rules.RULES, tree.Call: calls.value, il.CallsInRow: calls.in_row},
     type_declaration=specs.type_declaration,
     global_variable=globals.declare_early,
     interface=interfaces.resolve_interface,

@@ -11,6 +11,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Pou, PouCall, Variable
 from fbvm.syntax import tree
+from fbvm.syntax.tree.il import CallsInRow
 
 
 def value(scope: Scope, call: tree.Call, want: Type | None) -> Type | None:
@@ -28,6 +29,22 @@ def statement(scope: Scope, call: tree.Call) -> None:
     result = _resolve(scope, call, None, as_value=False)
     if isinstance(result, Type):
         scope.facts.types[call] = result
+
+
+def in_row(scope: Scope, expr: CallsInRow, want: Type | None) -> Type | None:
+    """The type of the result of the last call of an instruction list that has one, else of the current result before."""
+    kind: Type | None = None
+    for call in expr.calls:
+        errors = len(scope.project.report.diagnostics)
+        statement(scope, call)
+        if call in scope.facts.types:
+            scope.facts.last_calls[expr] = call
+            kind = scope.settle(call)
+        elif call not in scope.facts.calls or len(scope.project.report.diagnostics) > errors:
+            return None
+    if kind is None and expr.before is None:
+        return value(scope, expr.calls[-1], want)
+    return kind if kind is not None or expr.before is None else scope.settle(expr.before)
 
 
 def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -> Type | str | None:

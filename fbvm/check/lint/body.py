@@ -117,7 +117,7 @@ _BELOW: dict[type, Callable[[Any], Nodes]] = {
     tree.StructInit: lambda n: tuple(value for _, value in n.fields),
     tree.Literal: _nothing, tree.EnumLiteral: _nothing, tree.NullLiteral: _nothing, tree.NameRef: _nothing,
     tree.Direct: _nothing,
-    il.InstructionList: lambda n: n.body,
+    il.InstructionList: lambda n: n.body, il.CallsInRow: lambda n: (n.before, *n.calls),
     ladder.Ladder: lambda n: n.body, ladder.Rung: lambda n: n.body, sfc.Sfc: lambda n: n.body,
     ladder.Edge: lambda n: (n.of, n.memory), ladder.Element: lambda n: (n.value,),
     ladder.Memory: lambda n: (n.address,), ladder.Words: lambda n: (n.of,),

@@ -13,6 +13,7 @@ from fbvm.base.types import BOOL, ArrayType, Elementary, Field, RefType, StructT
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
+from fbvm.syntax.tree.il import CallsInRow
 
 Value = int | float | bool | bytes | str
 """A constant: bool for BOOL, int for integers, bits, times, enumerations and characters, float for reals, bytes for STRING,
@@ -366,6 +367,8 @@ class Facts:
     calls: dict[tree.Call, PouCall | StandardCall] = field(default_factory=dict)
     rewritten: dict[tree.Expr, tree.Expr] = field(default_factory=dict)
     """Expressions that mean the same as another one (ADD(a, b) is a + b)."""
+    last_calls: dict[CallsInRow, tree.Call] = field(default_factory=dict)
+    """Of calls of an instruction list one behind the other the last that has a result."""
     guards: dict[tree.Call, Guard] = field(default_factory=dict)
     labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     failed: set[tree.Expr] = field(default_factory=set)

@@ -15,6 +15,7 @@ from fbvm.code.lowering.context import BodyContext, PlaceRules, StatementRules, 
 from fbvm.code.lowering.variables import loaded
 from fbvm.code.operations import Node
 from fbvm.syntax import tree
+from fbvm.syntax.tree.il import CallsInRow
 
 
 def _statement(body: BodyContext, node: tree.CallStatement, site: int) -> None:
@@ -31,6 +32,23 @@ def _statement(body: BodyContext, node: tree.CallStatement, site: int) -> None:
         _standard(body, called, call)
     else:
         body.to_temporary(body.value(call))
+
+
+def _in_row(body: BodyContext, expr: CallsInRow) -> Node:
+    """Executes calls of an instruction list one behind the other: the last result, or what was the current result before."""
+    last = body.facts.last_calls.get(expr)
+    position = expr.calls.index(last) if last is not None else -1
+    kept: Node | None = None
+    if last is None:
+        assert expr.before is not None
+        kept = body.to_temporary(body.value(expr.before), always=True)
+    for number, call in enumerate(expr.calls):
+        if number == position:
+            kept = body.value(call) if last is expr.calls[-1] else body.to_temporary(body.value(call), always=True)
+        else:
+            body.lower((tree.CallStatement(call.start, call.end, call),))
+    assert kept is not None
+    return kept
 
 
 def _value(body: BodyContext, call: tree.Call) -> Node:
@@ -113,6 +131,6 @@ _INTRINSICS: dict[str, Callable[[BodyContext, StandardCall], Node]] = {
 }
 """Functions of places, by their keys: what they take is not the value of an argument, but where it lies."""
 
-VALUES: ValueRules = {tree.Call: _value}
+VALUES: ValueRules = {tree.Call: _value, CallsInRow: _in_row}
 PLACES: PlaceRules = {tree.Call: _place}
 STATEMENTS: StatementRules = {tree.CallStatement: _statement}

@@ -20,16 +20,18 @@ class Needs(NamedTuple):
     behind: list[bool]
 
 
-def needs(instructions: Sequence[Instruction], at_end: bool) -> Needs:
+def needs(instructions: Sequence[Instruction], at_end: bool, calls_replace: bool = True) -> Needs:
     """Where the current result is needed: where some way on leads to an instruction that uses it before one replaces it, or to
-    the end of the list, if it is needed `at_end`."""
+    the end of the list, if it is needed `at_end`.
+
+    A formal call replaces it if the function has a result, which only the checker knows: with `calls_replace` all do."""
     labels = {fold(each.label.text): at for at, each in enumerate(instructions) if each.label is not None}
     front = [False] * len(instructions) + [at_end]
     while True:
         before = list(front)
         behind = [_behind(at, each, front, labels) for at, each in enumerate(instructions)]
         for at in reversed(range(len(instructions))):
-            front[at] = _needs(instructions[at]) or not _replaces(instructions[at]) and behind[at]
+            front[at] = _needs(instructions[at]) or not _replaces(instructions[at], calls_replace) and behind[at]
         if front == before:
             return Needs(front, behind)
 
@@ -51,9 +53,9 @@ def _needs(instruction: Instruction) -> bool:
     return bool(operator.condition) or operator.kind != "load" and operator.kind not in _PASSES
 
 
-def _replaces(instruction: Instruction) -> bool:
+def _replaces(instruction: Instruction, calls_replace: bool) -> bool:
     operator = OPERATORS.get(instruction.name)
-    return operator.kind == "load" if operator is not None else is_formal(instruction)
+    return operator.kind == "load" if operator is not None else calls_replace and is_formal(instruction)
 
 
 def is_formal(instruction: Instruction) -> bool:

@@ -22,7 +22,7 @@ from fbvm.syntax.st.declarations import SET_BY
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.statements import Statements
 from fbvm.syntax.tree import Argument, Expr, Name, NameRef
-from fbvm.syntax.tree.il import InstructionList, TypeOf
+from fbvm.syntax.tree.il import CallsInRow, InstructionList, TypeOf
 
 LONGEST = 100
 """Operations of one expression: a longer current result is kept in a temporary."""
@@ -84,10 +84,12 @@ class ListLowering:
 
     def lower(self, instructions: list[Instruction], start: int, end: int) -> InstructionList:
         """The node of the list from `start` to `end`; what cannot be executed is reported to the builder."""
-        needed = needs(instructions, bool(_BEHIND_CONDITION.match(self.builder.source.text, end)))
+        at_end = bool(_BEHIND_CONDITION.match(self.builder.source.text, end))
+        needed_at = needs(instructions, at_end).front
+        needed = needs(instructions, at_end, calls_replace=False)
         for at, each in enumerate(instructions):
             if each.label is not None:
-                self.needed_at[fold(each.label.text)] = needed.front[at]
+                self.needed_at[fold(each.label.text)] = needed_at[at]
         self.first = start
         for at, each in enumerate(instructions):
             try:
@@ -110,7 +112,7 @@ class ListLowering:
     def _instruction(self, each: Instruction, needed: bool) -> None:
         operator = OPERATORS.get(each.name)
         if operator is None:
-            self._function(each)
+            self._function(each, needed)
             return
         if self.open and operator.kind not in ("load", "not", "binary", "close"):
             raise InstructionError(f"{each.name} stands in brackets", "only operations and functions stand between `(` and `)`")
@@ -150,8 +152,9 @@ class ListLowering:
         if result is None or self.is_wrong or isinstance(result, tree.Literal) or self._is_temporary(result):
             return
         start = min(self.first, result.start)
-        if isinstance(result, tree.Call):
-            self._add(tree.CallStatement(start, result.end, result))
+        if isinstance(result, tree.Call | CallsInRow):
+            for call in result.calls if isinstance(result, CallsInRow) else (result,):
+                self._add(tree.CallStatement(min(start, call.start), call.end, call))
             return
         target = self._declared(start, result.end, result)
         self._add(tree.Assign(start, result.end, (target,), ":=", result))
@@ -267,7 +270,7 @@ class ListLowering:
 
     # --- calls ---
 
-    def _function(self, each: Instruction) -> None:
+    def _function(self, each: Instruction, needed: bool) -> None:
         assert each.word is not None
         if each.name in _RUNG_WORDS:
             raise InstructionError(f"{each.name} is a mnemonic of ladder, no operator of the instruction list",
@@ -275,15 +278,35 @@ class ListLowering:
         if each.word.type in ("RPAR", "NUMBER") or not each.word.text[0].isidentifier():
             raise InstructionError(f"an operator is expected, but `{each.word.text}` found", "", each.word)
         if is_formal(each):
-            self._use_up()
-            self._begin(each)
-            self.result = self._parsed(each, [each.word, *each.operands])[0]
-            self.operations, self.is_unused = 1, True
+            self._formal_call(each, each.word, needed)
             return
         arguments = (self._current(each), *self._operands(each, each.operands))
         name = NameRef(each.word.start, each.word.end, each.word.text)
         given = tuple(Argument(one.start, one.end, "", None, one) for one in arguments)
         self._combine(each, tree.Call(each.word.start, each.end, name, given))
+
+    def _formal_call(self, each: Instruction, word: Token, needed: bool) -> None:
+        """A call with all arguments in brackets.  The current result stays if the function has none, which the checker knows."""
+        calls: tuple[tree.Call, ...] = ()
+        before = self.result
+        if needed and self.is_unused and isinstance(before, tree.Call):
+            calls, before = (before,), None
+        elif needed and self.is_unused and isinstance(before, CallsInRow):
+            calls, before = before.calls, before.before
+        elif needed and before is not None:
+            self._kept(each, True)
+            before = self.result
+        else:
+            self._use_up()
+            before = None
+        if not calls:
+            self._begin(each)
+        call = self._parsed(each, [word, *each.operands])[0]
+        if isinstance(call, tree.Call) and (calls or before is not None):
+            self.result = CallsInRow(call.start, call.end, (*calls, call), before)
+        else:
+            self.result = call
+        self.operations, self.is_unused = 1, True
 
     def _call(self, each: Instruction, operator: Operator, needed: bool) -> None:
         called = self._parsed(each, each.operands)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.tree.expressions import Expr
+from fbvm.syntax.tree.expressions import Call, Expr
 from fbvm.syntax.tree.node import node as _node
 from fbvm.syntax.tree.nodes import Block, Statement, TypeSpec, VarDecl
 
@@ -12,6 +12,17 @@ class TypeOf(TypeSpec):
     """The type of the value of an expression: a current result that is needed again has the type of what was computed."""
 
     of: Expr
+
+
+@_node
+class CallsInRow(Expr):
+    """Calls with all their arguments in brackets, one behind the other: its value is the result of the last that has one.
+
+    If none has a result, its value is `before`, the current result in front of the first; None if there is none, or if the
+    first replaces one that nobody has used."""
+
+    calls: tuple[Call, ...]
+    before: Expr | None
 
 
 @_node
