@@ -83,6 +83,9 @@ class Plant:
             image = images[kind.row.name] if images else self._image(kind.row)
             if image:
                 self._build(kind, image)
+        for number, picture in enumerate(() if images else project.pictures):
+            if not picture.file.is_file():
+                self._report(("picture", number, "file"), f"picture {number + 1}: there is no file {picture.file}")
         if (net or project.net) != project.net:
             self.diagnostics += project.wrong_on(net or project.net)
         if errors(self.diagnostics):

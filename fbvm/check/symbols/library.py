@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cache, lru_cache
@@ -103,11 +103,11 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(source[:-len(".st")]): folder / source for source in sources}
         spaces = _listed(table, "spaces", described, "a list of names")
-        lists = _listed(table, "lists", described, "a list of file names")
-        yield Library(name, folder, files, _listed(table, "globals", described, "a list of file names"),
+        lists = _files_of(table, "lists", described)
+        yield Library(name, folder, files, _files_of(table, "globals", described),
                       _mailbox(table, described), _pins(table, described), frozenset(map(fold, spaces)),
                       _written(table, described), _flag(table, "by_dialect", described),
-                      lists, _names_in(folder, lists, described), _task(table, described))
+                      lists, _names_in(folder, lists, described), _task(table, files, described))
 
 
 def _described(described: Path) -> dict[str, object]:
@@ -133,6 +133,17 @@ def _listed(table: dict[str, object], key: str, described: Path, what: str) -> t
     return tuple(listed)
 
 
+def _files_of(table: dict[str, object], key: str, described: Path) -> tuple[str, ...]:
+    """The files that a key names, which stand beside the description."""
+    files = _listed(table, key, described, "a list of file names")
+    for name in files:
+        if Path(name).name != name:
+            raise LibraryError(described, f"{key}: {name} is no file of this folder")
+        if not (described.parent / name).is_file():
+            raise LibraryError(described, f"{key}: there is no file {name} in this folder")
+    return files
+
+
 _DECLARED = re.compile(r"^\s*([A-Za-z_]\w*)\s*(?:AT\b[^:]*)?:", re.M)
 
 
@@ -149,10 +160,12 @@ def _names_in(folder: Path, lists: tuple[str, ...], described: Path) -> dict[str
     return names
 
 
-def _task(table: dict[str, object], described: Path) -> str:
+def _task(table: dict[str, object], files: Mapping[str, Path], described: Path) -> str:
     task = table.get("task", "")
     if not isinstance(task, str):
         raise LibraryError(described, "task must be the name of a function")
+    if task and fold(task) not in files:
+        raise LibraryError(described, f"task: there is no file {task}.st in this folder")
     return task
 
 

@@ -356,6 +356,14 @@ def test_a_source_that_is_not_there_is_told_at_its_place(folder: Path) -> None:
     assert found[0].hint.startswith("there is ") and "counter.st" in found[0].hint
 
 
+def test_a_picture_that_is_not_there_is_told_at_its_place(folder: Path) -> None:
+    text = '[plc.a]\nsources = ["counter.st"]\n[[picture]]\nfile = "tank.svg"\n'
+    found = errors(Plant(project(folder, text)).diagnostics)
+    assert said(found) == [("P0103", 4, f"picture 1: there is no file {folder / 'tank.svg'}")]
+    (folder / "tank.svg").write_text("<svg/>")
+    assert errors(Plant(project(folder, text)).diagnostics) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("program", "unit", "said"), [
     ("PROGRAM Main VAR s : ETN_Modbus_Server; END_VAR s(); END_PROGRAM", "ETN21", "the library omron/etn_modbus"),

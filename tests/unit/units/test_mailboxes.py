@@ -183,11 +183,16 @@ def test_a_mailbox_that_cannot_be(tmp_path: Path, area: str, sizes: tuple[object
 
 
 def test_what_a_library_cannot_mean(tmp_path: Path) -> None:
+    (tmp_path / "inside").mkdir()
     for text, why in (
         ("global = ['A.st']", "did you mean globals?"), ("by_dialects = true", "did you mean by_dialect?"),
         ("spaces = 'Standard'", "spaces must be a list of names"), ("by_dialect = 'yes'", "by_dialect must be true or false"),
         ("writes = ['X']", "writes must be a list of areas"), ("globals = [1]", "globals must be a list of file names"),
-        ("lists = ['gone.st']", "gone.st cannot be read"), ("task = 5", "task must be the name of a function"),
+        ("lists = ['gone.st']", "lists: there is no file gone.st in this folder"),
+        ("globals = ['gone.st']", "globals: there is no file gone.st in this folder"),
+        ("globals = ['inside']", "globals: there is no file inside in this folder"),
+        ("lists = ['../gone.st']", "lists: ../gone.st is no file of this folder"),
+        ("task = 'Gone'", "task: there is no file Gone.st in this folder"), ("task = 5", "task must be the name of a function"),
         ("[pins]\nA = 1", "pins has for each POU a table"), ("x =", "Invalid value"),
     ):
         (tmp_path / "library.toml").write_text(text, encoding="utf-8")
@@ -200,6 +205,7 @@ def test_what_a_library_cannot_mean(tmp_path: Path) -> None:
 def test_two_libraries_cannot_mean_different_mailboxes(library: Path) -> None:
     other = library / "other"
     other.mkdir()
+    (other / "Box_Memory.st").write_text(MEMORY)
     (other / "library.toml").write_text(TOML.replace("slots = 2", "slots = 3"))
     [found] = compile_text("PROGRAM Main END_PROGRAM", libraries=[library]).diagnostics
     assert (found.code, found.message) == ("P0201", "PBX is another library's mailbox, too")
