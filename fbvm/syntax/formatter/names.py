@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
-from fbvm.syntax.formatter.scopes import Scope, declared_in, element, global_scope, members
+from fbvm.syntax.formatter.scopes import Entry, Scope, declared_in, element, global_scope, members, of_method, with_inherited
 from fbvm.syntax.tree import (
     Argument,
     ArrayInit,
@@ -41,6 +41,7 @@ from fbvm.syntax.tree.node import names_of
 from fbvm.syntax.tree.sfc import Association, Sfc, Transition
 
 TYPE_WORDS = frozenset(ELEMENTARY) | GENERIC | set(SHORT_NAMES) | {"STRING", "WSTRING"}
+_WITH_METHODS = ("FUNCTION_BLOCK", "CLASS", "PROGRAM", "INTERFACE")
 Shape = TypeSpec | Pou | None
 """What is known of a value's type."""
 
@@ -81,13 +82,23 @@ class Spelling:
         while todo:
             node, scope = todo.pop()
             if isinstance(node, Pou):
-                scope = declared_in(node, self.globals)
+                scope = self._names_in(node, scope)
             self._visit(node, scope)
             if isinstance(node, Transition) and node.name is not None:
                 declared.append(node.name.start)
             todo.extend((child, scope) for child in _children(node) if not _is_ladder(child))
         for start in declared:  # what an instruction list computes is assigned there
             self.at.pop(start, None)
+
+    def _names_in(self, pou: Pou, around: Scope) -> Scope:
+        """The names in a POU; `around` are those of the block that a METHOD stands in."""
+        if "THIS" in around:
+            return of_method(pou, around, self.globals)
+        scope = declared_in(pou, self.globals)
+        if pou.kind not in _WITH_METHODS:
+            return scope
+        base = self._named(pou.bases[0].text) if pou.bases else None
+        return self._members(pou) | scope | {"THIS": Entry("THIS", pou), "SUPER": Entry("SUPER", base)}
 
     def _visit(self, node: Node, scope: Scope) -> None:
         if isinstance(node, NameRef):
@@ -201,7 +212,7 @@ class Spelling:
     def _members(self, shape: Shape) -> Scope:
         shape = self._resolved(shape)
         if shape not in self.members:
-            self.members[shape] = members(shape)
+            self.members[shape] = with_inherited(shape, self._named) if isinstance(shape, Pou) else members(shape)
         return self.members[shape]
 
     def _called(self, callee: Expr, scope: Scope) -> Shape:
@@ -233,6 +244,8 @@ class Spelling:
             return entry.shape if entry else None
         if isinstance(link, Call):
             return shape.result if isinstance(shape, Pou) else None
+        if isinstance(link, Deref) and isinstance(shape, Pou):
+            return shape  # THIS^ and SUPER^
         return element(shape) if isinstance(link, (Index, Deref)) else None
 
 

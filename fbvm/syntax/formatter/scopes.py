@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from fbvm.base.types import fold
@@ -92,6 +92,11 @@ def _enumerated(scope: Scope, spec: TypeSpec | None) -> None:
             scope.setdefault(fold(name.text), Entry(name.text, None))
 
 
+def of_method(method: Pou, block: Scope, outer: Scope) -> Scope:
+    """The names in a METHOD, or an accessor of a PROPERTY: its own, and those of its block."""
+    return block | declared_in(method, outer)
+
+
 def members(shape: TypeSpec | Pou | None) -> Scope:
     """The names that may follow a dot or name an argument."""
     scope: Scope = {}
@@ -99,6 +104,32 @@ def members(shape: TypeSpec | Pou | None) -> Scope:
         _declare(scope, shape.members)
     elif isinstance(shape, Pou):
         _variables(scope, shape.sections)
+        for action in shape.actions:
+            scope.setdefault(fold(action.name.text), Entry(action.name.text, None))
+        for method in shape.methods:
+            value = method.result if method.kind == "GET" else _given(method) if method.kind == "SET" else method
+            scope.setdefault(fold(method.name.text), Entry(method.name.text, value))
+    return scope
+
+
+def _given(setter: Pou) -> TypeSpec | None:
+    """The type of a property that has only SET: that of its input."""
+    inputs = (section for section in setter.sections if section.kind == "VAR_INPUT")
+    return next((variable.spec for section in inputs for variable in section.variables), None)
+
+
+def with_inherited(pou: Pou, named: Callable[[str], TypeSpec | Pou | None]) -> Scope:
+    """The names of a block or an interface and of all that it extends, its own first; `named` knows what a name stands for."""
+    scope: Scope = {}
+    waiting, seen = [pou], {pou}
+    while waiting:
+        here = waiting.pop(0)
+        scope = {**members(here), **scope}
+        for written in (*here.bases, *(here.interfaces if here.kind == "INTERFACE" else ())):
+            base = named(written.text)
+            if isinstance(base, Pou) and base not in seen:
+                seen.add(base)
+                waiting.append(base)
     return scope
 
 

@@ -320,6 +320,49 @@ def test_names_of_members_steps_actions_tasks_and_programs_are_written_as_declar
         assert line in lines
 
 
+METHODS = """FUNCTION_BLOCK Base
+VAR Speed : INT; END_VAR
+METHOD PUBLIC Start : BOOL
+VAR_INPUT Go : BOOL; END_VAR
+    START := GO AND speed > 3;
+END_METHOD
+PROPERTY Run : BOOL
+GET
+    run := SPEED > 0;
+END_GET
+SET
+    SPEED := BOOL_TO_INT(RUN);
+END_SET
+END_PROPERTY
+END_FUNCTION_BLOCK
+INTERFACE IWork
+METHOD Work END_METHOD
+END_INTERFACE
+FUNCTION_BLOCK Motor EXTENDS base IMPLEMENTS iwork
+VAR Other : BASE; END_VAR
+METHOD Work
+VAR Own, other : INT; END_VAR
+    OWN := SPEED; start(GO := TRUE); OTHER := 1; this^.WORK(); super^.start(go := TRUE); RUN := FALSE;
+END_METHOD
+work(); START(go := OTHER.RUN);
+ACTION Act: SPEED := 1; END_ACTION
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR M : Motor; I : IWork; END_VAR
+m.WORK(); m.START(GO := TRUE); m.RUN := m.SPEED = 1; i := m; i.WORK(); m.ACT();
+END_PROGRAM
+"""
+
+
+def test_names_in_and_of_methods_and_properties_are_written_as_declared() -> None:
+    text = written(METHODS)
+    for line in ("Start := Go AND Speed > 3;", "Run := Speed > 0;", "Speed := BOOL_TO_INT(Run);", "EXTENDS Base IMPLEMENTS IWork",
+                 "Own := Speed;", "Start(Go := TRUE);", "other := 1;", "THIS^.Work();", "SUPER^.Start(Go := TRUE);",
+                 "Run := FALSE;", "Start(Go := Other.Run);", "M.Run := M.Speed = 1;",
+                 "I := M;", "I.Work();", "M.Act();"):  # fmt: skip
+        assert line in text
+
+
 def test_an_external_variable_without_its_global_one_is_spelt_as_it_is_declared() -> None:
     given = "PROGRAM p VAR_EXTERNAL Pump, Valve : INT; END_VAR pump := VALVE; END_PROGRAM VAR_GLOBAL VaLve : INT; END_VAR"
     assert "    Pump, VaLve : INT;" in written(given) and "    Pump := VaLve;" in written(given)
