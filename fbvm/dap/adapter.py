@@ -26,7 +26,7 @@ from fbvm.step.position import Said
 from fbvm.step.session import Session
 from fbvm.step.world import ReadOnlyPast
 from fbvm.watch.paths import Place
-from fbvm.watch.values import show_time
+from fbvm.watch.values import Value, show, show_time
 
 Request = Callable[[Arguments], "Body | None"]
 BREAKPOINTS = {"setBreakpoints": "breakpoints", "setFunctionBreakpoints": "breakpoints", "setDataBreakpoints": "breakpoints",
@@ -122,6 +122,7 @@ class Adapter:
         if self.debug.moved_by_command:
             self.debug.moved_by_command = False
             self.moves.stopped("step")
+        self._end_progress()
 
     def _done(self, command: str, request: Request, arguments: dict[str, Any]) -> Body | None:
         """The body of the answer.  Breakpoints may change while it runs; anything else about the position has to wait."""
@@ -293,10 +294,14 @@ class Adapter:
         """Does a slice of what runs; returns False if nothing does any more."""
         running = self.moves.work()
         self._flush_said()
-        if not running and self._progress:
+        self._end_progress()
+        return running
+
+    def _end_progress(self) -> None:
+        """Tells that nothing runs any more, if the client was told that something does."""
+        if self._progress and not self.is_running:
             self._event("progressEnd", {"progressId": self._progress})
             self._progress = None
-        return running
 
     def tell_progress(self) -> None:
         """Called now and then while something runs, by who has a clock."""
@@ -372,7 +377,11 @@ class Adapter:
     def _forces(self) -> Body:
         session = self.debug.plc()
         forces = session.plc.forces if isinstance(session, Session) else {}
-        return {"forces": [{"name": name, "value": str(value)} for name, value in forces.items()]}
+        return {"forces": [{"name": name, "value": self._shown(name, value)} for name, value in forces.items()]}
+
+    def _shown(self, name: str, value: Value) -> str:
+        found = self.debug.plc().find(name)
+        return show(found.type, value) if isinstance(found, Place) else str(value)
 
     def _typed(self, line: str) -> Body:
         result = evaluate(self.debug, {"expression": line, "context": "repl"})

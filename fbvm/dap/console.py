@@ -24,7 +24,7 @@ KEPT_BACK = {"quit", "break", "unbreak"}
 
 
 def evaluate(debug: DebugSession, arguments: Arguments) -> Body:
-    """evaluate: an expression, or in any context a command of the stepping language; a name goes before a command."""
+    """evaluate: an expression, or a command of the stepping language where somebody types; a name goes before a command."""
     text = str(arguments.get("expression", "")).strip()
     if not text:
         raise Refusal("there is nothing to evaluate")
@@ -35,10 +35,10 @@ def evaluate(debug: DebugSession, arguments: Arguments) -> Body:
     try:
         return _value(debug, scope, plc, text, arguments.get("context") == "clipboard")
     except (ConditionError, UnknownPlace) as error:
-        word = text.partition(" ")[0].lower()
-        if word in COMMANDS_BY_WORD and arguments.get("context") != "hover":
+        context = arguments.get("context")
+        if context in (None, "repl") and text.partition(" ")[0].lower() in COMMANDS_BY_WORD:  # what is watched moves nothing
             return _command(debug, plc, text)
-        if arguments.get("context") == "repl" and re.search(r":=|(?<![<>])=", text):
+        if context == "repl" and re.search(r":=|(?<![<>])=", text):
             return _command(debug, plc, text)
         name = text.partition("(")[0].strip()
         if debug.plc(plc).properties.is_method(name, scope, debug.plc(plc).player.memory):

@@ -15,7 +15,7 @@ from fbvm.record.draw.power import RungExecution
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartCall
 from fbvm.record.recording.recorded import RecordedPlc
-from fbvm.record.trace.events import OUTSIDE, Frame, Statement
+from fbvm.record.trace.events import Frame, Statement
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.facts import ProgramFacts
 from fbvm.step.position import Position
@@ -295,9 +295,11 @@ def reached_step(step: int, number: int, statement: Statement) -> bool:
 
 
 def newer(newest: Frame | None, wanted: Frame) -> int:
-    """How many executions of the same body are newer than a frame that is on the stack of the newest one."""
+    """How many executions of the same body are newer than a frame of the stack of the newest one, which has perhaps been played
+    again since."""
     count = 0
-    while newest is not None and newest is not wanted and newest is not OUTSIDE:
+    for _ in range(depth(newest) - depth(wanted) if newest else 0):
+        assert newest is not None
         count += newest.body == wanted.body
         newest = newest.caller
     return count

@@ -205,33 +205,29 @@ class Mail:
                 self._later.append(event)
                 self._behind[0] = 1
                 continue
-            channel, place = event.channel, 0
+            channel = event.channel
             if channel not in at.SOCKETS:
                 continue
-            if isinstance(event, Received):
-                place = self._keep(channel, event.data)
-                if place < 0:
-                    continue
+            place = self._keep(channel, event.data) if isinstance(event, Received) else 0
+            if place is None:
+                continue
             pack, kind, values = agreed.events[type(event)]
             pack(self._events, agreed.event_bytes * posted, kind, channel, *values(event, place))
             posted += 1
         self._posted[0] = posted
 
-    def _keep(self, channel: int, data: bytes) -> int:
-        """Puts bytes into the ring of a socket.  Returns the place behind them, or -1: there were more than the socket would
+    def _keep(self, channel: int, data: bytes) -> int | None:
+        """Puts bytes into the ring of a socket.  Returns the place behind them, or None: there were more than the socket would
         keep, and they are lost."""
         fresh, size, ring_bytes = self._fresh.get(channel, 0), len(data), self._agreed.ring_bytes
         if fresh + size > self._agreed.fresh_bytes:
-            return -1
+            return None
         self._fresh[channel] = fresh + size
-        place = self._ends[channel - 1] + fresh
-        begin = ring_bytes * (channel - 1) + (place & ring_bytes - 1)
-        if (over := (place & ring_bytes - 1) + size - ring_bytes) <= 0:
-            self._rings[begin : begin + size] = data
-        else:
-            ring = ring_bytes * channel
-            self._rings[begin:ring] = data[: size - over]
-            self._rings[ring - ring_bytes : ring - ring_bytes + over] = data[size - over :]
+        place, ring = self._ends[channel - 1] + fresh, ring_bytes * (channel - 1)
+        at = place & ring_bytes - 1
+        first, rest = data[: ring_bytes - at], data[ring_bytes - at :]
+        self._rings[ring + at : ring + at + len(first)] = first
+        self._rings[ring : ring + len(rest)] = rest
         return place + size & COUNTER
 
     def collect(self, memory: AreaMemory) -> list[Request]:

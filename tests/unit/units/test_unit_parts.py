@@ -186,10 +186,14 @@ def test_a_service_wakes_for_what_waits_and_for_those_who_owe_something() -> Non
     assert made.wake_ns == NEVER
     made.told(Opened(CHANNEL, 9600, SERVER), now_ns=5)
     assert made.wake_ns == 5 + 10 * S, "the client owes its node"
-    made.told(Received(CHANNEL, tcp.client_node(26).to_bytes()), now_ns=7)
+    made.told(Received(CHANNEL, b"F"), now_ns=6)
+    assert made.wake_ns == 5 + 10 * S, "a part of it is not its node"
+    made.told(Received(CHANNEL, tcp.client_node(26).to_bytes()[1:]), now_ns=7)
     assert made.wake_ns == NEVER and made.connection_bits == 1
     made.told(Received(CHANNEL, b"FI"), now_ns=9)
     assert made.wake_ns == 9 + 10 * S, "the rest of a message"
+    made.told(Received(CHANNEL, b"N"), now_ns=11)
+    assert made.wake_ns == 9 + 10 * S, "a part of it is not the rest"
     assert made.told(now_ns=9 + 10 * S) == [Close(CHANNEL, True)] and made.connection_bits == 0
     made.take([Closed(CHANNEL)])
     assert made.wake_ns == 0
