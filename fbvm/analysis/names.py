@@ -40,7 +40,7 @@ def uses(checker: Checker, part: Part) -> list[Use]:
     """All names in a part whose meaning is known, in the order of the text, each place once."""
     found: dict[tuple[int, int], Use] = {}
     for use in _Names(checker, part).all():
-        if fold(part.source.text[use.start:use.end]) != use.key[-1].rpartition(".")[2] and use.key[0] != "pin":
+        if fold(part.source.text[use.start:use.end]) != use.key[-1].rpartition(".")[2]:
             continue
         kept = found.get((use.start, use.end))
         if kept is None or kept.role == "read":

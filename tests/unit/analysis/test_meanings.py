@@ -26,13 +26,14 @@ PROGRAM Main
 VAR_EXTERNAL Total : INT; END_VAR
 VAR P1 : Pump := (Level := 4); i : INT; m : Mode := Filling; END_VAR
 VAR a : ARRAY [0..1] OF Tank := [(Level := 5), (State := Off)]; r : REF_TO Tank; b : BYTE; on : BOOL; END_VAR
-VAR CONSTANT third : INT := 2; END_VAR
+VAR CONSTANT third : INT := 2; END_VAR VAR pumps : ARRAY [1..2] OF Pump; END_VAR
     FOR i := 0 TO 1 DO a[i].Level := Total; END_FOR
     P1.Stop(); P1(Level := i, Runs => on);
     r := REF(a[0]); r^.Level := 1;
     m := Mode#Off; Big.Level := Big.Height + ABS(i);
     b.third := P1.Runs;
 END_PROGRAM
+FUNCTION Twice : INT VAR_INPUT x : INT; END_VAR Twice := 2 * x; END_FUNCTION
 CONFIGURATION C
     VAR_GLOBAL Shared : INT; END_VAR
     RESOURCE R ON PLC
@@ -58,11 +59,11 @@ def meanings(program: Program, line: int) -> list[str]:
     (5, "PUMP="), (6, "PUMP.LEVEL="), (7, "PUMP.RUNS="), (8, "PUMP.INNER= FULL VESSEL.HEIGHT!"), (9, "PUMP.STOP()"),
     (10, "PUMP.STOP= PUMP.RUNS! PUMP.INNER TANK.LEVEL"), (12, "MAIN="), (13, "TOTAL"),
     (14, "MAIN.P1= PUMP PUMP.LEVEL! MAIN.I= MAIN.M= MODE MODE.FILLING"),
-    (15, "MAIN.A= TANK TANK.LEVEL! TANK.STATE! MODE.OFF MAIN.R= TANK MAIN.B= MAIN.ON="), (16, "MAIN.THIRD="),
+    (15, "MAIN.A= TANK TANK.LEVEL! TANK.STATE! MODE.OFF MAIN.R= TANK MAIN.B= MAIN.ON="), (16, "MAIN.THIRD= MAIN.PUMPS= PUMP"),
     (17, "MAIN.I! MAIN.A MAIN.I TANK.LEVEL! TOTAL"),
     (18, "MAIN.P1 PUMP.STOP() MAIN.P1() PUMP.LEVEL! MAIN.I PUMP.RUNS MAIN.ON!"), (19, "MAIN.R! REF() MAIN.A MAIN.R TANK.LEVEL!"),
     (20, "MAIN.M! MODE MODE.OFF BIG TANK.LEVEL! BIG VESSEL.HEIGHT ABS() MAIN.I"), (21, "MAIN.B MAIN.THIRD! MAIN.P1 PUMP.RUNS"),
-    (24, "SHARED="), (27, "RUN= MAIN"),
+    (25, "SHARED="), (28, "RUN= MAIN"),
 ])
 def test_what_the_names_of_a_line_mean(line: int, expected: str) -> None:
     assert meanings(_checked(PLANT), line) == expected.split()
@@ -74,6 +75,9 @@ def test_what_the_names_of_a_line_mean(line: int, expected: str) -> None:
     ("nobody := Filling + Big.Height;", "MODE.FILLING BIG VESSEL.HEIGHT"), ("nobody.Level := P1.Stop;", "MAIN.P1 PUMP.STOP"),
     ("P1.inner.Level := nobody;", "MAIN.P1 PUMP.INNER TANK.LEVEL!"), ("Total := Pump.nobody;", "TOTAL! PUMP"),
     ("m := Mode.Filling + nobody;", "MAIN.M! MODE MODE.FILLING"),
+    ("nobody(Filling, pumps[1](Level := i), P1(Level := 1), Twice(x := i));",
+     "MODE.FILLING MAIN.PUMPS PUMP.LEVEL! MAIN.I MAIN.P1() PUMP.LEVEL! TWICE() TWICE.X! MAIN.I"),
+    ("nobody(P1.Stop(), Main, Pump, b.third, Total, R, NOBODY);", "MAIN.P1 PUMP.STOP() MAIN PUMP MAIN.B MAIN.THIRD TOTAL MAIN.R"),
 ])
 def test_names_beside_a_mistake_keep_their_meaning(line: str, expected: str) -> None:
     program = _checked(PLANT.replace("    b.third := P1.Runs;", f"    {line}"))

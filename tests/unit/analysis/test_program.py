@@ -149,6 +149,25 @@ def test_a_check_that_is_given_up_changes_nothing() -> None:
     assert codes(program) == [("S0201", 4), ("S0402", 9)]
 
 
+def test_a_whole_check_that_is_given_up_is_still_needed() -> None:
+    program = edited(TWO)
+    program.replace("other.st", "VAR_GLOBAL shared : INT; END_VAR\n")
+    steps = program.check()
+    next(steps)
+    steps.close()
+    assert not program.is_current and not program.check_changes()
+
+
+def test_a_part_whose_messages_name_lines_is_checked_anew_where_it_moves_to() -> None:
+    text = TWO.replace("On := P1.Runs;", "On := P1.Run; IF On THEN").replace("END_PROGRAM", "END_PROGRAM\nPROGRAM Last\nEND_PROGRAM")
+    program = edited(text, ("Level < 200", "Level <\n200"))
+    assert program.check_changes()
+    fresh_one = edited(text.replace("Level < 200", "Level <\n200"))
+    assert [(each.line, each.message) for each in program.diagnostics("pump.st")] == [
+        (each.line, each.message) for each in fresh_one.diagnostics("pump.st")]  # fmt: skip
+    assert len(program.diagnostics("pump.st")) == 2
+
+
 def test_files_see_one_another_and_what_is_removed_is_gone() -> None:
     program = Program()
     block, _, main = TWO.partition("PROGRAM")

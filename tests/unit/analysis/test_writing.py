@@ -92,6 +92,8 @@ def test_completion_in_a_section_offers_types_and_free_addresses(line: str, some
      "PROGRAM Main VAR x : INT; END_VAR x := Other.‸ END_PROGRAM\n", ["Level"]),
     ("TYPE S : STRUCT a : INT; END_STRUCT END_TYPE FUNCTION_BLOCK Base VAR deep : S; END_VAR END_FUNCTION_BLOCK\n"
      "FUNCTION_BLOCK Top EXTENDS Base VAR i : INT; END_VAR i := deep.‸ ; END_FUNCTION_BLOCK\n", ["a"]),
+    ("TYPE S : STRUCT a : INT; END_STRUCT END_TYPE FUNCTION_BLOCK Base VAR deep : S; i : INT; END_VAR\n"
+     "METHOD M i := deep.‸ ; END_METHOD END_FUNCTION_BLOCK\n", ["a"]),
 ])
 def test_completion_knows_the_parts_of_programs_and_of_what_is_inherited(text: str, offered: list[str]) -> None:
     program, offset = at_mark(text, "codesys")
