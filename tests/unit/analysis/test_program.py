@@ -159,7 +159,7 @@ def test_a_whole_check_that_is_given_up_is_still_needed() -> None:
 
 
 def test_a_part_whose_messages_name_lines_is_checked_anew_where_it_moves_to() -> None:
-    text = TWO.replace("On := P1.Runs;", "On := P1.Run; IF On THEN").replace("END_PROGRAM", "END_PROGRAM\nPROGRAM Last\nEND_PROGRAM")
+    text = TWO.replace("On := P1.Runs;", "On := P1.Run; IF On THEN") + "PROGRAM Last\nEND_PROGRAM\n"
     program = edited(text, ("Level < 200", "Level <\n200"))
     assert program.check_changes()
     fresh_one = edited(text.replace("Level < 200", "Level <\n200"))

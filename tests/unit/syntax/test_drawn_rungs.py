@@ -31,7 +31,8 @@ RUNGS = {
     "lower inputs at a branch point": "LD a; OUT TR0; AND b; LD TR0; AND c; LD TR0; ANDNOT d; CNTR 5 #10",
     "a box of two inputs below outputs": "LD a; OUT TR0; OUT x; LD TR0; AND b; LD TR0; AND c; CNT 5 #10",
     "a call": "LD a; FBCALL TON t IN:=b PT:=T#1s Q=>c ET=>d; AND t.Q; OUT x",
-    "calls behind each other": "LD a; FBCALL CTU k CU:=* PV:=&5 Q=>*; FBCALL TON t IN:=* PT:=long_operand_of_the_timer Q=>* ET=>e; OUT x",
+    "calls behind each other": "LD a; FBCALL CTU k CU:=* PV:=&5 Q=>*"
+        "; FBCALL TON t IN:=* PT:=long_operand_of_timer Q=>* ET=>e; OUT x",
     "a call in a branch": "LD a; OR b; FBCALL R_TRIG r CLK:=* Q=>*; OR c; OUT x",
     "a call at the end": "LD a; FBCALL Part p u:=b io:=c done=>d",
     "a call at the rail": "FBCALL Part p u:=b", "at the rail": "END", "jumps": "LD a; JMP 1; LD b; OUT c; JME 1",
