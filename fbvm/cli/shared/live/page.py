@@ -104,7 +104,7 @@ class _Page:
         try:
             self.host = LiveHost(self._workbench(), bind, self._options.port, tick=both, frames=self._options.frames)
         except OSError as error:
-            unusable(OSError(f"the page cannot be served at {bind}:{self._options.port}: {error.strerror}"))
+            unusable(OSError(f"{bind}:{self._options.port} cannot be used for the page: {error.strerror}"))
 
     def close(self) -> None:
         self.host.close()
