@@ -533,7 +533,7 @@ def test_a_host_that_is_not_known_is_named(counter: str, monkeypatch: pytest.Mon
     (None, ".venv/bin/fbvm", ".venv/bin/fbvm"),
     (None, "{here}/.venv/bin/fbvm", ".venv/bin/fbvm"),
     (None, "fbvm/__main__.py", f"{sys.executable} -m fbvm"),
-])
+], ids=["installed", "relative", "absolute", "module"])
 def test_the_demo_names_the_command_as_it_can_be_called(
     found: str | None, argument: str, called_so: str, counter: str, monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
