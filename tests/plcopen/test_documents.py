@@ -75,6 +75,15 @@ def test_files_that_are_there_stay_without_force(tmp_path: Path) -> None:
     assert "PROGRAM Pump" in (tmp_path / "Pump.st").read_text(encoding="utf-8")
 
 
+def test_a_document_of_twincat_is_imported(tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, ["import", str(DOCUMENTS / "twincat.xml"), "-o", str(tmp_path / "made")])
+    assert done.exit_code == 0
+    assert "--dialect twincat" in done.output
+    assert "P_Strokes : UDINT" in (tmp_path / "made" / "FB_Press.st").read_text(encoding="utf-8")
+    refused = CliRunner().invoke(main, ["import", str(DOCUMENTS / "x.TcPOU"), "-o", str(tmp_path / "made")])
+    assert refused.exit_code == 2
+
+
 def test_a_program_that_lacks_something_has_status_3(tmp_path: Path) -> None:
     file = tmp_path / "bad.xml"
     file.write_text("<project/>", encoding="utf-8")

@@ -21,7 +21,7 @@ from fbvm.interchange.codesys2 import is_binary, is_export
 from fbvm.interchange.codesys2.importing import import_codesys2, library_description
 from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.dialect_signs import FAMILIES
-from fbvm.interchange.formats.given import is_cx_project, usual_dialect
+from fbvm.interchange.formats.given import PROJECT_SUFFIXES, TWINCAT_SUFFIXES, is_cx_project
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
@@ -47,7 +47,7 @@ def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: st
 
     Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
     blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
-    if usual_dialect([file]) == "twincat":
+    if file.suffix.lower() in (*PROJECT_SUFFIXES, *TWINCAT_SUFFIXES):
         raise click.UsageError(f"{file} needs no import: `fbvm check {file}` and all other verbs on programs take TwinCAT's "
                                "files as they are")  # fmt: skip
     made = _imported(file, order or "", plc, encoding, memory)
