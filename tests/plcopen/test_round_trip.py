@@ -431,6 +431,22 @@ def test_blocks_that_one_call_reads_are_all_wired_to_it() -> None:
     assert 'typeName="ADD"' in text
 
 
+def test_an_output_of_a_block_with_en_is_assigned_in_each_pass() -> None:
+    back = there_and_back("FUNCTION_BLOCK Inverse\nVAR_INPUT a : BOOL; END_VAR\nVAR_OUTPUT b : BOOL; END_VAR\nb := NOT a;\n"
+                          "END_FUNCTION_BLOCK\nPROGRAM Main\nVAR go, x, y, e : BOOL; i : Inverse; END_VAR\n"
+                          "i(EN := go, a := x, ENO => e);\ny := i.b;\nLADDER\nRUNG 1\n LD e\n OUT x\nEND_LADDER\nEND_PROGRAM")
+    compiled = compile_sources(back.sources, "Main", lint=False)
+    assert compiled.image is not None
+    plc = Plc(compiled.image)
+    seen = []
+    for go, y in ((True, False), (False, False), (False, True), (True, True)):
+        plc.write("Main.go", go)
+        plc.write("Main.y", y)
+        plc.scan()
+        seen.append((plc.read("Main.y"), plc.read("Main.e")))
+    assert seen == [(True, True), (True, False), (True, False), (True, True)]
+
+
 def test_functions_of_typed_literals_are_blocks() -> None:
     """Beremiz takes what stands in front of a `#` for the type of a value."""
     text = ("PROGRAM Main\nVAR a : BOOL; t : TIME; n : INT; END_VAR\nt := SUB_TIME(T#500ms, T#350ms);\n"

@@ -117,6 +117,9 @@ class StatementWriter:
 
     def _assign(self, target: str, expr: tree.Expr) -> None:
         drawing, value = self.drawing, self._value(expr)
+        block = self._block_of(expr)
+        if block is not None and any(pin.get("formalParameter").upper() == "EN" for pin in block.walk()):
+            value = self._function("MOVE", [("IN", expr)])  # a wire from the block itself writes while ENO is TRUE
         end = drawing.in_variable(value, drawing.x(1), drawing.y(0)) if isinstance(value, str) else value[0]
         drawing.out_variable(target, end, drawing.y(0))
         drawing.skip(1)
