@@ -141,7 +141,7 @@ class Parts:
                 raise Inexact
             return instruction_text(f"{how}{item.mnemonic}", *operands)
         form = CONTACTS.get((item.negated, item.edge))
-        if form is None or item.storage:
+        if form is None or item.storage or item.text.upper() in ("TRUE", "FALSE"):  # TwinCAT lets a contact be a literal
             raise Inexact
         return instruction_text(f"{form}{how}" if form in ("@", "%") else f"{how} {form}".rstrip(), self._bit(item))
 
