@@ -23,11 +23,19 @@ ROWS: dict[str, tuple[str, list[Scan]]] = {
     "codesys_device": ("PLC_PRG.el PLC_PRG.xDone PLC_PRG.n b a", [
         ({}, [0, False, 0, 0, 0]), ({"PLC_PRG.xStart": True}, [0, False, 0, 0, 0]), ({}, [20, False, 0, 0, 0]),
         ({}, [40, True, 1, 10, 0]), ({}, [40, True, 2, 20, 0]), ({"PLC_PRG.xStart": False}, [0, False, 2, 20, 0])]),
-    # POUs in types/pous, no instance; a method, a property, an action and an enumeration with attributes; FBD without places.
-    "twincat": ("MAIN.bRun MAIN.fbPress.eMode MAIN.nSeen MAIN.nFull MAIN.bLate MAIN.tLate", [
-        ({}, [False, 0, 0, 0, False, 0]), ({"MAIN.bStart": True}, [True, 10, 2, 0, False, 0]),
-        ({"MAIN.bStart": False}, [True, 10, 4, 0, True, 20]), ({}, [True, 10, 6, 1, True, 20]), ({}, [True, 10, 2, 1, True, 20]),
-        ({"MAIN.bStop": True}, [False, 0, 2, 1, False, 0])]),
+    # A CFC beside an empty ST: outputs and blocks by number, bends of wires as connectors without a name, a sum of itself.
+    "codesys_cfc": ("PLC_PRG.nLate PLC_PRG.nNow PLC_PRG.xDone PLC_PRG.tGone", [
+        ({}, [0, 1, False, 0]), ({"PLC_PRG.xGo": True}, [1, 2, False, 0]), ({}, [2, 3, False, 20]), ({}, [3, 4, True, 40])]),
+    # POUs in types/pous, no instance; a method, a property, actions and an enumeration with attributes; FBD without places, whose
+    # networks are told by localId, with EN, ENO, SR as TwinCAT names its pins, a jump; in a LD of an action a contact TRUE.
+    "twincat": ("MAIN.bRun MAIN.fbPress.eMode MAIN.nSeen MAIN.nFull MAIN.bLate MAIN.tLate MAIN.nLess MAIN.nTens MAIN.bKept "
+                "MAIN.bKept2 MAIN.nNotKept MAIN.bLamp", [
+        ({}, [False, 0, 0, 0, False, 0, 0, 0, True, True, 0, False]),
+        ({"MAIN.bStart": True}, [True, 10, 2, 0, False, 0, 0, 0, True, True, 0, True]),
+        ({"MAIN.bStart": False}, [True, 10, 4, 0, True, 20, 2, 0, True, True, 0, True]),
+        ({}, [True, 10, 6, 1, True, 20, 4, 0, True, True, 0, True]), ({}, [True, 10, 2, 1, True, 20, 0, 0, True, True, 0, True]),
+        ({"MAIN.bStop": True}, [False, 0, 2, 1, False, 0, 0, 10, True, True, 0, False]),
+        ({"MAIN.bStart": True}, [False, 0, 2, 1, False, 0, 0, 10, False, False, 1, False])]),
     # OpenPLC Editor until 2025: outputs in the order of the document, although a rung is drawn above; a sum that feeds itself.
     "openplc": ("%QX0.0 instance0.relay instance0.late instance0.n", [
         ({}, [False, False, False, 2]), ({"%IX0.0": True}, [False, True, False, 4]), ({}, [True, True, False, 6]),
@@ -68,3 +76,20 @@ def test_a_document_in_the_manner_of_a_tool_runs_on_both_engines(name: str) -> N
 def _plain(value: Any) -> Any:
     """A value to compare: a duration as its milliseconds, an enumeration as its number."""
     return value // 1_000_000 if type(value) is int and value >= 1_000_000 else value
+
+
+CFC = """<project xmlns="http://www.plcopen.org/xml/tc6_0200"><types><pous><pou name="P" pouType="program"><interface><localVars>
+<variable name="a"><type><BOOL/></type></variable></localVars></interface>
+<body><ST><xhtml/></ST><addData>
+<data name="http://www.3s-software.com/plcopenxml/{}" handleUnknown="implementation"><{}><inVariable localId="1">
+<position x="1" y="1"/><connectionPointOut/><expression>a</expression></inVariable>
+<return localId="2"><position x="1" y="2"/><connectionPointIn><connection refLocalId="1"/></connectionPointIn></return>
+</{}></data></addData></body></pou></pous></types></project>"""
+
+
+@pytest.mark.parametrize(("name", "element", "message"), [
+    ("cfc", "CFC", "POU P, return 2: a CFC with <return> is not taken over"),
+    ("uml", "UML", "POU P: the body that the tool keeps in addData http://www.3s-software.com/plcopenxml/uml is not taken over")])
+def test_a_body_in_added_data_never_becomes_an_empty_one(name: str, element: str, message: str) -> None:
+    made = import_xml(CFC.format(name, element, element).encode())
+    assert [error.message for error in made.errors] == [message]

@@ -1,4 +1,4 @@
-"""Bodies of a document as lines of a source file: ST as it is, ladder as LADDER .. END_LADDER and statements, FBD as
+"""Bodies of a document as lines of a source file: ST as it is, ladder as LADDER .. END_LADDER and statements, FBD and CFC as
 statements, charts in their textual form."""
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from fbvm.interchange.plcopen.read.conditions import NotImportable
 from fbvm.interchange.plcopen.read.diagram import Diagram, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading
 from fbvm.interchange.plcopen.read.networks import RAILS, Network, networks
-from fbvm.interchange.plcopen.read.producer import GENERATED, GIVEN, ORDERS
+from fbvm.interchange.plcopen.read.producer import BY_NUMBER, GENERATED, GIVEN, ORDERS
 from fbvm.interchange.plcopen.read.rung_steps import rung_steps
 from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.interchange.plcopen.read.sequence import sequence
@@ -39,7 +39,14 @@ class Bodies:
             return _text(body.element.text)
         if body.language == "SFC":
             return self._chart(body)
-        return self._diagram(body)
+        diagram = read_diagram(self.reading, body.element)
+        if len({(item.x, item.y) for item in diagram.objects}) > 1:
+            self._lose_places(body)
+        if body.language == "CFC" and (leaving := next((item for item in diagram.objects if item.kind in LEAVING), None)):
+            self.reading.report("X0203", leaving.element, f"a CFC with <{leaving.kind}> is not taken over",
+                                "put the elements that it skips into a block with EN")
+            return [f"{NOTE} the CFC was not taken over: it has a {leaving.kind}"]
+        return self._diagram(body, diagram)
 
     def _lose_places(self, body: Body) -> None:
         self.reading.count("positions and sizes of drawings are not taken over", body.element)
@@ -57,15 +64,12 @@ class Bodies:
             self.reading.report("X0203", *refusal.args)
             return [f"{NOTE} the sequential function chart was not taken over: {refusal.args[1]}"]
 
-    def _diagram(self, body: Body) -> list[str]:
-        """A body in LD or FBD: consecutive rungs stand in one LADDER .. END_LADDER, statements between these."""
-        diagram = read_diagram(self.reading, body.element)
-        if len({(item.x, item.y) for item in diagram.objects}) > 1:
-            self._lose_places(body)
+    def _diagram(self, body: Body, diagram: Diagram) -> list[str]:
+        """A body in LD, FBD or CFC: consecutive rungs stand in one LADDER .. END_LADDER, statements between these."""
         self._check_jumps(diagram)
         self._declare_instances(diagram)
         ours = any(item.mnemonic for item in diagram.objects)
-        found = self._networks(diagram)
+        found = networks(diagram, self.scope, BY_NUMBER) if body.language == "CFC" else self._networks(diagram)
         rungs = [rung_steps(network, self.scope, ours) if body.language == "LD" and not network.broken
                  and not (self.reading.producer.generates and _falls(network)) else None for network in found]
         among = divided(rungs)

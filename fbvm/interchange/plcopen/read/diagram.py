@@ -117,7 +117,7 @@ class _DiagramReader:
 
     def diagram(self) -> Diagram:
         for place, element in enumerate(self.body.children):
-            if element.name not in ("addData", "documentation"):
+            if element.name not in ("addData", "documentation") and not _is_settings(element):
                 self._add(element, place)
         for item in self.objects:
             for pin in item.pins:
@@ -157,7 +157,7 @@ class _DiagramReader:
             self.reading.report("X0105", made.element, f"localId {made.id} is there twice",
                                 "each element of a body has a number of its own")
         self.known.setdefault(made.id, made)
-        if made.kind == "connector":
+        if made.kind == "connector" and made.text:  # one without a name is a bend in a wire (CFC)
             other = self.connectors.setdefault(made.text.upper(), made)
             if other is not made:
                 made.broken = other.broken = True
@@ -199,6 +199,12 @@ class _DiagramReader:
         self.reading.report("X0201", at, f"a wire comes from output {name} of {block.text}, which there is not",
                             f"its outputs are {has}")
         return None
+
+
+def _is_settings(element: Element) -> bool:
+    """Whether an element is a box of CODESYS or TwinCAT with settings of the editor, which stands in front of an FBD."""
+    return element.name == "vendorElement" and any(
+        inner.name == "data" and inner.get("name").endswith("/implementationattributes") for inner in element.walk())
 
 
 def _followed(wires: list[Wire]) -> list[Wire]:

@@ -72,7 +72,7 @@ class VarList:
 
 @dataclass(frozen=True)
 class Body:
-    """A body and the element of its language: ST, IL, LD, FBD or SFC."""
+    """A body and the element of its language: ST, IL, LD, FBD, SFC or CFC."""
 
     language: str
     element: Element

@@ -22,6 +22,8 @@ ORDERS = {
     IDS: "outputs and blocks by executionOrderId, else as they stand in the document",
 }
 """Orders of evaluation, and what each means."""
+BY_NUMBER = "number"
+"""The order of a CFC, whose outputs and blocks all have a number.  Nobody chooses it."""
 GENERATED = (SINKS_AS_WRITTEN, SINKS_BY_POSITION, ALL_BY_POSITION)
 """The orders that Beremiz and OpenPLC Editor have had."""
 GIVEN = "it was given"

@@ -27,8 +27,10 @@ from fbvm.interchange.plcopen.read.objects import (
     INTERFACE,
     METHOD,
     accessors,
+    added,
     arguments,
     head,
+    last_word,
     left_out,
     members,
     property_type,
@@ -42,10 +44,11 @@ IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
 READ = {"pou", "element", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location",
         "action", "method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "inheritance",
-        "datatypeinheritance", "accessmodifiers", "attributes", "inputassignments", "stcode"}
+        "datatypeinheritance", "accessmodifiers", "attributes", "inputassignments", "stcode", "cfc"}
 """Last words of the names of `addData` whose contents are taken over."""
 SETTINGS = {"objectid", "tasksettings", "projectinformation", "projectstructure", "fbdcalltype", "fbdelementtype",
-            "interfaceasplaintext", "buildproperties", "inputparamtypes", "outputparamtypes"}
+            "interfaceasplaintext", "buildproperties", "inputparamtypes", "outputparamtypes", "cfccalltype",
+            "implementationattributes"}
 """Last words of the names of `addData` that repeat what elements say, or concern the tool itself."""
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
 
@@ -220,6 +223,12 @@ def _named_bodies(reading: Reading, pou: Element, what: str) -> tuple[tuple[str,
 
 
 def _body(reading: Reading, element: Element) -> Body | None:
+    """The body in an element; CODESYS and TwinCAT keep a CFC in addData, beside an empty ST."""
+    for data in added(element):
+        if (chart := data.one("CFC")) is not None:
+            return Body(chart.name, chart)
+        if last_word(data) not in READ | SETTINGS:
+            reading.report("X0203", data, f"the body that the tool keeps in addData {data.get('name')} is not taken over")
     inner = next((part for part in element.children if part.name in LANGUAGES), None)
     if inner is None:
         strange = next((part for part in element.children if part.name not in ("addData", "documentation")), None)

@@ -1,9 +1,12 @@
-"""The sequence in which the generator of Beremiz and OpenPLC Editor evaluates the objects of a diagram.
+"""The sequence in which the generator of Beremiz and OpenPLC Editor evaluates the objects of a diagram, and CODESYS a CFC.
 
 The generator goes through the sinks of a body, and through its blocks, and writes what each needs in front of it, a block once.
 A block counts as written before its inputs are looked at: so a wire that comes back to it carries the value of the pass before.
 A variable that a diagram reads and writes at one place (inOutVariable) is written at its turn; whoever reads it does not wait for
 that.
+
+In a CFC every output and every block has a number, and is executed at that number: what it takes of a block that comes later is
+the value of the pass before.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from collections.abc import Iterable, Iterator
 from functools import cmp_to_key
 
 from fbvm.interchange.plcopen.read.diagram import Object, Wire
-from fbvm.interchange.plcopen.read.producer import ALL_BY_POSITION, IDS, SINKS_BY_POSITION
+from fbvm.interchange.plcopen.read.producer import ALL_BY_POSITION, BY_NUMBER, IDS, SINKS_BY_POSITION
 
 ROW = 10
 """Objects whose y differ by less stand in one row (Beremiz, `SortInstances`)."""
@@ -24,7 +27,7 @@ def sequence(objects: Iterable[Object], order: str) -> tuple[list[Object], Cut]:
     """The objects in the order of their evaluation, and the wires, each with its consumer, that carry the value of the pass
     before.  Objects that feed nothing with an effect come last."""
     items = list(objects)
-    run = _Generation(frozenset(items))
+    run = _Generation(frozenset(items), ("block", *OUTPUTS) if order == BY_NUMBER else ("block",))
     for candidate in _candidates(items, order):
         run.add(candidate)
     for item in items:
@@ -40,7 +43,7 @@ def _candidates(items: list[Object], order: str) -> list[Object]:
     outputs = [item for item in plain if item.kind in OUTPUTS]
     blocks = [item for item in plain if item.kind == "block"]
     by_position = cmp_to_key(_by_position)
-    if order == IDS:
+    if order in (IDS, BY_NUMBER):
         return [*numbered, *(item for item in plain if item.kind in (*OUTPUTS, "block"))]
     if order == SINKS_BY_POSITION:
         return [*numbered, *sorted(outputs, key=by_position), *sorted(blocks, key=by_position)]
@@ -57,8 +60,8 @@ def _by_position(first: Object, second: Object) -> int:
 class _Generation:
     """One pass of the generator over a body."""
 
-    def __init__(self, inside: frozenset[Object]) -> None:
-        self.inside = inside
+    def __init__(self, inside: frozenset[Object], waiting: tuple[str, ...]) -> None:
+        self.inside, self.waiting = inside, waiting
         self.made: list[Object] = []
         self.cut: Cut = set()
         self.begun: set[Object] = set()
@@ -87,10 +90,9 @@ class _Generation:
             self.begun.add(source)
             todo.append((source, waits if source.kind == "contact" else self._numbered(source), self._wires(source)))
 
-    @staticmethod
-    def _numbered(item: Object) -> bool:
-        """Whether an object reads blocks that are still to come as they are: a block with an executionOrderId does."""
-        return item.kind == "block" and item.order > 0
+    def _numbered(self, item: Object) -> bool:
+        """Whether an object reads blocks that are still to come as they are: one of these kinds with an executionOrderId does."""
+        return item.kind in self.waiting and item.order > 0
 
     @staticmethod
     def _wires(item: Object) -> Iterator[Wire]:
