@@ -105,6 +105,7 @@ class Dialect:
     jumps_in_text: bool = False
     exceptions: bool = False
     raises_exceptions: bool = False
+    assignments_are_values: bool = False
     texts_have_addresses: bool = False
     conditional_returns: bool = False
     empty_structures: bool = False
@@ -231,9 +232,9 @@ QUESTIONS = {
                        "count lies there, with a warning (S0193)"),
     "times_are_numbers": ("a TOD gets T#25s, a DT a TIME, a LINT a TOD: a duration, a date, a moment or an integer where another "
                           "of these is needed", "an error that names the conversion", "its nanoseconds"),
-    "short_addresses": ("dword := p; p < dword, where p is a POINTER TO: a pointer where DWORD or UDINT is needed, or compared "
-                        "with one", "an error", "its address: the number of the byte in the memory of the PLC, 0 for a null "
-                        "pointer"),
+    "short_addresses": ("dword := p; p < dword; p := dword, where p is a POINTER TO: a pointer where DWORD or UDINT is needed or "
+                        "the other way round, or compared with one", "an error",
+                        "its address: the number of the byte in the memory of the PLC, 0 for a null pointer"),
     "dates_take_durations": ("D#2024-12-31 + T#1d: a DATE and a TIME", "an error",
                              "the DATE so much later or earlier, which may have hours in it"),
     "integers_are_conditions": ("IF n THEN, WHILE n DO, UNTIL n, where n is an integer or a bit string", "an error: n <> 0",
@@ -261,6 +262,8 @@ QUESTIONS = {
     "exceptions": ("__TRY .. __CATCH(code) .. __ENDTRY", "taken, with a warning (S0195)", "taken"),
     "texts_have_addresses": ("ADR('abc'), ADR(CONCAT('a', 'b')): of a constant text that is no variable", "an error (S0407)",
                              "points at the text, which lies in memory as long as the program"),
+    "assignments_are_values": ("IF (ready := level > 5) THEN, RETURN(done := TRUE): an assignment in parentheses as a value",
+                               "an error (S0101)", "assigns, and has the value of the variable, with a warning (S0193)"),
     "raises_exceptions": ("F_RaiseException(code)", "an error (S0401)",
                           "stops the program (R0122), or goes on behind __CATCH(code), which gets the code"),
     "functions_have_inputs": ("FUNCTION f : INT without an input", "taken", "taken, with a warning (S0195)"),
@@ -310,6 +313,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
                    conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
                    bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True,
+                   assignments_are_values=True,
                    short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (

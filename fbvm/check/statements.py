@@ -326,7 +326,8 @@ class _Statements:
     def _return(self, node: tree.Return) -> None:
         if node.value is None:
             return
-        if self.scope.dialect.conditional_returns and _is_enclosed(self.scope.source.text, node):
+        is_enclosed = isinstance(node.value, tree.StructInit) or _is_enclosed(self.scope.source.text, node)
+        if self.scope.dialect.conditional_returns and is_enclosed:
             self.scope.facts.conditional.add(node)
             self.scope.condition(node.value, "RETURN")
             return

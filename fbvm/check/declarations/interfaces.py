@@ -218,9 +218,10 @@ class _Interface:
             self._pass_by_reference(made, section)
             if made.kind != "VAR_IN_OUT":
                 refuse_abstract(self.context, made.type, self.pou.source, name)
-            if is_block(made.type) and made.kind == "VAR_OUTPUT" and self.pou.is_routine:
-                self._error("S0901", name, f"an instance as {section.kind} of a {self.pou.kind} is understood but not "
-                            "executed by this version", "pass it as VAR_IN_OUT")
+            if is_block(made.type) and made.kind == "VAR_OUTPUT" and self.pou.is_routine and \
+                    not self.scope.dialect.instances_are_values:
+                self._error("S0901", name, f"an instance as VAR_OUTPUT of a {self.pou.kind} is not taken here",
+                            f"pass it as VAR_IN_OUT, or take {takers('instances_are_values')}")
             self._place(made, declared)
             self._register(made)
             if made.kind == "VAR_STAT":

@@ -15,6 +15,7 @@ from fbvm.check.expressions.constant_integers import integer, repeated
 from fbvm.check.expressions.constants import default, encode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import flattened, initialisable
+from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Aggregate, AggregatePart, Variable
 from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
@@ -26,6 +27,9 @@ Value = tuple[tuple[int, ...], int | None, Type, tree.Expr]
 
 def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
     """The type of an array or structure that is written out: the type of its place; None after a diagnostic."""
+    if scope.dialect.assignments_are_values and isinstance(expr, tree.StructInit) and len(expr.fields) == 1 and \
+            not isinstance(want, StructType):
+        return _assigned(scope, expr)
     if not _has_place(scope, expr, want) or want is None:
         return None
     dialect, pou = scope.dialect, scope.pou
@@ -38,6 +42,23 @@ def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
     parts = [part for part in (_part(scope, value, content) for value in values) if part is not None]
     scope.facts.aggregates[expr] = Aggregate(in_frame(scope, expr, want, _form(expr)), bytes(content), tuple(parts))
     return want
+
+
+def _assigned(scope: Scope, expr: tree.StructInit) -> Type | None:
+    """The type of `(variable := value)`, which assigns and has the value of the variable (CODESYS online help, ExST)."""
+    (name, value), = expr.fields
+    target = tree.NameRef(name.start, name.end, name.text)
+    kind = scope.infer(target)
+    if kind is None or not scope.is_variable(target):
+        scope.infer(value)
+        if kind is not None:
+            scope.error("S0501", name, f"this is a value of {kind} and cannot be written", "only variables stand left of :=")
+        return None
+    if not writable(scope, target, "be written") or not scope.fit(value, kind):
+        return None
+    scope.facts.assignments[expr] = tree.Assign(expr.start, expr.end, (target,), ":=", value)
+    scope.error("S0193", expr, f"this assigns {name.text} and has its value then", "`=` compares, `:=` assigns")
+    return kind
 
 
 def _has_place(scope: Scope, expr: Written, want: Type | None) -> bool:

@@ -107,8 +107,13 @@ def _has_as_many(kind: Type, target: Type) -> bool:
     return sizes == wanted and same(kind.element, target.element)
 
 
-_BY_DIALECT = (("bounds_are_not_compared", _has_as_many), ("times_are_numbers", _holds_nanoseconds), ("narrowing", _narrows),
-               ("integers_and_bits", _holds_bits))
+def _is_address(kind: Type, target: Type) -> bool:
+    """True for a number that holds an address where a pointer is needed."""
+    return kind in ADDRESSES and isinstance(target, RefType) and target.moves
+
+
+_BY_DIALECT = (("short_addresses", _is_address), ("bounds_are_not_compared", _has_as_many),
+               ("times_are_numbers", _holds_nanoseconds), ("narrowing", _narrows), ("integers_and_bits", _holds_bits))
 """Switches of dialects, and between which types each of them converts."""
 
 

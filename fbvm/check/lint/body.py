@@ -39,6 +39,8 @@ class Body:
         """The nodes directly below one; of a call that means an operator, those of the operator."""
         if isinstance(node, tree.Call | ladder.Contents) and (meaning := self.facts.rewritten.get(node)) is not None:
             return (meaning,)
+        if isinstance(node, tree.StructInit) and (assignment := self.facts.assignments.get(node)) is not None:
+            return *assignment.targets, assignment.value
         return _BELOW[type(node)](node)
 
     @cached_property

@@ -383,6 +383,8 @@ class Facts:
     """Arguments on single bits for an ANY input, which reads a copy that fills a byte, and texts that a VAR_IN_OUT CONSTANT
     cannot read where they lie: the variable with the copy."""
     aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
+    assignments: dict[tree.Expr, tree.Assign] = field(default_factory=dict)
+    """Values `(a := b)`, with the assignments that they are in a dialect."""
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
     """Statements that name an ACTION without (), with the calls that they mean."""
     selves: dict[tree.Expr, Pou] = field(default_factory=dict)

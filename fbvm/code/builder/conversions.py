@@ -6,12 +6,13 @@ from __future__ import annotations
 
 import math
 
+from fbvm.base.areas import PAGE_BYTES
 from fbvm.base.arithmetic import limits
 from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.builder.emitter import Emitter
-from fbvm.code.operations import FLOATS, OFFSET_SHIFT, SIZES, TEXT_UNITS, Node
+from fbvm.code.operations import BUFFER_OBJECT, FLOATS, OBJECT_SHIFT, OFFSET_SHIFT, SIZES, TEXT_UNITS, WHOLE_BYTES, Node
 
 _TICKS = {"TIME": 1_000_000, "TIME_OF_DAY": 1_000_000, "DATE": 1_000_000_000, "DATE_AND_TIME": 1_000_000_000}
 """Nanoseconds of the unit in which a time or date is converted to and from numbers: ms for TIME and TOD, s for DATE and DT,
@@ -21,6 +22,8 @@ ns for L types (as CODESYS; the standard has no such conversion)."""
 def implicit(emitter: Emitter, node: Node, kind: Type, target: Type) -> Node:
     """A value of the type `kind` as one of `target`, to which the language converts it without a function."""
     source, wanted = machine(kind), machine(target)
+    if wanted == "ref" and source in ("u32", "u64"):
+        return _at_byte(emitter, node, source)
     if source == wanted or wanted in ("ref", ""):
         return node
     if wanted in TEXT_UNITS:
@@ -38,6 +41,15 @@ def _byte_number(reference: Node, form: str) -> Node:
     """The number of the byte in the buffer to which a reference points."""
     place = ("shr", "u64", ("bits", "u64", "ref", reference), ("const", "i64", OFFSET_SHIFT), 0)
     return ("convert", form, "u64", place)
+
+
+def _at_byte(emitter: Emitter, number: Node, form: str) -> Node:
+    """The pointer to the byte of that number in the buffer; NULL for 0 and for what no program has a variable in."""
+    at = emitter.to_temporary(("convert", "u64", form, number))
+    whole = BUFFER_OBJECT << OBJECT_SHIFT | WHOLE_BYTES
+    made = ("or", "u64", ("mul", "u64", at, ("const", "u64", 1 << OFFSET_SHIFT)), ("const", "u64", whole))
+    is_outside = ("lt", "b", "u64", at, ("const", "u64", PAGE_BYTES))
+    return ("bits", "ref", "u64", ("select", "u64", is_outside, made, ("const", "u64", 0)))
 
 
 def to_float(node: Node, kind: Type, form: str) -> Node:

@@ -37,5 +37,14 @@ def _value(body: BodyContext, part: AggregatePart) -> Node:
     return body.value(part.value, part.kind)
 
 
-PLACES: PlaceRules = dict.fromkeys((tree.ArrayInit, tree.StructInit), written_out)
+def _structure(body: BodyContext, expr: tree.StructInit, kind: Type) -> Place:
+    """The place of a structure that is written out, or of the variable that `(a := b)` assigns."""
+    assignment = body.facts.assignments.get(expr)
+    if assignment is None:
+        return written_out(body, expr, kind)
+    body.lower((assignment,))
+    return body.place(assignment.targets[0])
+
+
+PLACES: PlaceRules = {tree.ArrayInit: written_out, tree.StructInit: _structure}
 VALUES: ValueRules = dict.fromkeys((tree.ArrayInit, tree.StructInit), loaded)
