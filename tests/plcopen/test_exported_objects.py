@@ -152,3 +152,8 @@ def test_rungs_of_a_method_that_need_memory_are_refused() -> None:
     made = export_xml([Source("A.st", "FUNCTION_BLOCK A VAR x, y : BOOL; END_VAR METHOD m\nLADDER\nRUNG\n"
                                       "LD x\nUP\nOUT y\nEND_LADDER\nEND_METHOD END_FUNCTION_BLOCK")])
     assert [found.code for found in made.errors] == ["X0301"], [d.render() for d in made.diagnostics]
+
+
+def test_a_body_ends_in_front_of_an_end_that_is_one_word() -> None:
+    made = export_xml([Source("a.st", "FUNCTIONBLOCK B\nVAR n : INT; END_VAR\n    n := 1;\nEND_FUNCTIONBLOCK\n")])
+    assert made.text is not None and "n := 1;" in made.text and "END_FUNCTION" not in made.text

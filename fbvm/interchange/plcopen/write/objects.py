@@ -19,7 +19,7 @@ BodyWriter = Callable[[tree.Pou, int, int], Element]
 """Writes the element of the body of a method that stands between two offsets."""
 ACCESSORS = {"GET": "GetAccessor", "SET": "SetAccessor"}
 HINT = "put what other tools are to read into function blocks and functions without objects"
-END = re.compile(r"(?i)END_(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|ACTION|METHOD|GET|SET|PROPERTY)\s*$")
+END = re.compile(r"(?i)END_(?:FUNCTION_?BLOCK|FUNCTION|PROGRAM|ACTION|METHOD|GET|SET|PROPERTY)\s*$")
 _HALF = re.compile(r"(?i)\bPROPERTY_(?:GET|SET)\s+(?:\w+\s+)*$")
 _END_PROPERTY = re.compile(r"(?i)\bEND_PROPERTY\b")
 _IN_FRONT = re.compile(r"(?:\{[^{}]*\}\s*)+(?:TYPE\s+)?\Z", re.IGNORECASE)
