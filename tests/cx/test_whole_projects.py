@@ -42,6 +42,7 @@ def placed(made: Imported, file: str) -> list[str]:
             for line, place in zip(lines, places, strict=True)]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_what_a_project_is_imported_to() -> None:
     made = import_project(SAVED.encode(), "line.cxt", memory=True)
     check("line.txt", [*(line for file in made.files for line in (f"=== {file}", *placed(made, file))),

@@ -66,6 +66,7 @@ def names(made: Program, name: str) -> Iterator[str]:
             yield from (f"    > {line}".rstrip() for line in shown if "```" not in line)
 
 
+@pytest.mark.slow
 def test_what_every_name_means() -> None:
     made = program()
     wrong = [f"{placed(made, 'plant.st', each.start, each.end)} | {each.severity} {each.code} {each.message}"

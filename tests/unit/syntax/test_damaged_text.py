@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 
 import pytest
+from test_syntax_errors import ONE_ERROR
 
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.parser import parse
@@ -64,7 +65,38 @@ def test_what_is_said_of_a_damaged_text(how: str) -> None:
         row = TEXT.count("\n", 0, found.start()) + 1
         column = found.start() - TEXT.rfind("\n", 0, found.start())
         lines.append(f"{row}:{column} {found[0]}: {said(TEXT[: found.start()] + instead + TEXT[found.end() :])}")
-    path, text = TEXTS / f"{how}.txt", "\n".join(lines) + "\n"
+    check(f"{how}.txt", lines)
+
+
+MISTAKES = [text for text, *_ in ONE_ERROR] + [
+    "x := a SHL 2", "x := 2 DIV", "x := a NAND b", "x := SQRT a", "x := 1,5", "x := FLOAT(a)", "x := INT a", "x = = 2",
+    "x :=", "IF a", "IF a THEN",
+    "FOR i := 1 TO", "CASE a OF 1", "f(a :=", "x := a[", "x := (", "VAR a :", "VAR a : ARRAY [", "VAR a : STRING[",
+    "VAR a AT", "x := b#2",
+    "x := T#", "x := 'a", "(* a", "x := a.", "x := a^", "CASE a OF 1: ELSE", "REPEAT x := 1; UNTIL", "WHILE",
+    "VAR a, : INT; END_VAR",
+    "VAR a : INT := ; END_VAR", "VAR a b : INT; END_VAR", "VAR 2a : INT; END_VAR", "VAR a-b : INT; END_VAR",
+    "VAR INT a; END_VAR",
+    "VAR int a = 3; END_VAR", "VAR a : INT[3]; END_VAR", "VAR a : STRING(3) END_VAR", "GOTO x", "x := a ? b : c",
+    "x := y := 2", "{ x := 1; }",
+    "if (a) { x := 1; }", "while (a) x := 1;", "switch a", "return 3;", "break;", "x := null;", "x := 0x1F;", "x := 1_;",
+    "x := 16#G;",
+    "function f", "print(a)", "x := \"a\";", "x := a % b;", "x := a <> b <> c;", "x := a => b;", "x := NOT;",
+    "x := - -1;", "x = 1;",
+]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_what_is_said_of_mistakes_at_the_end_of_a_text() -> None:
+    """Nothing stands behind them; then they stand in front of others."""
+    lines = []
+    for text in MISTAKES:
+        lines += [f"{text!r}: {said(f'PROGRAM p {text}')}", f"    {said(f'PROGRAM p {text} y := 1; END_PROGRAM')}"]
+    check("mistakes.txt", lines)
+
+
+def check(name: str, lines: list[str]) -> None:
+    path, text = TEXTS / name, "\n".join(lines) + "\n"
     if os.environ.get("FBVM_REWRITE"):
         path.write_text(text, encoding="utf-8")
     assert text == path.read_text(encoding="utf-8")

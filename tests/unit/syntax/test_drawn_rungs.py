@@ -70,6 +70,7 @@ def steps(rung: str) -> list[tuple[str, str, tuple[str, ...]]]:
             for made in read_rungs(lines, 0, len(lines), lambda *message: None) for line in made.lines]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_drawings_of_a_width(way: str) -> None:
     width, annotations = WAYS[way]
