@@ -80,11 +80,14 @@ class ChannelLink(ABC):
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         """Carries out requests in order.  Raises ValueError for an open of a channel that is in use."""
+        channels = self.channels
         for request in requests:
-            open_channel = self.channels.get(request.channel)
+            open_channel = channels.get(request.channel)
             match request:
                 case Send():
-                    self._check(request.channel, open_channel.send(request.data, now_ns) if open_channel else "ENOTCONN")
+                    error = open_channel.send(request.data, now_ns) if open_channel else "ENOTCONN"
+                    if error:
+                        self._fail(request.channel, error)
                 case Grant():
                     if open_channel:
                         open_channel.grant(request.size)
@@ -94,11 +97,13 @@ class ChannelLink(ABC):
                     self.open(request, now_ns)
                 case Close(channel, reset):
                     if open_channel:
-                        del self.channels[channel]
+                        del channels[channel]
                         open_channel.close(reset, now_ns)
                     self.pending.append(Closed(channel))
                 case SendTo(channel, remote, data):
-                    self._check(channel, open_channel.send_to(remote, data, now_ns) if open_channel else "ENOTCONN")
+                    error = open_channel.send_to(remote, data, now_ns) if open_channel else "ENOTCONN"
+                    if error:
+                        self._fail(channel, error)
         if self.pending:
             self.mark_pending()
 
@@ -113,6 +118,5 @@ class ChannelLink(ABC):
     def pass_by(self, refreshes: int) -> None:  # noqa: B027
         """Counts refreshes in which `events` was not called; a network with faults by scan overrides it."""
 
-    def _check(self, channel: int, error: str) -> None:
-        if error:
-            self.pending.append(Failed(channel, "send", error))
+    def _fail(self, channel: int, error: str) -> None:
+        self.pending.append(Failed(channel, "send", error))

@@ -109,20 +109,22 @@ class Connection(HostChannel):
 
     def fetch(self, now_ns: int) -> None:
         """Reads the socket now and no earlier, since the unit may change its grant until it asks for events."""
-        if self.sock and not self._stalled and not self._fin_seen:
-            self._receive(self.sock, now_ns)
-        elif self.sock and (code := self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)):
+        sock = self.sock
+        if sock and not self._stalled and not self._fin_seen:
+            self._receive(sock, now_ns)
+        elif sock and (code := sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)):
             self._broke(code, now_ns)
         if not self._stalled and not self._fin_seen:  # else the selector does not tell that it breaks
             self.link.waiting.pop(self, None)
 
     def send(self, data: bytes, now_ns: int) -> str:
-        if not self._connected or self.sock is None:
+        sock, outbox = self.sock, self._outbox
+        if not self._connected or sock is None:
             return "EPIPE" if self._connected else "ENOTCONN"
-        if self._outbox and sum(map(len, self._outbox)) + len(data) > SEND_BUFFER_BYTES:
+        if outbox and sum(map(len, outbox)) + len(data) > SEND_BUFFER_BYTES:
             return "ENOBUFS"
-        self._outbox.append(data)
-        self._flush(self.sock, now_ns)
+        outbox.append(data)
+        self._flush(sock, now_ns)
         return ""
 
     def close(self, reset: bool, now_ns: int) -> None:
@@ -167,7 +169,7 @@ class Connection(HostChannel):
             relays.take_over(self, self.local, self.remote, len(self._outbox), self._fin_seen)
 
     def _receive(self, sock: socket.socket, now_ns: int) -> None:
-        wanted = min(self.granted, BUFFER_BYTES)
+        wanted = self.granted if self.granted < BUFFER_BYTES else BUFFER_BYTES
         try:
             # Without a grant only look, whether FIN has come; data stay in the host.
             data = sock.recv(wanted) if wanted > 0 else sock.recv(1, socket.MSG_PEEK)
@@ -194,16 +196,20 @@ class Connection(HostChannel):
             self.link.pending.append(Received(self.channel, data))
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
+        outbox = self._outbox
         try:
-            while self._outbox:
-                rest = self._outbox[0][self._taken :]
+            while outbox:
+                rest = outbox[0][self._taken :] if self._taken else outbox[0]
                 size = sock.send(rest) if rest else 0
                 if size and self.network.tap:
                     self._tap(now_ns, DATA, True, rest[:size])
-                self._taken += size
-                if size == len(rest):
-                    self._taken = 0
-                    self._report(Sent(self.channel, len(self._outbox.popleft())))
+                if size < len(rest):
+                    self._taken += size
+                    continue
+                self._taken = 0
+                sent = Sent(self.channel, len(outbox.popleft()))
+                if not self._orphan:
+                    self.link.pending.append(sent)
         except BlockingIOError:
             pass
         except OSError as error:
@@ -211,7 +217,7 @@ class Connection(HostChannel):
             return
         if self._orphan:
             self._finish(sock, now_ns)
-        if self._outbox or self.watched & WRITE:
+        if outbox or self.watched & WRITE:
             self._watch()
 
     def _finish(self, sock: socket.socket, now_ns: int) -> None:

@@ -50,7 +50,7 @@ class HostLink(ChannelLink):
             self._network.serve(now_ns)
         self.refreshes += 1
         if self.waiting:
-            for there in list(self.waiting):
+            for there in [*self.waiting]:
                 there.fetch(now_ns)
         events, self.pending = self.pending, []
         self.is_quiet = not self.waiting and (driven or self._network.is_idle)

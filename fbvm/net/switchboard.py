@@ -201,7 +201,7 @@ class Switchboard(ABC):
         """Handles every socket that is ready; returns the links of these sockets."""
         if self.closed:
             return []
-        woken: list[HostLink] = []
+        woken: dict[HostLink, None] = {}
         under_faults = self.relays.faults or self.relays.carried
         if under_faults:
             self.relays.meet(now_ns)
@@ -211,18 +211,16 @@ class Switchboard(ABC):
         for key, ready in found:
             watcher: Watcher = key.data
             watcher.ready(ready, now_ns)
-            link = watcher.link
+            woken[watcher.link] = None
+        for link in woken:
             link.is_quiet = False
             if link.pending:
                 link.mark_pending()
-            woken.append(link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
         while self._calls and self._calls[0][0] <= now_ns:
             self._calls.popleft()[1]()
-        if under_faults:
-            woken += self._serve_relays(now_ns)
-        return woken
+        return [*woken, *self._serve_relays(now_ns)] if under_faults else [*woken]
 
     def _serve_relays(self, now_ns: int) -> list[HostLink]:
         """Serves the connections under faults; returns the links that have events then."""

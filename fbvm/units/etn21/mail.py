@@ -38,8 +38,8 @@ from fbvm.wire.link import (
 
 COUNTER = 0xFFFF_FFFF
 """Places in a ring begin again after this: they are UDINT."""
-Values = Callable[[Any, int], tuple[int, ...]]
-"""Takes an event, and the place behind its bytes in the socket's ring; the values of fields of its row."""
+Values = Callable[[Any], tuple[int, ...]]
+"""Takes an event; the values of fields of its row."""
 
 
 @dataclass(frozen=True)
@@ -48,27 +48,23 @@ class EventRow:
 
     kind: str
     fields: tuple[str, ...] = ()
-    values: Values = lambda event, place: ()
+    values: Values = lambda event: ()
 
 
-def _opened(event: Opened, place: int) -> tuple[int, ...]:
+def _opened(event: Opened) -> tuple[int, ...]:
     return event.local_port, *words_of(event.remote.host), event.remote.port
-
-
-def _received(event: Received, place: int) -> tuple[int, ...]:
-    high, low = words_of(event.remote.host)
-    return high, low, event.remote.port, len(event.data), place
 
 
 EVENTS: Mapping[type, EventRow] = {
     Opened: EventRow("opened", ("local_port", "host[0]", "host[1]", "port"), _opened),
-    Failed: EventRow("failed", ("error",), lambda event, place: (code_of(event.error),)),
-    Sent: EventRow("sent", ("size",), lambda event, place: (event.size,)),
-    Received: EventRow("received", ("host[0]", "host[1]", "port", "size", "place"), _received),
+    Failed: EventRow("failed", ("error",), lambda event: (code_of(event.error),)),
+    Sent: EventRow("sent", ("size",)),
+    Received: EventRow("received", ("host[0]", "host[1]", "port", "size", "place")),
     PeerClosed: EventRow("peer_closed"),
-    Broken: EventRow("broken", ("error",), lambda event, place: (code_of(event.error),)),
+    Broken: EventRow("broken", ("error",), lambda event: (code_of(event.error),)),
     Closed: EventRow("closed"),
 }
+"""`Mail.post` finds the values of Sent and Received itself, because exchanges consist of them."""
 NOTHING = "nothing"
 """The kind of a row that says nothing."""
 EVERY_EVENT = ("kind", "channel")
@@ -199,7 +195,7 @@ class Mail:
         if self._later:
             events, self._later = [*self._later, *events], []
             self._behind[0] = 0
-        agreed = self._agreed
+        agreed, rows = self._agreed, self._events
         for event in events:
             if posted == agreed.most_events:
                 self._later.append(event)
@@ -208,26 +204,36 @@ class Mail:
             channel = event.channel
             if channel not in at.SOCKETS:
                 continue
-            place = self._keep(channel, event.data) if isinstance(event, Received) else 0
-            if place is None:
-                continue
             pack, kind, values = agreed.events[type(event)]
-            pack(self._events, agreed.event_bytes * posted, kind, channel, *values(event, place))
+            row = agreed.event_bytes * posted
+            if isinstance(event, Sent):
+                pack(rows, row, kind, channel, event.size)
+            elif not isinstance(event, Received):
+                pack(rows, row, kind, channel, *values(event))
+            elif (place := self._keep(channel, event.data)) is not None:
+                high, low = words_of(event.remote.host)
+                pack(rows, row, kind, channel, high, low, event.remote.port, len(event.data), place)
+            else:
+                continue
             posted += 1
         self._posted[0] = posted
 
     def _keep(self, channel: int, data: bytes) -> int | None:
         """Puts bytes into the ring of a socket.  Returns the place behind them, or None: there were more than the socket would
         keep, and they are lost."""
-        fresh, size, ring_bytes = self._fresh.get(channel, 0), len(data), self._agreed.ring_bytes
-        if fresh + size > self._agreed.fresh_bytes:
+        fresh, size, agreed = self._fresh.get(channel, 0), len(data), self._agreed
+        if fresh + size > agreed.fresh_bytes:
             return None
         self._fresh[channel] = fresh + size
+        ring_bytes = agreed.ring_bytes
         place, ring = self._ends[channel - 1] + fresh, ring_bytes * (channel - 1)
-        at = place & ring_bytes - 1
-        first, rest = data[: ring_bytes - at], data[ring_bytes - at :]
-        self._rings[ring + at : ring + at + len(first)] = first
-        self._rings[ring : ring + len(rest)] = rest
+        begin = place & ring_bytes - 1
+        if begin + size <= ring_bytes:
+            self._rings[ring + begin : ring + begin + size] = data
+        else:
+            first, rest = data[: ring_bytes - begin], data[ring_bytes - begin :]
+            self._rings[ring + begin : ring + ring_bytes] = first
+            self._rings[ring : ring + len(rest)] = rest
         return place + size & COUNTER
 
     def collect(self, memory: AreaMemory) -> list[Request]:
@@ -240,14 +246,14 @@ class Mail:
             agreed = self._agreed
             for row in agreed.requests(self._requests[: agreed.request_bytes * count]):
                 kind, channel, _, _, _, _, _, high, low, size = row
-                if kind == agreed.grant:
-                    requests.append(Grant(channel, size))
-                elif kind == agreed.send:
+                if kind == agreed.send:
                     data, part = fetch(memory, high, low, size), agreed.part_bytes
                     if size <= part:
                         requests.append(Send(channel, data))
                     else:
                         requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
+                elif kind == agreed.grant:
+                    requests.append(Grant(channel, size))
                 else:
                     requests.append(agreed.rare[kind](dict(zip(REQUEST_FIELDS, row, strict=True)), memory))
         return requests

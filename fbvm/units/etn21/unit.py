@@ -332,7 +332,7 @@ class Etn21:
         """Events of the network for the next run of the program."""
         if self._fins:
             events = self._fins.take(events)
-        self._inside.mail.post(events)
+        (self._processor or self._inside).mail.post(events)
 
     def finish(self) -> list[Request]:
         """The requests that the unit's program has left for the network since the last call, in order."""
