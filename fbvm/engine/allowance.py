@@ -18,10 +18,15 @@ class Allowance:
     """A run ends with R0104 where fewer than `least` steps of its budget are left, unless `ask` says otherwise.
 
     `ask` is called with the steps that are left.  It returns how many have to be left from now on: if that are more, the run ends
-    now.  It must not raise."""
+    now.  It must not raise.  Neither number is negative: a run never goes on with fewer than no steps left, and machine code
+    counts on that.  Raises ValueError for a negative `least`."""
 
     least: int = 0
     ask: Callable[[int], int] | None = None
+
+    def __post_init__(self) -> None:
+        if self.least < 0:
+            raise ValueError(f"at least {self.least} steps left: it cannot be fewer than none")
 
 
 WHOLE_BUDGET = Allowance()

@@ -93,7 +93,7 @@ class Replay(RepeatedRun):
             self._links[number].told = list(events)
         if scan.watch is not None:
             steps, plc.watch_cycle.time_ns = scan.watch
-            plc.engine.allowance = Allowance(plc.budget - steps + 1)
+            plc.engine.allowance = Allowance(max(0, plc.budget - steps + 1))
         plc.scan(scan.now_ns)
         plc.engine.allowance = WHOLE_BUDGET
         if self._fingerprint.settle() != scan.fingerprint and self.differs is None:

@@ -223,7 +223,7 @@ class Replay:
             plc.budget = inputs.budget
         if inputs.watch is not None:
             steps, plc.watch_cycle.time_ns = inputs.watch
-            plc.engine.allowance = Allowance(plc.budget - steps + 1)
+            plc.engine.allowance = Allowance(max(0, plc.budget - steps + 1))
         write(plc, inputs.writes)
         for number, events in inputs.events.items():
             self._links[number].told = list(events)

@@ -18,6 +18,7 @@ import pytest
 from hand_image import at, behind, const, image, load, own, power_on, store
 from rows import each_of, first_quick
 
+from fbvm import compile_text
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS, SLOTS_OFFSET
 from fbvm.base.arithmetic import FUNCTIONS, NAN, limits, power, single
 from fbvm.base.memory import STRUCTS
@@ -32,6 +33,7 @@ from fbvm.base import cache
 from fbvm.engine.native.code import code_of
 from fbvm.engine.native.emit import conversions
 from fbvm.engine.native.emit.module import BodyWriter, translate
+from fbvm.engine.native.emit.writer import TRAPPED
 from fbvm.engine.native.llvm import compiler as native_compiler
 from fbvm.engine.native.llvm import entry_points as entries
 from fbvm.engine.native.llvm.worker import worker
@@ -305,6 +307,14 @@ def test_a_product_and_a_sum_are_rounded_each(machine: str) -> None:
     program = image((store(machine, 0, ("add", machine, product, load(machine, 24))),))
     _, assembly = native_compiler.assembly(translate(program).text, 2)
     assert "mul" in assembly and "fma" not in assembly.lower() and "fmadd" not in assembly.lower()
+
+
+def test_behind_a_body_that_is_inlined_nobody_looks_whether_it_has_ended() -> None:
+    """The steps that are left behind a charge are never taken for a point: a task that takes its bodies in has no look."""
+    program = compile_text("PROGRAM Main VAR t : TON; q : BOOL; END_VAR t(IN := NOT q, PT := T#1s); q := t.Q; END_PROGRAM").image
+    assert program
+    optimised, _ = native_compiler.assembly(translate(program).text, 2)
+    assert str(TRAPPED) not in optimised and optimised.count("@ask(") > 2
 
 
 CRC = (

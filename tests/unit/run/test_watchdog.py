@@ -229,4 +229,6 @@ def test_engines_end_at_the_charge_at_which_too_few_steps_are_left(engine: str) 
     plc.engine.allowance = Allowance(501)
     trap = plc.scan()
     assert trap and trap.code == "R0112"
+    with pytest.raises(ValueError, match="fewer than none"):
+        Allowance(-1)
     assert plc.read("Main.n") == 248  # 1000 - 2 - 249 * 2 = 500: two for the body, two for a pass

@@ -30,8 +30,9 @@ METADATA = """\
 !4 = distinct !{!4, !6, !"system page"}
 !5 = distinct !{!5, !6, !"program"}
 !6 = distinct !{!6, !"memory"}
+!7 = !{i64 0, i64 -9223372036854775808}
 """
-FIRST_NUMBER = 7
+FIRST_NUMBER = 8
 """The first number of the metadata that bodies add."""
 _MARK = re.compile(r" ;(\d+)$", re.MULTILINE)
 """A mark at the end of the line of an access: a comment to LLVM, until `resolved` puts metadata in its place."""
