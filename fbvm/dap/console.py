@@ -147,8 +147,8 @@ def inline_values(debug: DebugSession, arguments: Arguments) -> Body:
     first = debug.sources.line(int(arguments.get("startLine") or 1))
     last = debug.sources.line(int(arguments.get("endLine") or arguments.get("startLine") or 1))
     rows: list[Body] = []
-    for line in range(first, min(last, debug.sources.line_count(name)) + 1):
-        text = _SILENT.sub(lambda match: " " * len(match[0]), debug.sources.line_text(name, line))
+    for line, written in debug.sources.lines(name, first, last):
+        text = _SILENT.sub(lambda match: " " * len(match[0]), written)
         seen: set[str] = set()
         for match in _WORD.finditer(text):
             named = _named(debug, session, scope, match[0])

@@ -84,9 +84,9 @@ class Sources:
         rows = self._lines.get(name, [])
         return rows[line - 1] if 0 < line <= len(rows) else ""
 
-    def line_count(self, name: str) -> int:
-        """The number of lines of a source."""
-        return len(self._lines.get(name, []))
+    def lines(self, name: str, first: int, last: int) -> list[tuple[int, str]]:
+        """The lines of a source from one number to another, as far as it has them, with their numbers."""
+        return [(number, text) for number, text in enumerate(self._lines.get(name, ()), 1) if first <= number <= last]
 
     # --- lines and columns
 

@@ -15,6 +15,7 @@ from fbvm.machine.plc import Plc
 from fbvm.record.recording.recording import Recording
 from fbvm.record.recording.scans import RecordedScans
 from fbvm.step.past_session import PastSession
+from fbvm.step.session import Session
 
 PROJECT = """\
 [plc.fast]
@@ -140,6 +141,23 @@ def test_a_recording_opens_at_its_end_and_is_gone_through_backwards() -> None:
     assert client.ask("source", sourceReference=source["sourceReference"])["content"].startswith("PROGRAM Main")
     client.go("fbvm/gotoScan", scan=5)
     assert client.value("Main.n") == "5" and client.line == 3
+
+
+def attached(text: str) -> Target:
+    image = compile_text(text).image
+    assert image is not None
+    return Target({"pump": Session.of(lambda: Plc(image))}, {"text.st": text})
+
+
+def test_what_runs_elsewhere_goes_on_when_somebody_attaches_and_is_not_begun_again() -> None:
+    client = Client(lambda how, arguments: attached(TRAP))
+    client.ask("initialize", adapterID="fbvm")
+    client.send("attach", {})
+    client.ask("configurationDone")
+    assert client.events("process") == [{"name": "pump", "startMethod": "attach", "isLocalProcess": True}]
+    assert client.events("stopped") == [] and client.adapter.is_running
+    with pytest.raises(RefusedError, match="what runs elsewhere cannot be begun again from here"):
+        client.ask("restart")
 
 
 def test_a_recording_that_ended_in_a_trap_opens_there() -> None:
