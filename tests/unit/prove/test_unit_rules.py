@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fbvm.prove.encoding.terms import Terms
-from fbvm.prove.unit_rules import KINDS, MOST_BYTES, Rule, Word, rules
+from fbvm.prove.unit_rules import KINDS, MOST_BYTES, Rule, Word, free_words, rules
 from fbvm.units.etn21.map import Switch
 from fbvm.units.etn21.unit import Etn21, Fault
 from fbvm.wire.link import Event, Peer, Request, Sent
@@ -94,6 +94,29 @@ def test_a_unit_that_does_otherwise_breaks_a_rule(kind: str, word: Word, old: in
     before = {word: 0 for rule in some for word in rule.words} | {word: old}
     assert broken(some, before, before) == []
     assert kind in {rule.kind for rule in broken(some, before, before | {word: new})}
+
+
+KEPT = [
+    ("CIO 1570", "only clears", 0xFF), ("CIO 1561", "stays off", 0x1FF0), ("D 30211", "at most", 0xA),
+    ("D 30203", "at most", 1984), ("D 30243", "becomes at most", 1984),
+    ("D 30247", "changes while", 0, "CIO 1570: 3F", "CIO 1561: F"),
+    ("D 30247", "becomes one of", 0), ("CIO 1561", "one at most", 7), ("D 30238", "keeps", 0xFFFF), ("D 30244", "keeps", 0xFFFF),
+    ("D 30245", "keeps", 0xFFFF), ("D 30246", "keeps", 0xFFFF), ("CIO 1553", "stays off", 0x3FF0), ("CIO 1553", "one at most", 7),
+    ("CIO 1561", "rises while", 1, "CIO 1570: 6"), ("CIO 1561", "rises while", 2, "CIO 1570: 10"),
+    ("CIO 1561", "rises while", 4, "CIO 1570: 8"), ("CIO 1561", "rises while", 8, "CIO 1570: 20"),
+    ("CIO 1553", "rises while", 1, "CIO 1570: 1"), ("CIO 1553", "rises while", 2, "CIO 1570: 10"),
+    ("CIO 1553", "rises while", 4, "CIO 1570: 8"), ("CIO 1553", "rises while", 8, "CIO 1570: 20"),
+]  # fmt: skip
+"""The rules of socket 3 of unit 2, by hand from W421 6-6-2 to 6-7-6: n is 1550, m 30200, its area begins at m+38."""
+
+
+def test_the_words_of_a_socket_and_their_rules() -> None:
+    found = [(f"{rule.word[0]} {rule.word[1]}", rule.kind, rule.number,
+              *(f"{area} {word}: {mask:X}" for (area, word), mask in rule.cause)) for rule in rules(2, 3)]  # fmt: skip
+    assert found == KEPT
+    assert list(free_words(rules(2, 3))) == ["CIO1570.00..1570.07", *dict.fromkeys(
+        name.replace(" ", "") for name, *_ in KEPT if name != "CIO 1570")]
+    assert next(iter(free_words(rules(2, 4)))) == "CIO1570.08..1570.15"
 
 
 def test_every_kind_of_rule_has_a_source_and_is_used() -> None:
