@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from fbvm.record.trace.writer import Depth as Depth
     from fbvm.record.trace.writer import TraceWriter as TraceWriter
     from fbvm.units.etn21.unit import Etn21 as Etn21
+    from fbvm.units.openplc.unit import OpenPlc as OpenPlc
     from fbvm.units.port.noc import Noc as Noc
     from fbvm.units.port.tianxing import Tianxing as Tianxing
     from fbvm.watch.paths import UnknownPlace as UnknownPlace
@@ -83,6 +84,7 @@ _HOMES = {
     "record.trace.writer": ("Depth", "TraceWriter"),
     "units.etn21.unit": ("Etn21",),
     "units.port.noc": ("Noc",),
+    "units.openplc.unit": ("OpenPlc",),
     "units.port.tianxing": ("Tianxing",),
     "watch.paths": ("UnknownPlace",),
     "wire.link": ("Peer",),

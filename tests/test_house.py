@@ -59,7 +59,7 @@ ORDERS = {
     "code": ("", "builder", "layout", "pictures", "lowering", "store", "compiler"),
     "engine": ("", "python", "native/llvm", "native/library", "native/emit", "native/scans", "native", "choice"),
     "wire": ("", "fins"),
-    "units": ("", "etn21/fins", "etn21", "port"),
+    "units": ("", "etn21/fins", "etn21", "port", "openplc"),
     "machine": ("scan", "servicing", "fast", ""),
     "prove": ("encoding", ""),
     "campaign": ("", "mutation", "items", "fleet"),

@@ -7,10 +7,11 @@ from typing import Any
 
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.unit import Etn21
+from fbvm.units.openplc.unit import OpenPlc
 from fbvm.units.port.noc import Noc
 from fbvm.units.port.tianxing import Tianxing
 
-UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc, "Tianxing": Tianxing}
+UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc, "OpenPlc": OpenPlc, "Tianxing": Tianxing}
 """What makes a unit, by the name of its class, as journals write it."""
 KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "ETN21": ("Etn21", {"number": "unit_number", "timing": "timing", "seed": "seed", "fins": "fins", "fins_port": "fins_port",
@@ -19,6 +20,7 @@ KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
                         "fins_error_flags": "fins_error_flags"}),
     "NOC": ("Noc", {"slot": "rack_slot", "mac": "mac", "module": "module_type", "http": "http", "ftp": "ftp",
                     "restart": "restart_ns"}),
+    "OpenPLC": ("OpenPlc", {"port": "port", "clients": "clients", "read_only": "read_only"}),
     "Tianxing": ("Tianxing", {"model": "model"}),
 }  # fmt: skip
 """What a project calls a unit: the class, and the arguments by the keys that are written for them."""

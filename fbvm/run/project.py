@@ -115,6 +115,9 @@ UNIT: Keys = {
     "http": Key(flag, "NOC: whether the HTTP service is configured.", None),
     "ftp": Key(flag, "NOC: whether the FTP service is configured.", None),
     "restart": Key(time_ns, "NOC: how long a restart takes.", None),
+    "port": Key(whole(1, 65535), "OpenPLC: the port at which it waits for Modbus clients, 502 if none is given.", None),
+    "clients": Key(whole(1, 64), "OpenPLC: how many clients it has at once, 8 if nothing is said.", None),
+    "read_only": Key(flag, "OpenPLC: whether everything that writes is refused.", None),
     "model": Key(text, "Tianxing: \"T3\" with 8 connections or \"T4\" with 32.", None),
 }
 """The keys of all units; which of them a unit has depends on its type."""

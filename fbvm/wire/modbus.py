@@ -1,6 +1,6 @@
-"""Modbus TCP frames for decoders, peers and tests: bytes in, frames out, and every layout as a row of a table.
+"""Modbus TCP frames for decoders, peers, tests and OpenPLC's server: bytes in, frames out, and every layout as a row of a table.
 
-No unit uses this; a unit sends the bytes that the program gives it.  Received bytes never raise: an invalid frame is a
+No other unit uses this; a unit sends the bytes that the program gives it.  Received bytes never raise: an invalid frame is a
 `Fault`, an invalid PDU a `Message` whose `fault` describes the error.
 From MODBUS Application Protocol V1.1b3 ("AP") and MODBUS Messaging on TCP/IP Implementation Guide V1.0b ("IG").
 """

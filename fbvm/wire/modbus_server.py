@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from array import array
 from collections.abc import Callable, Collection, Mapping
+from typing import Any, Protocol
 
 from fbvm.wire import modbus
 from fbvm.wire.modbus import Adu, Fault, Message, data_reply, exception_reply
@@ -21,6 +22,16 @@ IDENTITY: dict[int, str] = {0: "fbvm", 1: "ModbusServer", 2: "1.0"}
 
 _COUNTERS = {0x0B: "messages", 0x0C: "", 0x0D: "exceptions", 0x0E: "messages", 0x0F: "", 0x10: "", 0x11: "", 0x12: ""}
 """FC 08 sub-functions that give a counter (AP 6.8): bus and server messages are one here, the others never count."""
+
+
+class Table(Protocol):
+    """One of the four tables: numbers by their addresses, one by one or in slices."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, place: Any, /) -> Any: ...
+
+    def __setitem__(self, place: Any, value: Any, /) -> None: ...
 
 
 class ModbusServer:
@@ -42,10 +53,10 @@ class ModbusServer:
         refusals: Mapping[int, int] | None = None,
         identity: Mapping[int, str] | None = None,
     ) -> None:
-        self.coils = bytearray(coils)
-        self.discrete_inputs = bytearray(discrete_inputs)
-        self.holding_registers = array("H", bytes(2 * holding_registers))
-        self.input_registers = array("H", bytes(2 * input_registers))
+        self.coils: Table = bytearray(coils)
+        self.discrete_inputs: Table = bytearray(discrete_inputs)
+        self.holding_registers: Table = array("H", bytes(2 * holding_registers))
+        self.input_registers: Table = array("H", bytes(2 * input_registers))
         self.unit_ids = unit_ids
         self.functions = frozenset(functions)
         self.refusals = dict(refusals or {})

@@ -19,7 +19,7 @@ FOLDER = "reference/python"
 SUBJECTS = {
     "Compile": ("compile_files", "compile_sources", "compile_text", "Compilation", "Diagnostic", "Source", "Image"),
     "Run": ("Plc", "Mode", "Trap", "Stopped", "UnknownPlace"),
-    "Units": ("Etn21", "Noc", "Tianxing"),
+    "Units": ("Etn21", "Noc", "OpenPlc", "Tianxing"),
     "Networks and peers": ("LoopNetwork", "TcpNetwork", "Peer", "ModbusPeer", "ModbusServer"),
     "Look": ("chart", "draw", "Recorder", "Recording", "TraceWriter", "Depth", "Trace", "Capture"),
     "Recordings in files": ("RecordingFile", "FileScans", "RecordingWriter"),

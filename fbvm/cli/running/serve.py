@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from contextlib import AbstractContextManager, ExitStack
 from io import TextIOWrapper
 from pathlib import Path
@@ -48,9 +48,11 @@ from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.interactive import Control
-from fbvm.run.plant import ENDLESS
+from fbvm.run.plant import ENDLESS, units_of
 from fbvm.run.running import EVENT, Running
 from fbvm.step.world import Debugged
+from fbvm.units.openplc.tables import COILS, DISCRETE_INPUTS, HOLDING_REGISTERS, INPUT_REGISTERS
+from fbvm.units.openplc.unit import OpenPlc
 from fbvm.wire.link import Peer
 
 CYCLE_NS = 10_000_000
@@ -60,10 +62,16 @@ SHIPPED = data_folder("examples") / "server.st"
 SERVED = {"CIO": 5801, "D": 32768}
 """Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
 
+RUNTIME_WORDS = {area: words for part in (*HOLDING_REGISTERS, *INPUT_REGISTERS) for area, words in ((part.area, part.count),)} | {
+    area: bits // 16 for area, bits in (COILS, DISCRETE_INPUTS)}
+"""Words of each area that clients of OpenPLC's server can reach."""
+
 OWN_SETTINGS = {"sockets": "Sockets", "read_only": "Read_Only", "fn0f": "Fn0F", "full_dm": "Full_DM", "idle_ns": "Idle_Time"}
 """The options that set inputs of the shipped server program."""
 FINS_SETTINGS = {"read_only"}
 """Those of them that FINS knows, too."""
+RUNTIME_SETTINGS = {"sockets": "clients", "read_only": "read_only"}
+"""Those that OpenPLC's server knows, and what it calls them."""
 HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --map {endpoint}=127.0.0.1:{port}` has several"
 
 
@@ -96,7 +104,9 @@ def command(
     **settings: int | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
-    reach the first port at which it waits.  With --fins, SCADA software and libraries that speak FINS reach it, too.
+    reach the first port at which it waits.  A program under --dialect matiec or strucpp that waits at none is served as OpenPLC
+    does: its coils are %QX, its registers %QW, %MW, %MD and %ML.  With --fins, SCADA software and libraries that speak FINS reach
+    it, too.
 
     With --trace all that clients do is recorded; `fbvm chart`, `table`, `why` and `step` look at it, also meanwhile.
 
@@ -110,7 +120,8 @@ def command(
     door = fins_door(fins_bind, fins_port, fins_node, fins_control, read_only) if fins else None
     with ExitStack() as stack:
         stack.enter_context(signals.installed())
-        plc = _own(files, program, libraries, FINS_SETTINGS if fins else ()) if files else _shipped(settings)
+        allowed = FINS_SETTINGS if fins else set()
+        plc, runtime = _own(files, program, libraries, allowed, settings) if files else (_shipped(settings), None)
         plc.watch_cycle.time_ns = watch_ns
         if image:
             _load(plc, image)
@@ -121,6 +132,8 @@ def command(
             plc.watchers.append(lambda _: None)  # no scans in one go: the log says in which one an answer left
         for unit in usual_units(mailbox_names(plc.image), fins=door.unit if door else None):
             plc.attach(unit, network)
+        if runtime:
+            plc.attach(runtime, network)
         if door:
             try_fins(network, door)
         recordings: dict[str, Any] = {"trace": trace, "journal": journal, "verify": verify}
@@ -181,14 +194,21 @@ def _shipped(settings: dict[str, int | None]) -> Plc:
     return plc
 
 
-def _own(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], allowed: Collection[str]) -> Plc:
-    """A PLC with a program of the user's own.  Raises UsageError for options of the shipped one, but for those `allowed`."""
+def _own(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], allowed: Set[str],
+         settings: Mapping[str, int | None]) -> tuple[Plc, OpenPlc | None]:  # fmt: skip
+    """A PLC with a program of the user's own, and, if it is one of OpenPLC's that has no server of its own, that of its runtime.
+
+    Raises UsageError for options of the shipped program, but for those `allowed`."""
+    image = compile_or_exit(files, program, libraries, runnable=True)
+    is_served = image.layout.sized is not None and not units_of(image)
     context = click.get_current_context()
-    given = [parameter.opts[0] for parameter in context.command.params if parameter.name in OWN_SETTINGS.keys() - allowed
-             and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT]  # fmt: skip
-    if given:
-        raise click.UsageError(f"{', '.join(given)}: said to the shipped server program; your own sets what it wants itself")
-    return Plc(compile_or_exit(files, program, libraries, runnable=True), CYCLE_NS)
+    given = {str(parameter.name): parameter.opts[0] for parameter in context.command.params if parameter.name in OWN_SETTINGS
+             and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT}  # fmt: skip
+    known = allowed | RUNTIME_SETTINGS.keys() if is_served else allowed
+    if wrong := [option for name, option in given.items() if name not in known]:
+        raise click.UsageError(f"{', '.join(wrong)}: said to the shipped server program; your own sets what it wants itself")
+    told: dict[str, Any] = {RUNTIME_SETTINGS[name]: settings[name] for name in given if name in RUNTIME_SETTINGS}
+    return Plc(image, CYCLE_NS), OpenPlc(**told) if is_served else None
 
 
 def _load(plc: Plc, image: Path) -> None:
@@ -320,7 +340,8 @@ def _save(plc: Plc, image: Path | None) -> bool:
     """Saves the memory, if `image` is given; says why it cannot and returns False if the host refuses."""
     if image:
         try:
-            memory_images.save(plc.memory, image, SERVED)
+            served = {area: words for area, words in RUNTIME_WORDS.items() if area in plc.memory.areas}
+            memory_images.save(plc.memory, image, served or SERVED)
         except OSError as error:
             say(f"{named(image)} cannot be written: {reason(error)}", err=True)
             return False

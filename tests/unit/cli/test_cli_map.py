@@ -24,6 +24,16 @@ def test_a_register_and_a_bit() -> None:
     assert mapped("CIO 1000") == [["CIO 1000", "input register", "04", "1000", "03E8", "1001", "31001", "301001"]]
 
 
+def test_addresses_of_openplc() -> None:
+    assert mapped("%QX1.2", "%IX0.0", "%IW7") == [
+        ["%QX1.2", "coil", "01 05 0F", "10", "000A", "11", "00011", "000011"],
+        ["%IX0.0", "discrete input", "02", "0", "0000", "1", "10001", "100001"],
+        ["%IW7", "input register", "04", "7", "0007", "8", "30008", "300008"]]
+    assert [line[3] for line in mapped("%QW1023", "%MW0", "%MD0", "%ML1023")] == [
+        "1023", "1024", "2048", "2049", "8188", "8189", "8190", "8191"]
+    assert [line[1] for line in mapped("%QW1024", "%MB3", "%IL0")] == ["not served"] * 3
+
+
 def test_ranges() -> None:
     assert [line[0] for line in mapped("D7..D9", "CIO 400.14..CIO 401.01")] == [
         "D7", "D8", "D9", "CIO 400.14", "CIO 400.15", "CIO 401.00", "CIO 401.01",

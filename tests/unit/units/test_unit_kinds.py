@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from fbvm import Etn21, Noc, Tianxing
+from fbvm import Etn21, Noc, OpenPlc, Tianxing
 from fbvm.units.contract import FinsUnit, ProcessorUnit, Unit, has_processor, serves_fins
 
-UNITS = {"ETN21": Etn21, "NOC": Noc, "Tianxing": Tianxing}
+UNITS = {"ETN21": Etn21, "NOC": Noc, "OpenPLC": OpenPlc, "Tianxing": Tianxing}
 
 
 @pytest.mark.parametrize("kind", UNITS)
