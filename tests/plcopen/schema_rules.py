@@ -12,6 +12,7 @@ _OBJECT = "localId | height width executionOrderId negated edge storage"
 _TYPE = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD string wstring ANY "
          "ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE array derived enum "
          "struct subrangeSigned subrangeUnsigned pointer")
+_DATA = "text Inheritance AccessModifiers Attributes Method* Property* Interface InputAssignments ObjectId ProjectStructure"
 _PINS = "inputVariables! inOutVariables! outputVariables!"
 _LISTS = "localVars tempVars inputVars outputVars inOutVars externalVars globalVars"
 _MARKS = "| name constant retain nonretain persistent"
@@ -63,13 +64,15 @@ connection | refLocalId | formalParameter | position*
 position | x y |
 relPosition | x y |
 addData | | data*
-data | name handleUnknown | text Inheritance AccessModifiers Attributes Method* Property* Interface InputAssignments
+data | name handleUnknown | {_DATA}
 Inheritance | | Extends* Implements*
 Attributes | | Attribute*
 Attribute | Name Value |
-Method | name | interface! body
-Property | name | interface! GetAccessor SetAccessor
-Interface | name | Methods Properties Inheritance addData
+Method | name | ObjectId | interface! body
+Property | name | ObjectId | interface! GetAccessor SetAccessor
+ProjectStructure | | Object*
+Object | Name ObjectId | Object*
+Interface | name | ObjectId | Methods Properties Inheritance addData
 InputAssignments | | InputAssignment*
 InputAssignment | | Name Value!
 """

@@ -157,3 +157,25 @@ def test_rungs_of_a_method_that_need_memory_are_refused() -> None:
 def test_a_body_ends_in_front_of_an_end_that_is_one_word() -> None:
     made = export_xml([Source("a.st", "FUNCTIONBLOCK B\nVAR n : INT; END_VAR\n    n := 1;\nEND_FUNCTIONBLOCK\n")])
     assert made.text is not None and "n := 1;" in made.text and "END_FUNCTION" not in made.text
+
+
+def test_what_belongs_to_what_is_named_for_twincat() -> None:
+    """TwinCAT takes methods, properties and actions only if `projectstructure` names them."""
+    text = ("INTERFACE I\nMETHOD M : INT\nEND_METHOD\nEND_INTERFACE\nFUNCTION_BLOCK A IMPLEMENTS I\n"
+            "METHOD M : INT\nM := 1;\nEND_METHOD\nPROPERTY P : INT\nGET\nP := 2;\nEND_GET\nEND_PROPERTY\n"
+            "ACTION X:\n;\nEND_ACTION\nEND_FUNCTION_BLOCK\n"
+            "PROGRAM Main\nVAR a : A; END_VAR\na();\nEND_PROGRAM\n")
+    made = export_xml([Source("a.st", text)])
+    assert made.text is not None
+    found = parse_markup(made.text.encode(), "made.xml")
+    assert not isinstance(found, Diagnostic)
+    assert breaches(found[1]) == []
+    rows = {row.get("ObjectId"): row.get("Name") for row in found[1].walk() if row.name == "Object"}
+    assert sorted(rows.values()) == ["A", "I", "M", "M", "Main", "P", "X"]
+    named = {one.get("ObjectId"): one.get("name") for one in found[1].walk() if one.name in ("Method", "Property", "Interface")}
+    kept = {one.text.strip(): "" for one in found[1].walk() if one.name == "ObjectId"}
+    assert {identity: rows[identity] for identity in named} == named
+    assert rows.keys() == {*named, *kept}
+    assert export_xml([Source("a.st", text)]).text == made.text
+    plain = export_xml([Source("a.st", "PROGRAM Main\nVAR a : BOOL; END_VAR\na := TRUE;\nEND_PROGRAM\n")]).text
+    assert plain is not None and "objectid" not in plain.lower()

@@ -11,6 +11,7 @@ from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.interchange.markup import Element, element, written
 from fbvm.interchange.plcopen.write import objects
 from fbvm.interchange.plcopen.write.pous import add_action, pou
+from fbvm.interchange.plcopen.write.structure import structure
 from fbvm.interchange.plcopen.write.types import OTHERS, NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
@@ -224,6 +225,8 @@ def _project(parts: _Parts, name: str, created: str) -> Element:
         place = next((at for at, part in enumerate(first.content) if isinstance(part, Element)
                       and part.name in ("accessVars", "configVars")), len(first.content))
         first.content[place:place] = parts.globals
+    interfaces = [inner for data in parts.added for inner in data.all("Interface")]
+    named = structure([*parts.types, *parts.pous, *interfaces])
     scaling: Callable[[str], Element] = lambda kind: element(kind, element("scaling", x=1, y=1))  # noqa: E731
     header = element("coordinateInfo", scaling("fbd"), scaling("ld"), scaling("sfc"))
     return element(
@@ -231,5 +234,5 @@ def _project(parts: _Parts, name: str, created: str) -> Element:
         element("fileHeader", companyName="", productName="fbvm", productVersion="1", creationDateTime=created),
         element("contentHeader", header, name=name, modificationDateTime=created),
         element("types", element("dataTypes", *parts.types), element("pous", *parts.pous)),
-        element("instances", element("configurations", *parts.configurations)), objects.added(*parts.added),
+        element("instances", element("configurations", *parts.configurations)), objects.added(*parts.added, named),
         **{"xmlns": NAMESPACE, "xmlns:xhtml": XHTML})
