@@ -60,9 +60,11 @@ class Source:
 
     def place(self, offset: int) -> tuple[int, int]:
         """Line (from `first_line`) and column (from 1) of a character offset; behind the text those of its end."""
-        offset = min(max(offset, 0), len(self.text))
-        row = bisect.bisect_right(self.line_starts, offset) - 1
-        return row + self.first_line, offset - self.line_starts[row] + 1
+        if not 0 <= offset <= len(self.text):
+            offset = 0 if offset < 0 else len(self.text)
+        starts = self.line_starts
+        row = bisect.bisect_right(starts, offset) - 1
+        return row + self.first_line, offset - starts[row] + 1
 
     def line(self, number: int) -> str:
         """The text of line `number` (from `first_line`) without its end.  Raises IndexError behind the last line."""

@@ -94,9 +94,10 @@ ANY_SIZE, ANY_BITS, ANY_STRIDE, ANY_CLASS = 8, 12, 16, 20
 next (8 for BOOLs that fill bytes), type class."""
 
 
-@dataclass(frozen=True)
+@dataclass(unsafe_hash=True)
 class Field:
-    """A member of a structure or a variable of a POU, at `offset` bytes from the start of the whole.
+    """A member of a structure or a variable of a POU, at `offset` bytes from the start of the whole.  It never changes: it is not
+    `frozen`, since a program has thousands, and to make a frozen one takes six times as long.
 
     `kind` is "" for structure members, else the section's word (VAR_INPUT ...); `bit` is set for a BOOL located on a
     bit; `absolute` for a located variable, whose offset is one of the buffer; `reference` for an in-out, whose slot
@@ -305,6 +306,8 @@ def base(kind: Type) -> Type:
 
 def families(kind: Type) -> frozenset[str]:
     """The generic types that hold `kind`."""
+    if isinstance(kind, Elementary):
+        return kind.families
     kind = base(kind)
     if isinstance(kind, Elementary):
         return kind.families
@@ -314,6 +317,11 @@ def families(kind: Type) -> frozenset[str]:
 
 
 _TEXTS, _DERIVED, _NO_FAMILIES = families_of("ANY_STRING"), families_of("ANY_DERIVED"), frozenset[str]()
+
+
+def is_real(kind: Type) -> bool:
+    """True for REAL and LREAL."""
+    return kind is REAL or kind is LREAL
 
 
 def machine(kind: Type) -> str:

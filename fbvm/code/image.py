@@ -20,9 +20,9 @@ SAME_FOR_EQUAL = 2
 """The version of `marshal` in which equal data are equal bytes, whether or not parts of them are one object."""
 
 
-@dataclass(frozen=True)
+@dataclass(unsafe_hash=True)
 class Site:
-    """A place in the source: name of the file, name of the POU, line and column from 1 on."""
+    """A place in the source: name of the file, name of the POU, line and column from 1 on.  It never changes, as a `Field`."""
 
     file: str
     pou: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import chain, islice
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.pous import SourceBuilder
@@ -45,10 +46,13 @@ _TWINCAT_HINT = "it is of TwinCAT: check, run, test and export read .TcPOU, .plc
 
 def _counted(tokens: Iterator[Token], reached: Callable[[int], None]) -> Iterator[Token]:
     """The tokens, and a word to the caller at some of them."""
-    for number, token in enumerate(tokens):
-        if number % OFTEN == 0:
-            reached(token.start)
-        yield token
+    return chain.from_iterable(_portions(tokens, reached))
+
+
+def _portions(tokens: Iterator[Token], reached: Callable[[int], None]) -> Iterator[Iterator[Token]]:
+    for first in tokens:
+        reached(first.start)
+        yield chain((first,), islice(tokens, OFTEN - 1))
 
 
 OFTEN = 5000

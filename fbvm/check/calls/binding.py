@@ -118,7 +118,7 @@ def _named(scope: Scope, argument: tree.Argument, pou: Pou, bound: PouCall, give
         scope.error("S0403", argument.name, f"{argument.name.text} is given twice")
         return
     given[name] = argument
-    variable = next((v for v in pou.order if fold(v.name) == name and v.kind in PARAMETER_KINDS), None)
+    variable = _parameter(pou, name)
     if variable is None:
         _implicit(scope, argument, name, pou, bound)
     elif (variable.kind == "VAR_OUTPUT") != (argument.kind == "=>") and not (
@@ -128,6 +128,14 @@ def _named(scope: Scope, argument: tree.Argument, pou: Pou, bound: PouCall, give
         scope.error("S0402", argument, f"{variable.name} is {_described(variable)}: write {variable.name} {arrow} ...", others)
     elif argument.value is not None:
         _pass(scope, argument, variable, bound)
+
+
+def _parameter(pou: Pou, name: str) -> Variable | None:
+    """The parameter of that folded name.  Behind the name of an input with R_EDGE stands what the body reads of it."""
+    found = pou.variables.get(name)
+    if found is not None and found.kind in PARAMETER_KINDS and not pou.edges:
+        return found
+    return next((v for v in pou.order if fold(v.name) == name and v.kind in PARAMETER_KINDS), None)
 
 
 def _implicit(scope: Scope, argument: tree.Argument, name: str, pou: Pou, bound: PouCall) -> None:

@@ -66,7 +66,7 @@ def _has_own(context: Context, level: Pou, phase: str) -> bool:
     key = level, phase
     if key not in context.constructing:
         context.constructing[key] = bool(_called(context, level, phase)) or \
-            any(constructs(context, variable.type, phase) for variable in _declared(level))
+            any(constructs(context, kind, phase) for kind in {id(each.type): each.type for each in _declared(level)}.values())
     return context.constructing[key]
 
 

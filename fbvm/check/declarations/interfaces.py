@@ -7,7 +7,7 @@ in-outs, which the caller writes; all others get their initial values at each en
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
@@ -382,7 +382,7 @@ class _Interface:
 
     # --- layout -----------------------------------------------------------------------------------------------------
 
-    def _frame(self, variables: list[Variable]) -> None:
+    def _frame(self, variables: Sequence[Variable]) -> None:
         passed = [v for v in variables if v.kind in ("VAR_INPUT", "VAR_IN_OUT")]
         read = [v for v in variables if v.kind in ("VAR_OUTPUT", "RESULT")] if self.pou.block is not None else []
         rest = [*read, *(v for v in variables if v not in passed and v not in read)]

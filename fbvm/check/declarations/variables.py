@@ -73,7 +73,7 @@ def make_variable(context: Context, declared: tree.VarDecl, name: tree.Name, sec
     report = context.report
     refuse_reserved(report, source, name, context.project.dialect, section.kind)
     kind, initial = resolved
-    words = {fold(q.text) for q in section.qualifiers}
+    words = {fold(q.text) for q in section.qualifiers} if section.qualifiers else frozenset[str]()
     made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
                     retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None,
                     role=section.role, declared=declared)

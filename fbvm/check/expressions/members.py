@@ -37,16 +37,18 @@ READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 def member(scope: Scope, expr: tree.Member, want: Type | None) -> Type | None:
     """The type of `of.name`: a field, a bit, a member of an enumeration, a global variable of a list."""
     of = expr.of
-    meant = qualified.member(scope, expr)
-    if isinstance(meant, EnumType):
-        return literals.enum_value(scope, expr, meant, expr.name)
-    if isinstance(meant, Variable):
-        return names.variable(scope, expr, meant)
-    if qualified.is_space(scope, of):
-        _report_unlisted(scope, qualified.last_name(of), expr.name)
-        return None
+    if not isinstance(of, tree.NameRef) or scope.variable(of.text) is None:
+        meant = qualified.member(scope, expr)
+        if isinstance(meant, EnumType):
+            return literals.enum_value(scope, expr, meant, expr.name)
+        if isinstance(meant, Variable):
+            return names.variable(scope, expr, meant)
+        if qualified.is_space(scope, of):
+            _report_unlisted(scope, qualified.last_name(of), expr.name)
+            return None
+        if isinstance(of, tree.NameRef):
+            names.program(scope, of)
     if isinstance(of, tree.NameRef):
-        names.program(scope, of)
         scope.qualifiers.add(of)
     is_property, kind = objects.value_of_property(scope, expr)
     if is_property:

@@ -88,7 +88,8 @@ def find(scope: Scope, expr: tree.Expr, keys: tuple[str, ...]) -> tuple[list[Pou
     `keys` are "{}" for a method, "GET {}" and "SET {}" for accessors.  None if the expression names none of them."""
     if isinstance(expr, tree.NameRef):
         block = scope.pou.own_block if scope.pou is not None else None
-        if block is None or scope.own_variable(expr.text) is not None and not _is_result(scope, expr.text):
+        if block is None or _has_no_methods(block) or \
+                scope.own_variable(expr.text) is not None and not _is_result(scope, expr.text):
             return None
         of, name = None, expr
     elif isinstance(expr, tree.Member):
@@ -98,13 +99,18 @@ def find(scope: Scope, expr: tree.Expr, keys: tuple[str, ...]) -> tuple[list[Pou
         block, of, name = scope.context.block_of(kind), expr.of, expr.name  # type: ignore[assignment]
     else:
         return None
-    if not block.methods and block.base is None and not block.interfaces:
+    if _has_no_methods(block):
         return None
     found = [block.method(key.format(fold(name.text))) for key in keys]
     if not any(found):
         return None
     scope.project.dependencies.repeatable = False
     return found, of
+
+
+def _has_no_methods(block: Pou) -> bool:
+    """True for a block with neither methods nor accessors of its own or inherited."""
+    return not block.methods and block.base is None and not block.interfaces
 
 
 def _is_result(scope: Scope, name: str) -> bool:

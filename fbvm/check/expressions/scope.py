@@ -15,6 +15,7 @@ from fbvm.base.types import (
     LREAL,
     ULINT,
     AnyType,
+    Elementary,
     EnumType,
     RefType,
     StringType,
@@ -41,9 +42,9 @@ from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Valu
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 
-_BEHIND_REFERENCE = tree.Deref | tree.Index | ladder.Memory | ladder.Words | ladder.Contents
+_BEHIND_REFERENCE = frozenset((tree.Deref, tree.Index, ladder.Memory, ladder.Words, ladder.Contents))
 """Expressions that name a place in memory without a variable."""
-_PLACES = _BEHIND_REFERENCE | tree.NameRef | tree.Direct | tree.Member | tree.Part
+_PLACES = _BEHIND_REFERENCE | {tree.NameRef, tree.Direct, tree.Member, tree.Part}
 """Expressions that may name a place in memory."""
 _CONSTANT_PLACES = ("S0503", "S0705", "S0801")
 """Codes of places whose values must be known before the program runs: a conversion does not help there."""
@@ -64,6 +65,7 @@ class Scope:
         self.pou = pou
         self.late = late
         self._rules = context.rules.expressions
+        self._types = context.facts.types
         self.qualifiers: set[tree.NameRef] = set()
         """Names that stand in front of a point."""
         self.counters: list[tuple[object, ...]] = []
@@ -84,14 +86,15 @@ class Scope:
 
         `want` is the type that the place of the expression has; a literal takes it where no operand decides.  The first call
         runs the rule of the expression, further calls return the same type."""
-        if expr in self.facts.types or expr in self.facts.wrong:
-            return self.facts.types.get(expr)
+        kind = self._types.get(expr)
+        if kind is not None or expr in self.facts.wrong:
+            return kind
         kind = self._rules[type(expr)](self, expr, want)
         if isinstance(kind, RefType) and kind.follows:
             self.facts.followed[expr] = kind
             kind = kind.target
         if kind is not None:
-            self.facts.types[expr] = kind
+            self._types[expr] = kind
         else:
             self.facts.wrong.add(expr)
         return kind
@@ -114,6 +117,8 @@ class Scope:
         kind = self.infer(expr, target)
         if kind is None:
             return False
+        if kind is target and isinstance(kind, Elementary) and expr not in self.facts.constants:
+            return True  # most values
         if is_untyped(kind):
             return self.adopt(expr, target, code) is not None
         if assignable(kind, target):
@@ -283,7 +288,7 @@ class Scope:
     def is_in_memory(self, expr: tree.Expr) -> bool:
         """True for a variable, an address, what a reference refers to, or a part of one of these."""
         expr = self.facts.root(expr)
-        return isinstance(expr, _BEHIND_REFERENCE) or expr in self.facts.variables or expr in self.facts.directs or \
+        return type(expr) in _BEHIND_REFERENCE or expr in self.facts.variables or expr in self.facts.directs or \
             expr in self.facts.followed
 
     def is_variable(self, expr: tree.Expr) -> bool:
@@ -291,4 +296,4 @@ class Scope:
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return any_parameters.is_array(expr)
         return expr not in self.facts.rewritten and self.is_in_memory(expr) and \
-            (isinstance(expr, _PLACES) or expr in self.facts.followed)
+            (type(expr) in _PLACES or expr in self.facts.followed)

@@ -108,7 +108,7 @@ def _warn_of_written_input(scope: Scope, expr: tree.Expr, variable: Variable) ->
     pou = scope.pou
     if pou is None:
         return
-    raw = any(edge.hidden is variable for edge in pou.owner.edges)
+    raw = bool(pou.owner.edges) and any(edge.hidden is variable for edge in pou.owner.edges)
     if raw or variable.kind == "VAR_INPUT" and variable.owner is pou.owner:
         scope.error("S0591", expr, f"{variable.name.removesuffix(' edge')} is an input of {pou.name}"
                                    " and is written inside it")

@@ -37,11 +37,12 @@ class Body:
 
     def below(self, node: tree.Node) -> Nodes:
         """The nodes directly below one; of a call that means an operator, those of the operator."""
-        if isinstance(node, tree.Call | ladder.Contents) and (meaning := self.facts.rewritten.get(node)) is not None:
+        kind = type(node)
+        if kind in _MEANING_OTHERS and (meaning := self.facts.rewritten.get(node)) is not None:  # type: ignore[call-overload]
             return (meaning,)
-        if isinstance(node, tree.StructInit) and (assignment := self.facts.assignments.get(node)) is not None:
+        if kind is tree.StructInit and (assignment := self.facts.assignments.get(node)) is not None:  # type: ignore[call-overload]
             return *assignment.targets, assignment.value
-        return _BELOW[type(node)](node)
+        return _BELOW[kind](node)
 
     @cached_property
     def nodes(self) -> list[tree.Node]:
@@ -52,8 +53,8 @@ class Body:
             node = todo.pop()
             if node is not None:
                 found.append(node)
-                if below := self.below(node):
-                    todo += below[::-1]
+                if type(node) not in _LEAVES:
+                    todo += self.below(node)[::-1]
         return found
 
     def numbered(self) -> Iterator[tuple[tree.Call, Address]]:
@@ -61,9 +62,8 @@ class Body:
 
         An interlock makes several calls of one instruction in the same place; they count as one."""
         seen: set[int] = set()
-        for node in self.nodes:
-            if (isinstance(node, tree.Call) and isinstance(node.callee, tree.NameRef) and node.callee.text.startswith("$")
-                    and node.start not in seen):
+        for node in [each for each in self.nodes if isinstance(each, tree.Call)]:
+            if isinstance(node.callee, tree.NameRef) and node.callee.text.startswith("$") and node.start not in seen:
                 seen.add(node.start)
                 for argument in node.arguments:
                     flag = self.facts.directs.get(argument.value) if argument.value is not None else None
@@ -126,3 +126,5 @@ _BELOW: dict[type, Callable[[Any], Nodes]] = {
     ladder.Contents: lambda n: (n.of,),
 }
 """For each kind of node of a body the nodes directly below it, in the order of the text."""
+_LEAVES = frozenset(kind for kind, below in _BELOW.items() if below is _nothing)
+_MEANING_OTHERS = frozenset((tree.Call, ladder.Contents))

@@ -17,7 +17,7 @@ def flow(body: Body) -> None:
     _Flow(body).block(body.pou.tree.body)
 
 
-_GOES_ON = tree.Assign | tree.CallStatement
+_GOES_ON = (tree.Assign, tree.CallStatement)
 
 
 class _Flow:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from fbvm.base.types import BOOL, LREAL, StructType, Type, base
+from fbvm.base.types import BOOL, LREAL, StructType, Type, base, is_real
 from fbvm.check.expressions.constants import wrap
 from fbvm.check.expressions.values import is_any
 from fbvm.check.expressions.writes import place
@@ -15,14 +15,14 @@ from fbvm.check.lint.body import Body
 from fbvm.check.symbols.facts import Pou, PouCall, StandardCall, Variable
 from fbvm.syntax import tree
 
-_NO_PLACES = tree.Binary | tree.Unary | tree.Literal
+_NO_PLACES = frozenset((tree.Binary, tree.Unary, tree.Literal))
 
 
 def _binary(body: Body, node: tree.Binary) -> None:
     kind = body.facts.operands.get(node)
     if node.op == "**":
         _signed_power(body, node)
-    if kind is None or not is_any(kind, "ANY_REAL"):
+    if kind is None or not is_real(kind):
         if kind is not None and node in body.facts.constants:
             _overflow(body, node, kind)
         return
@@ -77,7 +77,7 @@ def _equality(body: Body, node: tree.Expr, op: str, sides: Sequence[tree.Expr], 
 
 def _fraction(body: Body, expr: tree.Expr, kind: Type) -> None:
     """Warn of a division of integers within a value that becomes a real only afterwards."""
-    if not is_any(kind, "ANY_REAL"):
+    if not is_real(kind):
         return
     todo = [expr]
     while todo:
@@ -110,7 +110,7 @@ def _assign(body: Body, node: tree.Assign) -> None:
     _kept_address(body, node)
     if node.op != ":=" or len(node.targets) > 1:
         return
-    if isinstance(node.value, _NO_PLACES):
+    if type(node.value) in _NO_PLACES:
         return
     there = place(facts, node.targets[0])
     if there is not None and there == place(facts, node.value):

@@ -28,9 +28,9 @@ SCANNED = frozenset((
 MANY_WORDS = 16
 """An access to more words than that counts as one to the whole area."""
 
-_NAMES = tree.NameRef | tree.Direct
-_FOLLOWING = tree.Deref | tree.Index
-_PARTS = _FOLLOWING | tree.Member | tree.Part
+_NAMES = (tree.NameRef, tree.Direct)
+_FOLLOWING = (tree.Deref, tree.Index)
+_PARTS = (*_FOLLOWING, tree.Member, tree.Part)
 
 Key = Hashable
 """A place that can be written: its variable or address, and the steps to the part."""

@@ -33,4 +33,5 @@ class Containment:
         if not kind.block:
             return any(self(member.type) for member in kind.fields.values())
         pou = self.context.block_of(kind)
-        return self._property(pou) or any(self(v.type) for v in pou.order if v.place == "self" and not v.reference)
+        held = {id(v.type): v.type for v in pou.order if v.place == "self" and not v.reference}
+        return self._property(pou) or any(map(self, held.values()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TypeGuard
+from typing import TypeGuard, get_args
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
@@ -21,6 +21,7 @@ for WSTRING a str of UTF-16 units."""
 
 PartOf = tree.Member | tree.Index | tree.Part
 """Expressions that may name a part of a variable."""
+_PARTS = frozenset(get_args(PartOf))
 
 UNTYPED_INT = Elementary("an integer literal", 0, 1, "i64", frozenset())
 UNTYPED_REAL = Elementary("a real literal", 0, 1, "f64", frozenset())
@@ -180,6 +181,8 @@ class Pou:
     tasked: dict[Variable, Variable] = field(default_factory=dict)
     """Instances of a program that a CONFIGURATION gives tasks of their own, and the variable that says whether it does so
     for this instance of the program: calls do not run them then."""
+    _by_kind: dict[str, tuple[int, tuple[Variable, ...]]] = field(default_factory=dict, repr=False)
+    """Results of `parameters`, each with the length of `order`, which only grows."""
 
     @property
     def is_function(self) -> bool:
@@ -246,8 +249,12 @@ class Pou:
         """The POU whose variables its body sees: of an ACTION the one that it belongs to, else itself."""
         return self.home or self
 
-    def parameters(self, kind: str) -> list[Variable]:
-        return [v for v in self.order if v.kind == kind]
+    def parameters(self, kind: str) -> tuple[Variable, ...]:
+        """Its variables of one kind, in the order of the declaration."""
+        known = self._by_kind.get(kind)
+        if known is None or known[0] != len(self.order):
+            known = self._by_kind[kind] = len(self.order), tuple(v for v in self.order if v.kind == kind)
+        return known[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,8 +422,8 @@ class Facts:
     def is_part(self, expr: tree.Expr) -> TypeGuard[PartOf]:
         """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer, nor for
         what a member that is declared REFERENCE TO is bound to."""
-        return isinstance(expr, PartOf) and expr not in self.variables and expr not in self.gets and \
-            expr not in self.followed and not isinstance(self.types.get(expr.of), RefType)
+        return type(expr) in _PARTS and expr not in self.variables and expr not in self.gets and \
+            expr not in self.followed and not isinstance(self.types.get(expr.of), RefType)  # type: ignore[attr-defined]
 
     def root(self, expr: tree.Expr) -> tree.Expr:
         """The variable, address, dereference or element behind a pointer of which a place is a part."""
@@ -444,6 +451,8 @@ _WORD_LEVELS = re.compile(r"%[IQM][BWDL]?\d+\.\d+", re.I)
 
 def holds_block(kind: Type) -> bool:
     """True for an instance, and for arrays and structures that hold one."""
+    if isinstance(kind, Elementary):
+        return False
     if isinstance(kind, ArrayType):
         return holds_block(kind.element)
     return is_block(kind) or isinstance(kind, StructType) and any(holds_block(f.type) for f in kind.fields.values())

@@ -124,7 +124,7 @@ class SymbolTable:
     def let_go(self) -> None:
         """Drop everything.  POUs, variables and facts refer to each other in circles, and would stay in memory until the next
         garbage collection."""
-        owners = (variable.owner for variable in self.facts.variables.values() if variable.owner)
+        owners = (variable.owner for variable in set(self.facts.variables.values()) if variable.owner)
         for pou in {*self.pous.values(), *self.instantiated.values(), *owners}:
             vars(pou).clear()
         for table in vars(self.facts).values():

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 
 from fbvm.base.dialects import Dialect
 from fbvm.code.operations import Node
 
 DEEPEST = 40
 """Operations nested deeper than this are cut by a temporary, so that no back end meets deep nesting."""
+
+
+class Inner:
+    """A block inside the present one, for a `with` statement: a class, since there is one for each branch and call."""
+
+    def __init__(self, emitter: Emitter) -> None:
+        self.emitter, self.outer = emitter, emitter.out
+
+    def __enter__(self) -> list[Node]:
+        inner: list[Node] = []
+        self.emitter.out = inner
+        return inner
+
+    def __exit__(self, *_: object) -> None:
+        self.emitter.out = self.outer
 
 
 class Emitter:
@@ -29,13 +43,9 @@ class Emitter:
         """Append statements to the present block."""
         self.out += statements
 
-    @contextmanager
-    def block(self) -> Iterator[list[Node]]:
-        """Collect what is emitted inside the `with` statement in a block of its own, which is yielded."""
-        outer, inner = self.out, []  # type: list[Node], list[Node]
-        self.out = inner
-        yield inner
-        self.out = outer
+    def block(self) -> Inner:
+        """Collects what is emitted inside the `with` statement in a block of its own, which is yielded."""
+        return Inner(self)
 
     # --- temporaries ------------------------------------------------------------------------------------------------
 
@@ -72,10 +82,15 @@ class Emitter:
         mark = len(self.out)
         for node in values:
             if len(self.out) > mark:
-                nodes = [self._to_temporary_at(mark, earlier) for earlier in reversed(nodes)][::-1]
-                mark = len(self.out)
+                nodes, mark = self.evaluated_before(nodes, mark)
             nodes.append(node)
         return nodes
+
+    def evaluated_before(self, nodes: list[Node], mark: int) -> tuple[list[Node], int]:
+        """Temporaries with operands that are evaluated where the present block had only `mark` statements, and how many it has
+        now."""
+        made = [self._to_temporary_at(mark, earlier) for earlier in reversed(nodes)][::-1]
+        return made, len(self.out)
 
     def cut_if_deep(self, node: Node) -> Node:
         """The same expression, or a temporary with its value if it is nested deeper than DEEPEST."""
@@ -83,10 +98,11 @@ class Emitter:
         if id(node) in heights:
             return node
         for part in node[2:]:
-            if isinstance(part, tuple):
+            if type(part) is tuple:
                 known = heights.get(id(part))
-                if height <= (1 if known is None else known[0]):
-                    height = 2 if known is None else known[0] + 1
+                above = 2 if known is None else known[0] + 1
+                if above > height:
+                    height = above
         if height > DEEPEST:
             return self.to_temporary(node)
         heights[id(node)] = height, node

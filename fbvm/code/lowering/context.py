@@ -96,19 +96,22 @@ class BodyContext(Emitter):
         return self._value(expr, want)
 
     def _value(self, expr: tree.Expr, want: Type | None) -> Node:
-        expr = self.facts.gets.get(expr, expr)
-        kind = self.facts.types[expr]
-        known = self.facts.constants.get(expr)
+        facts = self.facts
+        if facts.gets:
+            expr = facts.gets.get(expr, expr)
+        kind = facts.types[expr]
+        known = facts.constants.get(expr)
         if known is not None:
             target = base(kind if want is None else want)
             form = machine(target)
             if form in FLOATS or form == "b" or form in TEXT_UNITS:
                 known = convert_constant(known, target)
             return constant(target, known)
+        if want is None or want is kind:
+            return self.cut_if_deep(self._values[type(expr)](self, expr))
         if isinstance(kind, StructType) and kind.block and isinstance(want, RefType):
             return self.cut_if_deep(self.instance_reference(self.place(expr), kind))
-        node = self._values[type(expr)](self, expr)
-        return self.cut_if_deep(node if want is None or want is kind else implicit(self, node, kind, base(want)))
+        return self.cut_if_deep(implicit(self, self._values[type(expr)](self, expr), kind, base(want)))
 
     def _shown(self, expr: tree.Expr, marks: list[Mark]) -> Node:
         """A BOOL that contacts of a rung show, with the observations of those."""
@@ -120,7 +123,14 @@ class BodyContext(Emitter):
 
     def operands(self, *wanted: tuple[tree.Expr, Type | None]) -> list[Node]:
         """The values of several expressions, each with the type that is wanted, evaluated from left to right."""
-        return self.sequence(self.value(expr, kind) for expr, kind in wanted)
+        nodes: list[Node] = []
+        mark = len(self.out)
+        for expr, kind in wanted:
+            node = self.value(expr, kind)
+            if len(self.out) > mark:
+                nodes, mark = self.evaluated_before(nodes, mark)
+            nodes.append(node)
+        return nodes
 
     def as_i64(self, expr: tree.Expr) -> Node:
         """An integer expression as i64, for subscripts; what does not fit becomes the greatest."""
@@ -134,10 +144,14 @@ class BodyContext(Emitter):
 
     def place(self, expr: tree.Expr) -> Place:
         """The place that an expression names; for a REFERENCE TO, the place that it is bound to."""
-        expr = self.facts.gets.get(expr, expr)
-        reference = self.facts.followed.get(expr)
+        facts = self.facts
+        if facts.gets:
+            expr = facts.gets.get(expr, expr)
+        reference = facts.followed.get(expr)
         if reference is None or isinstance(expr, tree.Call):
-            return self._named(expr, self.facts.types[expr])
+            if (variable := facts.variables.get(expr)) is not None:
+                return self.variable(variable, expr)
+            return self._places[type(expr)](self, expr, facts.types[expr])
         held = self._named(expr, reference).load()
         return Place((("ref", held, self.site(expr)), 0, ()), self.facts.types[expr])
 
@@ -248,7 +262,7 @@ class BodyContext(Emitter):
             if isinstance(statement, tree.Empty):
                 continue
             site = self.site(statement)
-            if statement.end > statement.start and not self.is_hidden and not isinstance(statement, _OBSERVED_BY_RULE):
+            if statement.end > statement.start and not self.is_hidden and type(statement) not in _OBSERVED_BY_RULE:
                 rung = self.rung_numbers.get(site)
                 self.out.append(("observe", "statement" if rung is None else "rung", site, rung))
             position = len(self.out)
@@ -281,4 +295,4 @@ class BodyContext(Emitter):
 
 
 EXIT: Block = (("exit",),)
-_OBSERVED_BY_RULE = ladder.Ladder | ladder.Rung | sfc.Sfc | il.InstructionList
+_OBSERVED_BY_RULE = frozenset((ladder.Ladder, ladder.Rung, sfc.Sfc, il.InstructionList))

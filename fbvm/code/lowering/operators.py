@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.arithmetic import limits
-from fbvm.base.types import BOOL, LREAL, RefType, Type, base, machine
+from fbvm.base.types import BOOL, ELEMENTARY, LREAL, RefType, Type, base, machine
 from fbvm.check.expressions import constants
 from fbvm.check.expressions.values import is_any
 from fbvm.code.builder.conversions import day_start, to_float
@@ -15,6 +15,7 @@ from fbvm.syntax.tree import ladder
 
 _ARITHMETIC = {"+": "add", "-": "sub", "*": "mul", "/": "div", "MOD": "mod", "**": "pow",
                "AND": "and", "OR": "or", "XOR": "xor"}
+_TIMES = frozenset(kind for kind in ELEMENTARY.values() if is_any(kind, "ANY_DURATION", "ANY_DATE"))
 _COMPARE = {"=": "eq", "<>": "ne", "<": "lt", ">": "gt", "<=": "le", ">=": "ge"}
 
 
@@ -41,7 +42,7 @@ def _binary(body: BodyContext, expr: tree.Binary) -> Node:
     if isinstance(operand, RefType):
         return pointers.binary(body, expr)
     compares = expr.op in _COMPARE
-    if not compares and is_any(operand, "ANY_DURATION", "ANY_DATE"):
+    if operand in _TIMES and not compares:
         return _time(body, expr, operand)
     if expr.op == "**":
         return _power(body, expr, operand)

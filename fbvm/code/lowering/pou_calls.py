@@ -6,7 +6,7 @@ is not run, outputs keep their values, a function's result is the default of its
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 
 from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, StringType, base, followed, machine
@@ -72,10 +72,10 @@ def aggregate(body: BodyContext, call: tree.Call, called: PouCall) -> Place:
 # --- the POU that is called -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Callee:
     """A call of a POU from a body, and where the variables of the POU lie: in its instance, in its frame on the stack, or at
-    fixed places."""
+    fixed places.  It never changes."""
 
     body: BodyContext
     called: PouCall
@@ -96,9 +96,15 @@ class Callee:
         return next((v for v in self.called.pou.parameters(kind) if v.name.upper() == name), None)
 
 
-@contextmanager
-def _callee(body: BodyContext, call: tree.Expr, called: PouCall) -> Iterator[Callee]:
+def _callee(body: BodyContext, call: tree.Expr, called: PouCall) -> AbstractContextManager[Callee]:
     """The POU of a call, with its frame on the stack of frames as long as the `with` statement emits, if it has one there."""
+    if not called.pou.stack_bytes:
+        return nullcontext(Callee(body, called, _instance(body, called), None))
+    return _on_stack(body, call, called)
+
+
+@contextmanager
+def _on_stack(body: BodyContext, call: tree.Expr, called: PouCall) -> Iterator[Callee]:
     with frame_stack.frame(body, called, body.site(call)) as frame:
         yield Callee(body, called, _instance(body, called), frame)
 

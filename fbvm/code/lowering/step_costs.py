@@ -30,6 +30,8 @@ MOVED_BYTE, TEXT_BYTE, READ_BYTE = 1, 2, 8
 literal."""
 
 _LOOPS = tree.For | tree.While | tree.Repeat
+_PLAIN = frozenset((tree.Assign, tree.CallStatement))
+"""Statements without statements inside."""
 
 
 def step_cost(statements: tree.Block) -> int:
@@ -37,6 +39,8 @@ def step_cost(statements: tree.Block) -> int:
     total = 0
     for statement in statements:
         total += 1
+        if type(statement) in _PLAIN:
+            continue
         if isinstance(statement, tree.Try):
             total += step_cost(statement.handler) + step_cost(statement.final or ())
         elif not isinstance(statement, _LOOPS):

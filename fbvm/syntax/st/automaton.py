@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import chain, repeat
 from typing import Any, Protocol
 
@@ -14,6 +15,9 @@ from fbvm.syntax.st.tables import Tables, tables
 
 NESTING_LIMIT = 200
 """Most brackets, blocks and composite types inside one another; recursion over trees relies on it."""
+
+SHALLOW = NESTING_LIMIT // 2
+"""States on the stack up to which one token cannot come near NESTING_LIMIT."""
 
 STACK_LIMIT = 4000
 """Most states on the stack; within NESTING_LIMIT only an endless chain of signs or NOTs needs more."""
@@ -37,14 +41,59 @@ FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
 """Reserved words that are names of functions in front of `(`, as in `AND(a, b)`."""
 
 
-_known: dict[tuple[type, str], tuple[Callable[..., Any] | None, ...]] = {}
+Reduction = tuple[Callable[..., Any] | None, int, tuple[int | None, ...] | None]
+"""What is done for a rule: its method of the builder, its size and its places, as `Rule` has them."""
 
 
-def _actions(kind: type, language: str) -> tuple[Callable[..., Any] | None, ...]:
-    """The method of a class of builders for each rule; looked up once a class, since a short text uses few of the rules."""
+_known: dict[tuple[type, str], tuple[Reduction, ...]] = {}
+
+
+def _reductions(kind: type, language: str) -> tuple[Reduction, ...]:
+    """For each rule what a class of builders does; looked up once a class, since a short text uses few of the rules."""
     if (kind, language) not in _known:
-        _known[kind, language] = tuple(getattr(kind, r.action) if r.action else None for r in tables(language).rules)
+        _known[kind, language] = tuple(
+            (getattr(kind, r.action) if r.action else None, r.size, r.places) for r in tables(language).rules)
     return _known[kind, language]
+
+
+class _Landings(dict[int, tuple[int, int | None]]):
+    """Where reductions lead that one terminal demands: by the state below and the rule the state above, and the action there.
+
+    Behind an operand up to ten rules follow that only hand on their child (a primary is a term is a sum ...).  What they come
+    to depends on the two and the terminal alone, so it is worked out once."""
+
+    def __init__(self, language: str, terminal: str) -> None:
+        super().__init__()
+        self.tables, self.terminal = tables(language), terminal
+        self.width = len(self.tables.rules) + 1
+
+    def __missing__(self, key: int) -> tuple[int, int | None]:
+        rows, rules = self.tables.actions, self.tables.rules
+        below, rule = divmod(key, self.width)
+        state = rows[below][rules[rule].origin]
+        act = rows[state].get(self.terminal)
+        while act is not None and act < 0 and rules[~act].action is None:
+            state = rows[below][rules[~act].origin]
+            act = rows[state].get(self.terminal)
+        self[key] = state, act
+        return state, act
+
+
+class _AllLandings(dict[str, _Landings]):
+    """The landings of a language by terminal."""
+
+    def __init__(self, language: str) -> None:
+        super().__init__()
+        self.language = language
+
+    def __missing__(self, terminal: str) -> _Landings:
+        made = self[terminal] = _Landings(self.language, terminal)
+        return made
+
+
+@cache
+def _landings(language: str) -> _AllLandings:
+    return _AllLandings(language)
 
 
 class ErrorRecovery(Protocol):
@@ -62,7 +111,8 @@ class Automaton:
         self.tables: Tables = tables(language)
         self.rows = self.tables.actions
         self.builder = builder
-        self.actions: Sequence[Callable[..., Any] | None] = _actions(type(builder), language)
+        self.landings = _landings(language)
+        self.reductions = _reductions(type(builder), language)
         self.states: list[int] = [self.tables.start]
         self.values: list[Any] = []
         self.stream = chain(stream, repeat(Token("$END", "", len(text), len(text))))
@@ -79,15 +129,16 @@ class Automaton:
 
     def run(self, recovery: Callable[[Automaton], ErrorRecovery]) -> Any:
         """Feed every token; returns the value of the start symbol.  `recovery` is called at the first error."""
-        ahead, stream, special = self.ahead, self.stream, DIVIDERS | NESTING | {"$END"}
+        ahead, special = self.ahead, DIVIDERS | NESTING | {"$END"}
         while True:
-            token = ahead.pop() if ahead else next(stream)
             try:
-                if token.type not in special:
-                    refused = self.feed(token)
-                elif token.type in DIVIDERS and advance(self.states, token.type) is None:
+                tokens = iter((ahead.pop(),)) if ahead else self.stream
+                token, refused = self.feed_all(tokens, special)
+                if token is None:
+                    continue
+                if refused is None and token.type in DIVIDERS and advance(self.states, token.type) is None:
                     refused = token
-                else:
+                elif refused is None:
                     refused = self.feed(token)
                     if refused is None and self._ended(token, recovery):
                         return self.values[-1]
@@ -95,10 +146,11 @@ class Automaton:
                     self.before = token
                     continue
                 self.settle()
-                tokens = self._recovery(recovery).unexpected(refused)
-            except TooDeep:
-                tokens = self._recovery(recovery).too_deep(token, "operators")
-            ahead.extend(reversed(tokens))
+                repaired = self._recovery(recovery).unexpected(refused)
+            except TooDeep as error:
+                assert error.token is not None
+                repaired = self._recovery(recovery).too_deep(error.token, "operators")
+            ahead.extend(reversed(repaired))
 
     def _recovery(self, recovery: Callable[[Automaton], ErrorRecovery]) -> ErrorRecovery:
         if self.recovery is None:
@@ -125,45 +177,59 @@ class Automaton:
     def feed(self, token: Token) -> Token | None:
         """Take one token: reduce as it demands, then shift it.  Returns None, or the token if it cannot stand here; its
         reductions are not undone then: they would follow in any case."""
-        rows, rules, actions, states, values = self.rows, self.tables.rules, self.actions, self.states, self.values
-        builder, end, kind = self.builder, self.tables.end, token.type
-        while True:
-            act = rows[states[-1]].get(kind)
-            if act is None:
-                if kind == "NAME" or not self.may_be_name(token):
-                    return token
-                if kind == "MISSPELT" and self.misspelt(token):
-                    return token
-                token = Token("NAME", token.text, token.start, token.end)
-                kind = "NAME"
-                continue
-            if act >= 0:
-                states.append(act)
-                values.append(token)
-                return None
-            rule, action = rules[~act], actions[~act]
-            size = rule.size
-            if action is None:
-                del states[-1]
-            elif size == 1 and rule.places is None:
-                values[-1] = action(builder, values[-1])
-                del states[-1]
-            else:
-                at = len(values) - size
-                children = values[at:]
-                del values[at:], states[at + 1:]
-                if rule.places is not None:
-                    children = [None if p is None else children[p] for p in rule.places]
-                values.append(action(builder, *children))
-            row = rows[states[-1]]
-            state = row[rule.origin]
-            act = rows[state].get(kind)
-            while act is not None and act < 0 and actions[~act] is None:
-                state = row[rules[~act].origin]
-                act = rows[state].get(kind)
-            states.append(state)
-            if state == end:
-                return None
+        before = self.before
+        _, refused = self.feed_all(iter((token,)), frozenset())
+        self.before = before
+        return refused
+
+    def feed_all(self, tokens: Iterator[Token], special: frozenset[str]) -> tuple[Token | None, Token | None]:
+        """Take tokens as `feed` does, as long as they can stand here and none is `special`; each is the one `before` then.
+
+        Returns the last one, if any was left, and that again if it cannot stand here; a special one was not taken.
+        TooDeep knows the token.  Most of a parse is spent here, in one call for many tokens."""
+        rows, reductions, states, values, builder = self.tables.actions, self.reductions, self.states, self.values, self.builder
+        landings, end, width, before = self.landings, self.tables.end, len(reductions) + 1, self.before
+        token = before
+        try:
+            for token in tokens:
+                kind = token[0]
+                if kind in special and (kind not in NESTING or len(states) > SHALLOW):
+                    return token, None
+                taken, act = token, rows[states[-1]].get(kind)
+                while act is None or act < 0:
+                    if act is None:
+                        if kind == "NAME" or not self.may_be_name(taken) or kind == "MISSPELT" and self.misspelt(taken):
+                            return token, taken
+                        taken, kind = Token("NAME", *token[1:]), "NAME"
+                        act = rows[states[-1]].get(kind)
+                        continue
+                    action, size, places = reductions[~act]
+                    if action is None:
+                        del states[-1]
+                    elif size == 1 and places is None:
+                        values[-1] = action(builder, values[-1])
+                        del states[-1]
+                    else:
+                        at = len(values) - size
+                        children = values[at:]
+                        del values[at:], states[at + 1:]
+                        if places is not None:
+                            children = [None if p is None else children[p] for p in places]
+                        values.append(action(builder, *children))
+                    state, act = landings[kind][states[-1] * width + ~act]
+                    states.append(state)
+                    if state == end:
+                        break
+                else:
+                    states.append(act)
+                    values.append(taken)
+                before = token
+        except TooDeep as error:
+            error.token = token
+            raise
+        finally:
+            self.before = before
+        return None, None
 
     def settle(self) -> None:
         """Reduce what is complete whatever follows, so that the recovery finds values for what has been read."""
@@ -176,13 +242,13 @@ class Automaton:
 
     def reduce(self, act: int) -> None:
         """Reduce by one rule; `act` is an action of the tables below 0."""
-        rule, action = self.tables.rules[~act], self.actions[~act]
-        at = len(self.values) - rule.size
+        rule, (action, size, places) = self.tables.rules[~act], self.reductions[~act]
+        at = len(self.values) - size
         children = self.values[at:]
         del self.values[at:]
         del self.states[at + 1:]
-        if rule.places is not None:
-            children = [None if p is None else children[p] for p in rule.places]
+        if places is not None:
+            children = [None if p is None else children[p] for p in places]
         self.values.append(action(self.builder, *children) if action else children[0])
         self.states.append(self.rows[self.states[-1]][rule.origin])
 

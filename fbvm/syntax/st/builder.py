@@ -32,7 +32,9 @@ class Stop(Exception):
 
 
 class TooDeep(Exception):
-    """An expression grew deeper than CHAIN_LIMIT; the driver reports it and goes on behind the statement."""
+    """An expression grew deeper than CHAIN_LIMIT at `token`; the driver reports it and goes on behind the statement."""
+
+    token: Token | None = None
 
 
 class Builder:

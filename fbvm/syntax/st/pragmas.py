@@ -93,7 +93,10 @@ def in_place(source: Source, pragma: Pragma) -> bool:
 
 def shown_in_hexadecimal(text: str, start: int) -> bool:
     """Whether `{attribute 'displaymode' := 'hex'}` stands before the name that begins at `start`, as CODESYS has it."""
-    before = text[max(0, start - _REACH):start]
+    at = max(0, start - _REACH)
+    if text.find("}", at, start) < 0:
+        return False
+    before = text[at:start]
     return before.rstrip().endswith("}") and _HEXADECIMAL.search(before) is not None
 
 
