@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from fbvm.base.types import fold
+from fbvm.check.declarations.locations import is_open
 from fbvm.check.declarations.variables import check_qualifiers, initialized, make_variable, type_of
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.dependencies import Dependencies, Key
-from fbvm.check.symbols.facts import GLOBAL_SLOT, is_open
+from fbvm.check.symbols.facts import GLOBAL_SLOT
 from fbvm.check.symbols.symbol_table import GlobalDeclaration, SymbolTable, list_name
 from fbvm.syntax.st.pragmas import attributes_before, init_slot
 

@@ -26,11 +26,12 @@ from fbvm.base.types import (
 from fbvm.check.declarations import construction, initializers, same_names
 from fbvm.check.declarations.hidden import add_hidden
 from fbvm.check.declarations.inheritance import refuse_abstract, resolve_head
+from fbvm.check.declarations.locations import is_open
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.declarations.variables import check_qualifiers, initialized, is_constant, make_variable, type_of
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Edge, Pou, Variable, is_block, is_open
+from fbvm.check.symbols.facts import Edge, Pou, Variable, is_block
 from fbvm.check.symbols.statement_lists import writes_eno
 from fbvm.check.symbols.symbol_table import Resolved
 from fbvm.syntax import tree

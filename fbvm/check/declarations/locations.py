@@ -9,7 +9,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Variable, holds_block, is_open
+from fbvm.check.symbols.facts import Variable, holds_block
 from fbvm.syntax import tree
 
 _WITHOUT_SIGN = re.compile(r"[IQM][XBWDL]?\d+(?:\.\d+)*", re.IGNORECASE)
@@ -126,3 +126,15 @@ def _fits(context: Context, address: Address, kind: Type, source: Source, node: 
         context.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
         return False
     return True
+
+
+def is_open(location: tree.Location, kind: Type) -> bool:
+    """True for `%I*`, which VAR_CONFIG completes, and for addresses of several levels, which mean a module to its maker."""
+    written = location.text.strip()
+    return written.endswith("*") or _LEVELS.fullmatch(written) is not None or \
+        base(kind) != BOOL and _WORD_LEVELS.fullmatch(written) is not None
+
+
+_LEVELS = re.compile(r"%[IQM](?:[BWDL]\d+(?:\.\d+){2,}|X?\d+(?:\.\d+){2,})", re.I)
+_WORD_LEVELS = re.compile(r"%[IQM][BWDL]?\d+\.\d+", re.I)
+"""With a BOOL it is a bit of that byte or word, and without a size a bit; Beremiz has structures of extensions at %I3.0."""

@@ -28,6 +28,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.declarations.construction import INIT_KEY
 from fbvm.check.declarations.initial_bytes import initial_bytes
+from fbvm.check.declarations.locations import is_open
 from fbvm.check.declarations.structures import RELATIVE, Members
 from fbvm.check.expressions.constant_integers import integer
 from fbvm.check.expressions.constants import default
@@ -35,7 +36,7 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols import vendor_names
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.elementary_types import elementary_type
-from fbvm.check.symbols.facts import Pou, is_block, is_open
+from fbvm.check.symbols.facts import Pou, is_block
 from fbvm.check.symbols.refused_forms import report_form
 from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.check.symbols.symbol_table import Resolved, TypeEntry

@@ -16,14 +16,14 @@ from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
 from fbvm.check.declarations.hidden import own_name
 from fbvm.check.declarations.initial_bytes import initial_bytes
-from fbvm.check.declarations.locations import completes, example, location_of
+from fbvm.check.declarations.locations import completes, example, is_open, location_of
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.expressions.constant_integers import integer
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.config_facts import AccessPath, Completed, Spot
 from fbvm.check.symbols.containment import Containment
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import Variable, is_open
+from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
 
 _WIDTHS: dict[int, Type] = {1: BOOL, 8: BYTE, 32: DWORD, 64: LWORD}

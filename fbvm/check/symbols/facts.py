@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeGuard, get_args
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import BOOL, ArrayType, Elementary, Field, RefType, StructType, Type, base, fold
+from fbvm.base.types import ArrayType, Elementary, Field, RefType, StructType, Type, fold
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
@@ -435,18 +434,6 @@ class Facts:
 def is_block(kind: Type) -> bool:
     """True for the type of a function block's or program's instances."""
     return isinstance(kind, StructType) and kind.block
-
-
-def is_open(location: tree.Location, kind: Type) -> bool:
-    """True for `%I*`, which VAR_CONFIG completes, and for addresses of several levels, which mean a module to its maker."""
-    written = location.text.strip()
-    return written.endswith("*") or _LEVELS.fullmatch(written) is not None or \
-        base(kind) != BOOL and _WORD_LEVELS.fullmatch(written) is not None
-
-
-_LEVELS = re.compile(r"%[IQM](?:[BWDL]\d+(?:\.\d+){2,}|X?\d+(?:\.\d+){2,})", re.I)
-_WORD_LEVELS = re.compile(r"%[IQM][BWDL]?\d+\.\d+", re.I)
-"""With a BOOL it is a bit of that byte or word, and without a size a bit; Beremiz has structures of extensions at %I3.0."""
 
 
 def holds_block(kind: Type) -> bool:
