@@ -331,7 +331,6 @@ def _attempt(x: Execution, state: State, pou: int, address: Address | None, numb
         x.base, x.site, x.callers, x.calls = outer
     finally:
         x.attempts.pop()
-    x.stored = None
     attempt.join(state, number, end)
 
 
