@@ -194,8 +194,10 @@ async def prepare_calls(server: Server, params: types.CallHierarchyPrepareParams
 def _item(server: Server, program: Program, key: Key) -> types.CallHierarchyItem | None:
     declared = find(program.checked.checker, key) if program.checked is not None else None
     place = declared_location(server, program, declared) if declared is not None else None
-    if declared is None or declared.pou is None or place is None:
+    if place is None:
         return None
+    assert declared is not None
+    assert declared.pou is not None
     return types.CallHierarchyItem(declared.name, _KINDS[declared.pou.kind], place.uri, place.range, place.range,
                                    detail=declared.pou.kind, data=list(key))
 

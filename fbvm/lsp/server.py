@@ -103,6 +103,9 @@ class Server(LanguageServer):
         """A file is open no more: what is on disk counts again."""
         path = path_of(uri)
         self.open_paths.pop(path, None)
+        if path.name == FILE:
+            self.project_file_changed(path)
+            return
         for project in self.projects.of(path):
             self.changed(project, path)
         self._forgotten(self.projects.close(self.open_paths))
@@ -123,8 +126,8 @@ class Server(LanguageServer):
     def project_file_changed(self, path: Path | None) -> None:
         """What belongs together may have changed: the programs are begun anew.  None: the settings have changed."""
         self._forgotten(self.projects.forget(path))
-        if path is not None and path in self.projects.wrong:
-            del self.projects.wrong[path]
+        if path in self.projects.wrong:
+            self.projects.wrong[path] = []
         self._open_again()
         if path is not None and path in self.open_paths:
             self.projects.wrong[path] = project_file.diagnostics(path, self.open_text(path))
@@ -144,6 +147,8 @@ class Server(LanguageServer):
             for path in project.paths:
                 if not self.projects.of(path):
                     self._tell(self.uri(path), [])
+            for path in project.libraries_told.difference(*(each.libraries_told for each in self.projects.all)):
+                self._tell(self.uri(path), [])
 
     # --- checks -----------------------------------------------------------------------------------------------------
 
