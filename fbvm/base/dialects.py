@@ -105,6 +105,7 @@ class Dialect:
     jumps_in_text: bool = False
     exceptions: bool = False
     raises_exceptions: bool = False
+    glued_words: bool = False
     assignments_are_values: bool = False
     texts_have_addresses: bool = False
     conditional_returns: bool = False
@@ -264,6 +265,7 @@ QUESTIONS = {
                              "points at the text, which lies in memory as long as the program"),
     "assignments_are_values": ("IF (ready := level > 5) THEN, RETURN(done := TRUE): an assignment in parentheses as a value",
                                "an error (S0101)", "assigns, and has the value of the variable, with a warning (S0193)"),
+    "glued_words": ("FOR i := 9 TO 1 BY -1DO: no blank between a number and the word behind it", "an error (S0105)", "taken"),
     "raises_exceptions": ("F_RaiseException(code)", "an error (S0401)",
                           "stops the program (R0122), or goes on behind __CATCH(code), which gets the code"),
     "functions_have_inputs": ("FUNCTION f : INT without an input", "taken", "taken, with a warning (S0195)"),
@@ -325,7 +327,8 @@ _ROWS = (
             raises_exceptions=True,
             large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
-            libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True),
+            libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True,
+            glued_words=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
@@ -371,8 +374,9 @@ def takers(switch: str, value: bool = True) -> str:
 
 
 def option(rows: Iterable[Dialect]) -> str:
-    """The option for one of some dialects, for hints; of those that are not offered nothing is said."""
-    *names, last = (row.name for row in rows if row.offered)
+    """The option for one of some dialects, for hints; those that are not offered are named if there is no other."""
+    found = [*rows]
+    *names, last = [row.name for row in found if row.offered] or [row.name for row in found]
     return f"--dialect {', '.join(names)} or {last}" if names else f"--dialect {last}"
 
 

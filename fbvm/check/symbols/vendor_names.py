@@ -60,7 +60,7 @@ _LIBRARIES = (
      r"(?:BYTE|WORD|DWORD|LWORD)_TO_(?:BIN|OCT|DEC)STR|TIMESTRUCT|LREAL_TO_FMTSTR|DINT_TO_DECSTR|FindAnd(?:Delete|Replace|Split)|"
      r"T_FILETIME|FILETIME_TO_\w+", "TwinCAT's Tc2_Utilities"),
     (r"DCTIME\w*_TO_\w+|T_DCTIME\w*|DCTIMESTRUCT|F_GetCurDc\w+|F_GetActualDcTime\w*", "TwinCAT's Tc2_EtherCAT"),
-    (r"FB_Socket\w+|T_HSOCKET|TCPADS_\w+", "TwinCAT's Tc2_TcpIp"),
+    (r"FB_(?:Socket|Client|Server)\w+|T_HSERVER|TCPADS_\w+|F_CreateServerHnd", "TwinCAT's Tc2_TcpIp"),
     (r"ComBuffer|SerialLine\w+|(?:Send|Receive)(?:String|Byte|Data)(?:255)?|ClearComBuffer|EL6(?:in|out)Data\w+|ComError_t",
      "TwinCAT's Tc2_SerialCom"),
     (r"(?:FB|I|E|F|T|ST)_BA_\w+", "TwinCAT's Tc3_BA2"),

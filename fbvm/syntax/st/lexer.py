@@ -94,6 +94,8 @@ _ORDER = ("NAME", "PART", "COMMENT", "FOREIGN", "SIGN", "NUMBER", "DATE_LITERAL"
 _BEHIND_DURATION = re.compile(
     r"(?i)(L?T(?:IME)?#)([ \t]*)(?:(?<=[ \t])-?[0-9][0-9a-z_.]*|(?<=#)[0-9]+(?:\.[0-9]+[a-z_0-9]*){2,})")
 """A duration of which the pattern of a literal takes only the beginning: with a blank behind `#`, or with two fractions."""
+_GLUED = re.compile(r"(?i)([0-9]+)(DO|THEN|TO|BY|OF)")
+"""A number and the word behind it without a blank between them."""
 _NAMED_BIT = re.compile(r"(?i)(?<=\.)%X(?=[A-Z_])")
 OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
 
@@ -219,6 +221,10 @@ class Lexer:
             elif before == "AT":
                 kind, at = self._special(lex, before, kind, start, at)
                 word = text[start:at]
+            elif kind == "NUMBER" and word[-1] > "9" and (glued := _GLUED.fullmatch(word)):
+                word, at = glued[1], start + glued.end(1)
+                self.forms.append(Form("glued_words", start, start + glued.end(), (
+                    "S0105", f"`{glued[0]}` is no number", f"write a blank between {word} and {glued[2]}")))
             yield new(Token, (kind, word, start, at))
             before = kind
         yield Token("$END", "", length, length)
