@@ -179,3 +179,11 @@ def test_what_belongs_to_what_is_named_for_twincat() -> None:
     assert export_xml([Source("a.st", text)]).text == made.text
     plain = export_xml([Source("a.st", "PROGRAM Main\nVAR a : BOOL; END_VAR\na := TRUE;\nEND_PROGRAM\n")]).text
     assert plain is not None and "objectid" not in plain.lower()
+
+
+def test_a_property_behind_letters_that_have_longer_capitals_is_found() -> None:
+    made = back("FUNCTION_BLOCK A\nVAR n : INT; END_VAR\n// Straße, groß\nn := n + 1;\nPROPERTY P : INT\nGET\nP := n;\nEND_GET\n"
+                "END_PROPERTY\nEND_FUNCTION_BLOCK\nPROGRAM Main\nVAR a : A; r : INT; END_VAR\na(); r := a.P;\nEND_PROGRAM\n")
+    for plc in plcs(made):
+        assert plc.scan() is None
+        assert plc.read("Main.r") == 1

@@ -141,9 +141,9 @@ def _assigned(text: str, node: Node) -> Iterator[Replacement]:
     """S= for R=, and the other way round: a missing or a wrong reset."""
     assert isinstance(node, tree.Assign)
     swapped = {"S=": "R=", "R=": "S="}.get(node.op.upper())
-    at = text.upper().find(node.op.upper(), node.targets[-1].end, node.value.start)
-    if swapped and at >= 0:
-        yield "SRO", at, at + len(node.op), swapped
+    found = re.compile(re.escape(node.op), re.IGNORECASE).search(text, node.targets[-1].end, node.value.start)
+    if swapped and found:
+        yield "SRO", *found.span(), swapped
 
 
 def _literal(text: str, node: Node) -> Iterator[Replacement]:

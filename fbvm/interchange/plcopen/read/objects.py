@@ -25,7 +25,9 @@ from fbvm.syntax.parser import parse
 
 INTERFACE, METHOD, PROPERTY = "Interface", "Method", "Property"
 ACCESSORS = {"GetAccessor": "GET", "SetAccessor": "SET", "Get": "GET", "Set": "SET"}
-_KIND = re.compile(r"(?im)^[ \t]*(FUNCTION_BLOCK|FUNCTION|PROGRAM)\b")
+_KIND = re.compile(r"(?im)^[ \t]*(FUNCTION_BLOCK|FUNCTION|PROGRAM|METHOD)\b")
+_OWN_SECTIONS = ("VAR_STAT", "VAR_INST")
+"""Sections that the format does not have."""
 _WORDS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL", "ABSTRACT", "FINAL", "OVERRIDE")
 
 
@@ -94,21 +96,39 @@ def arguments(element: Element) -> str:
     return f"({', '.join(given)})" if given else ""
 
 
-def left_out(interface: Element | None, lists: Iterable[VarList]) -> tuple[VarList, ...]:
-    """What the declaration of a POU as plain text has beyond its lists, such as variables of types that the format cannot say."""
+def left_out(element: Element, lists: Iterable[VarList]) -> tuple[VarList, ...]:
+    """What the declaration of a POU or a method as plain text has beyond its lists, such as variables of types that the format
+    cannot say, and VAR_INST.  Each variable comes once, though a document may repeat the text."""
     known = {variable.name.upper() for listed in lists for variable in listed.variables}
-    texts = (data.text.strip() for data in added(interface) if last_word(data) == "interfaceasplaintext")
     found: list[VarList] = []
-    for text in texts:
-        kind = _KIND.search(text)
-        source = Source("", f"{text}\nEND_{kind[1].upper() if kind else ''}\n")
-        for pou in (one for one in parse(source)[0].everything() if isinstance(one, tree.Pou)):
-            for section in pou.sections:
-                missing = tuple(_as_written(source, variable, name) for variable in section.variables for name in variable.names
-                                if name.text.upper() not in known)
-                if missing and section.kind in SECTIONS.values():
-                    found.append(VarList(section.kind, tuple(word.text.upper() for word in section.qualifiers), missing))
+    for source in _declarations(element):
+        for section in _sections(source):
+            missing = tuple(_as_written(source, variable, name) for variable in section.variables for name in variable.names
+                            if name.text.upper() not in known)
+            if missing and section.kind in (*SECTIONS.values(), *_OWN_SECTIONS):
+                found.append(VarList(section.kind, tuple(word.text.upper() for word in section.qualifiers), missing))
+                known.update(variable.name.upper() for variable in missing)
     return tuple(found)
+
+
+def _declarations(element: Element) -> Iterator[Source]:
+    """The declaration of a POU or a method as plain text, as something that can be read: CODESYS keeps it at the interface or at
+    one of its lists, TwinCAT at the POU, both at a method."""
+    interface = element.one("interface")
+    holders = [element, interface, *(interface.children if interface is not None else ())]
+    texts = [part.text.strip() for part in element.all("InterfaceAsPlainText")]
+    texts += [data.text.strip() for holder in holders for data in added(holder) if last_word(data) == "interfaceasplaintext"]
+    for text in dict.fromkeys(texts):
+        if kind := _KIND.search(text):
+            text = f"{text}\nEND_{kind[1].upper()}\n"
+            yield Source("", f"FUNCTION_BLOCK Owner\n{text}END_FUNCTION_BLOCK\n" if kind[1].upper() == "METHOD" else text)
+
+
+def _sections(source: Source) -> Iterator[tree.VarSection]:
+    for pou in parse(source)[0].everything():
+        if isinstance(pou, tree.Pou):
+            yield from pou.sections
+            yield from (section for method in pou.methods for section in method.sections)
 
 
 def _as_written(source: Source, declared: tree.VarDecl, name: tree.Name) -> Variable:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.document import (
@@ -148,11 +149,7 @@ def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
         return
     reading.where = name
     interface = element.one("interface")
-    lists = _lists(reading, interface)
-    if more := left_out(interface, lists):
-        names = ", ".join(variable.name for listed in more for variable in listed.variables)
-        reading.report("X0292", element, f"{names}: only the plain text of the declaration has this, and it is taken from there")
-        lists += more
+    lists = _lists(reading, element)
     returned = interface.one("returnType") if interface else None
     result = type_text(reading, returned, element) if returned and kind == "FUNCTION" else ""
     bodies = element.all("body")
@@ -166,13 +163,19 @@ def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
     reading.where = ""
 
 
-def _lists(reading: Reading, interface: Element | None) -> tuple[VarList, ...]:
-    """The sections of variables of a POU or a method."""
+def _lists(reading: Reading, element: Element) -> tuple[VarList, ...]:
+    """The sections of variables of a POU or a method.  What the format calls global in a POU is VAR_STAT (CODESYS, TwinCAT)."""
+    interface = element.one("interface")
     parts = interface.children if interface else []
     for part in parts:
         if part.name == "accessVars" and part.all("variable"):
             reading.report("X0203", part, "access variables are not taken over")
-    return tuple(made for part in parts if part.name in SECTIONS for made in _var_list(reading, part))
+    lists = tuple(replace(made, kind="VAR_STAT") if made.kind == "VAR_GLOBAL" else made
+                  for part in parts if part.name in SECTIONS for made in _var_list(reading, part))
+    if more := left_out(element, lists):
+        names = ", ".join(variable.name for listed in more for variable in listed.variables)
+        reading.report("X0292", element, f"{names}: only the plain text of the declaration has this, and it is taken from there")
+    return lists + more
 
 
 def _members(reading: Reading, element: Element) -> tuple[Pou, ...]:
@@ -195,7 +198,7 @@ def _routine(reading: Reading, kind: str, name: str, result: str, element: Eleme
     """A method, or an accessor of a property."""
     body = element.one("body")
     interface = element.one("interface")
-    return Pou(kind, name, result, _lists(reading, interface), _body(reading, body) if body else None, (), (),
+    return Pou(kind, name, result, _lists(reading, element), _body(reading, body) if body else None, (), (),
                note(element) or (note(interface) if interface else ""), element, head(element))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -18,6 +19,7 @@ STEP_WIDTH, STEP_HEIGHT, ACTION_WIDTH, ACTION_HEIGHT = 80, 30, 140, 20
 
 Body = Callable[[tree.Block, int, int], Element]
 """Makes the element of a body, given the start and end of its text."""
+_END = re.compile(r"(?i)END_TRANSITION")
 
 
 @dataclass
@@ -138,8 +140,8 @@ class ChartWriter:
         if not body:
             raise NotExportable(transition, f"the transition {transition.name.text} has no condition that can be exported", "")
         start, end = body[0].start, transition.end
-        text_end = self.types.source.text.upper().rfind("END_TRANSITION", start, end)
-        self.named.append(element("transition", element("body", self.body(body, start, text_end if text_end > 0 else end)),
+        ends = [found.start() for found in _END.finditer(self.types.source.text, start, end)]
+        self.named.append(element("transition", element("body", self.body(body, start, ends[-1] if ends else end)),
                                   name=transition.name.text))
         return element("condition", element("reference", name=transition.name.text))
 

@@ -21,6 +21,7 @@ ACCESSORS = {"GET": "GetAccessor", "SET": "SetAccessor"}
 HINT = "put what other tools are to read into function blocks and functions without objects"
 END = re.compile(r"(?i)END_(?:FUNCTION_?BLOCK|FUNCTION|PROGRAM|ACTION|METHOD|GET|SET|PROPERTY)\s*$")
 _HALF = re.compile(r"(?i)\bPROPERTY_(?:GET|SET)\s+(?:\w+\s+)*$")
+_PROPERTY = re.compile(r"(?i)\bPROPERTY")
 _END_PROPERTY = re.compile(r"(?i)\bEND_PROPERTY\b")
 _IN_FRONT = re.compile(r"(?:\{[^{}]*\}\s*)+(?:TYPE\s+)?\Z", re.IGNORECASE)
 _ATTRIBUTE = re.compile(r"\{\s*attribute\s+'([^']*)'(?:\s*:=\s*'([^']*)')?\s*\}", re.IGNORECASE)
@@ -86,13 +87,19 @@ def spans(types: Types, declared: tree.Pou) -> list[Span]:
     for each in declared.methods:
         start, end = each.start, each.end
         if each.kind in ACCESSORS:
-            start = text.upper().rindex("PROPERTY", 0, each.name.start)
+            start = _property_start(text, each)
             if not _END_PROPERTY.search(text, max(0, end - len("END_PROPERTY")), end):
                 closing = _END_PROPERTY.search(text, end)
                 end = closing.end() if closing else end
         front = _IN_FRONT.search(text, max(0, start - _LONGEST), start)
         found.append((front.start() if front else start, end))
     return sorted(set(found))
+
+
+def _property_start(text: str, accessor: tree.Pou) -> int:
+    """Where the word PROPERTY in front of the name of an accessor stands."""
+    first = max(0, accessor.name.start - _LONGEST)
+    return [found.start() for found in _PROPERTY.finditer(text, first, accessor.name.start)][-1]
 
 
 def interface(types: Types, declared: tree.Pou) -> Element:
@@ -136,8 +143,7 @@ def _property(types: Types, accessors: Sequence[tree.Pou], body: BodyWriter | No
     """The element of a property: the words of its head are those that all its accessors have."""
     first = accessors[0]
     words = [word.text for word in first.modifiers if all(word.text in _words(one) for one in accessors)]
-    start = types.source.text.upper().rindex("PROPERTY", 0, first.name.start)
-    head = added(access(words), attributes(types, start))
+    head = added(access(words), attributes(types, _property_start(types.source.text, first)))
     parts = []
     for one in accessors:
         own = added(access([word for word in _words(one) if word not in words]))

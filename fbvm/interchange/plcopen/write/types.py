@@ -217,6 +217,9 @@ class Types:
     def section(self, section: tree.VarSection, name: str = "") -> Element:
         """The element of a section.  Raises NotExportable."""
         kind = LISTS.get(section.kind)
+        if section.kind == "VAR_STAT":
+            kind = LISTS["VAR_GLOBAL"]
+            self.foreign.append((section, f"VAR_STAT is written as CODESYS and TwinCAT have it; {OTHERS}"))
         if kind is None:
             raise NotExportable(section, f"the format has no {section.kind}", "")
         marks = {}
