@@ -174,10 +174,11 @@ def _run_live(image: Image, cycle_ns: int, banks: Sequence[str], *, files: tuple
         return plc, network.close
 
     def bound(plc: Plc) -> Running:
-        ends = {name: options[name] for name in ("scans", "for_ns", "until", "max_ns") if options[name] is not None}
+        ends = {"scans": ENDLESS} | {name: options[name] for name in ("scans", "for_ns", "until", "max_ns")
+                                     if options[name] is not None}  # fmt: skip
         try:
             set_breakpoints(plc, options["lines"], options["watched"], options["conditions"])
-            return Running(plc, **(ends or {"scans": ENDLESS}), writes=[_write(plc, given) for given in options["settings"]])
+            return Running(plc, **ends, writes=[_write(plc, given) for given in options["settings"]])
         except (LookupError, TypeError, ValueError) as error:
             raise click.UsageError(str(error)) from None
 
@@ -202,7 +203,6 @@ def _run(
     """Runs to the end.  Raises UsageError for names, values and conditions that do not fit the program."""
     for warning in plc.warnings:
         say(warning, fg="yellow", err=True)
-    bounded = scans is not None or for_ns is not None or until is not None
     try:
         writes = [_write(plc, given) for given in settings]
         places = {text: plc.find(text) for text in shown}
@@ -217,8 +217,8 @@ def _run(
                 if capture:  # of a quiet network a buffer would take minutes to fill
                     capture.flush()
 
-            running = Running(plc, scans=scans if bounded else ENDLESS, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes,
-                              pace=pace)  # fmt: skip
+            most = ENDLESS if scans is None else scans
+            running = Running(plc, scans=most, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace)
             _execute(running, debug_port, files, libraries, progress)
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None

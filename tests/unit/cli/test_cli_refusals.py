@@ -20,7 +20,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.cli.main import main
 from fbvm.cli.programs import export, fmt, prove, prove_tests
 from fbvm.cli.running import project_run, run
-from fbvm.cli.shared import journals, prompt, run_recording, traces
+from fbvm.cli.shared import drawings, journals, prompt, run_recording, traces
 from fbvm.cli.shared.debug import launch
 from fbvm.cli.shared.options import check_live_installed, time_ns
 from fbvm.cli.shared.paths import SourcePath
@@ -358,3 +358,31 @@ def test_warnings_of_a_program_that_runs_are_shown(folder: Path, monkeypatch: py
                         lambda *_, **__: SimpleNamespace(image="image", diagnostics=[warned], errors=[]))
     with click.Context(click.Command("run")):
         assert sources.compile_or_exit((Path("counter.st"),), None, (), runnable=True) == cast(Any, "image")
+
+
+def test_comments_of_operands_are_those_of_their_declarations() -> None:
+    def declared(comment: str) -> Any:
+        return SimpleNamespace(comment=comment)
+
+    own = SimpleNamespace(declared={"start": declared("the green button"), "both": declared("own"), "bare": declared("")})
+    known = cast(Any, SimpleNamespace(
+        blocks={"other": SimpleNamespace(declared={"lamp": declared("of another block")})}, programs={"main": own},
+        symbols={"lamp": (None, declared("on the panel")), "both": (None, declared("global"))}, addresses={"W9.00": "spare"}))
+    addresses = {"Start": "W0.00", "Lamp": "W1.00", "W1.00": "Lamp", "Both": "D5"}
+    operands = ("Start", "Bare", "Lamp", "W1.00", "W9.00", "W7.00", "IN:=Both", "Q=>Start", "5")
+    rung = cast(Any, SimpleNamespace(steps=[(0, "", "LD", (each,)) for each in operands]))
+    shown = drawings.comment_lines(rung, "Main", lambda name: addresses.get(name, ""), known)
+    assert shown == ["  Start  W0.00  the green button", "  Lamp   W1.00  on the panel", "  W9.00         spare",
+                     "  Both   D5     own"]
+    assert drawings.comment_lines(rung, "Nobody", lambda name: "", cast(Any, SimpleNamespace(
+        blocks={}, programs={}, symbols={}, addresses={}))) == []
+
+
+@pytest.mark.slow
+def test_sources_with_errors_are_not_compared(folder: Path) -> None:
+    Path("broken.st").write_text("PROGRAM Main\nLADDER\nLD (\nEND_LADDER\n", encoding="utf-8")
+    for pair in (("broken.st", "counter.st"), ("counter.st", "broken.st")):
+        result = fbvm("diff", *pair)
+        assert result.exit_code == 3 and "broken.st" in result.stderr, result.output
+    same = fbvm("diff", "counter.st", "counter.st")
+    assert (same.exit_code, same.output) == (0, "")
