@@ -24,12 +24,12 @@ def memory() -> Memory:
 @pytest.mark.slow
 def test_there_and_back(tmp_path: Path) -> None:
     path, one, other = tmp_path / "image.json", memory(), memory()
-    places = [("CIO", 0), ("CIO", 1499), ("CIO", 6143), ("W", 511), ("H", 7), ("D", 0), ("D", 32767)]
+    places = [("H", 8), ("CIO", 0), ("CIO", 1499), ("CIO", 6143), ("W", 511), ("H", 7), ("D", 0), ("D", 32767)]
     for number, (area, word) in enumerate(places):
-        one.words(area)[word] = 0x8000 + number
+        one.words(area)[word] = 0xFFFF - number
     memory_images.save(one, path, ALL)
     memory_images.load(other, path)
-    assert [other.words(area)[word] for area, word in places] == [0x8000 + number for number in range(len(places))]
+    assert [other.words(area)[word] for area, word in places] == [0xFFFF - number for number in range(len(places))]
     assert other.words("D")[1:32767].tolist() == 32766 * [0]
 
 
@@ -90,3 +90,10 @@ def test_what_is_no_image(name: str, tmp_path: Path) -> None:
     with pytest.raises(memory_images.ImageError, match=said):
         memory_images.load(one, path)
     assert one.words("D")[0] == 0, "nothing has been written"
+
+
+def test_the_largest_image_and_words_of_units_that_are_not_set(tmp_path: Path) -> None:
+    path, one = tmp_path / "image.json", memory()
+    path.write_text(json.dumps({"spaces": {"W": 512 * [65535], "CIO": 1499 * [0] + [3, 4, 0, 5]}}))
+    assert memory_images.load(one, path) == {"CIO": [1500, 1502]}
+    assert one.words("W").tolist() == 512 * [65535] and one.words("CIO")[1499] == 3
