@@ -45,7 +45,7 @@ class BlockHead(NamedTuple):
     scans: int
 
 
-def write_block(file: BinaryIO, kind: int, payload: bytes, plc: int = 0, first: int = 0, scans: int = 0) -> int:
+def write_block(file: BinaryIO, kind: int, payload: bytes, plc: int, first: int, scans: int) -> int:
     """Writes a block and flushes the file; returns the size of the block in bytes."""
     packed = zlib.compress(payload, LEVEL)
     file.write(_HEAD.pack(kind, len(packed), _checksum(packed, kind, plc, first, scans), plc, first, scans) + packed)

@@ -404,7 +404,7 @@ def test_blocks_that_are_much_larger_when_unpacked(monkeypatch: pytest.MonkeyPat
 def test_blocks_that_are_nested_deeply(payload: bytes) -> None:
     file = io.BytesIO()
     file.write(MAGIC)
-    container.write_block(file, container.START, payload)
+    container.write_block(file, container.START, payload, 0, 0, 0)
     assert damaged(file.getvalue()).startswith("the recording's beginning is damaged")
     whole = written(COUNTER, 5, nothing)
     rows = blocks(whole)
@@ -427,3 +427,21 @@ def test_the_memory_of_a_replay_is_that_of_the_run() -> None:
         plc.scan()
     made.close()
     assert contents(opened(file.getvalue())["pump"].at(60)) == contents(plc)
+
+
+def test_only_blocks_of_scans_name_scans() -> None:
+    found = [(head.kind, head.plc, head.first, head.scans) for head, _ in blocks(written(COUNTER, 5, nothing))]
+    assert found == [(container.START, 0, 0, 0), (container.PLC, 0, 0, 0), (container.KEYFRAME, 0, 0, 0),
+                     (container.SCANS, 0, 0, 5), (container.END, 0, 0, 0)]  # fmt: skip
+
+
+def test_a_plc_of_the_past_goes_on_without_the_units_that_it_had() -> None:
+    plc = Plc(image(COUNTER))
+    plc.attach(Etn21(0, "192.168.250.21"), LoopNetwork())
+    made = Recording()
+    made.add("pump", plc)
+    plc.run(scans=5)
+    again = made["pump"].at(3)
+    assert plc.units and not again.units
+    again.run(scans=2)
+    assert again.read("Main.n") == 5
