@@ -91,7 +91,6 @@ def _name_kept(name: str, notation: Notation) -> None:
     """Names the rungs that have no other notation."""
     for line in notation.kept:
         say(f"{named(name)}:{line}: this rung cannot be written as {notation.form.value}", err=True)
-    notation.kept.clear()
 
 
 def _left_alone(name: str, why: str) -> None:

@@ -279,3 +279,19 @@ def test_tests_travel_with_their_project(counter: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr("fbvm.campaign.project_copies.pack_project", large)
     with pytest.raises(click.UsageError, match="the project has 2 GB"):
         runs_of_tests.travelling(bench)
+
+
+@each_of("where, options, said", [
+    (Path("runs.toml"), {}, "runs.toml: x is no name"), (Path("runs.toml"), {"never": ("x",)}, "x is no name"),
+    (Path("runs.toml"), {"until": "x"}, "x is no name"), (None, {}, "x is no name"), (None, {"varied": ("x=1",)}, "x is no name"),
+])
+def test_what_a_file_says_wrongly_is_told_with_its_name(where: Path | None, options: dict[str, Any], said: str) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError("x is no name")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(planned_runs, "written_plan", lambda files, options: (SimpleNamespace(about={"sources": ("a.st",)}), where))
+        patch.setattr("fbvm.campaign.planning.program_project", fails)
+        with pytest.raises(click.UsageError) as refused:
+            planned_runs.planned((), None, (), options, cast(Any, None))
+    assert refused.value.message == said

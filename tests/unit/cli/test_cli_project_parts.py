@@ -278,3 +278,16 @@ def test_what_runs_without_end_is_bounded_by_nothing() -> None:
     plc = Plc(cast(Any, _image()))
     run = learn._endless(Running(plc, scans=3))
     assert run.plc is plc and run.scans_left == ENDLESS
+
+
+@pytest.mark.slow
+def test_a_fleet_that_its_network_cannot_have_is_refused(counter: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = FLEET.format(net="loop", more=', for = "1s"') + (
+        '[[plc.one.unit]]\naddress = "10.0.0.2"\n[[door]]\naddress = "10.0.0.2:502"\nbind = "127.0.0.1:0"\n'
+        '[[fault]]\nerror = "ETIMEDOUT"\npeer = "10.0.0.2:502"\n')
+    Path("fbvm.toml").write_text(text, encoding="utf-8")
+    with click.Context(fleet.command):
+        assert fleet._project(None, {"net": None, "for_ns": None})[0].net == "loop"
+        with pytest.raises(SystemExit) as ended:
+            fleet._project(None, {"net": "tcp", "for_ns": None})
+    assert ended.value.code == 3 and "cannot be given ETIMEDOUT with real connections" in capsys.readouterr().err
