@@ -38,6 +38,8 @@ class Serving:
 
     def __init__(self, plc: Plc, start: str = "", served: tuple[str, bool] = ("", True), saved: bool = True) -> None:
         self.plc, self.calls = plc, list[Any]()
+        self.runtime: object = None
+        """The unit of a runtime of OpenPLC that the program brings."""
         self.network = SimpleNamespace(close=lambda: self.calls.append("closed"), tap=None)
         self._start, self._served, self._saved = start, served, saved
 
@@ -57,12 +59,13 @@ class Serving:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(serve.Signals, "installed", lambda signals: nullcontext())
             patch.setattr(serve, "_shipped", lambda settings: note(("settings", settings)) or self.plc)
-            patch.setattr(serve, "_own", lambda files, program, libraries, allowed:
-                          note(("own", files, set(allowed))) or self.plc)  # fmt: skip
+            patch.setattr(serve, "_own", lambda files, program, libraries, allowed, settings:
+                          note(("own", files, set(allowed), settings)) or (self.plc, self.runtime))  # fmt: skip
             patch.setattr(serve, "_load", lambda plc, image: note(("load", image)))
             patch.setattr(serve, "_network", lambda *given: note(("network", *given)) or self.network)
             patch.setattr(serve, "usual_units", lambda names, fins: note(("units", fins)) or [unit])
-            patch.setattr(Plc, "attach", lambda plc, one, network: note(("attach", one is unit, network is self.network)))
+            patch.setattr(Plc, "attach", lambda plc, one, network: note(
+                ("attach", "runtime" if one is self.runtime else one is unit, network is self.network)))
             patch.setattr(serve, "try_fins", lambda network, door: note(("fins", network is self.network, door)))
             patch.setattr(serve, "_start", start)
             patch.setattr(serve, "_serve", served)
@@ -94,13 +97,14 @@ def test_a_program_of_ones_own_with_fins_an_image_a_log_and_a_debugger(plc: Plc,
     file, log = tmp_path / "a.st", tmp_path / "log.txt"
     file.write_text("PROGRAM Main END_PROGRAM", encoding="utf-8")
     serving = Serving(plc)
+    serving.runtime = object()
     result = serving(str(file), "--fins", "--fins-node", "9", "--image", "memory.json", "--log", str(log), "--debug", "4711",
                      "--trace", "t", "--verify")
     assert (result.exit_code, result.output) == (0, "")
     door = FinsDoor(Peer("127.0.0.1", 9600), 9, "full")
     assert serving.calls == [
-        ("own", (file,), {"read_only"}), ("load", Path("memory.json")), ("network", "127.0.0.1", 1502, True, door),
-        ("units", door.unit), ("attach", True, True), ("fins", True, door),
+        ("own", (file,), {"read_only"}, USUAL), ("load", Path("memory.json")), ("network", "127.0.0.1", 1502, True, door),
+        ("units", door.unit), ("attach", True, True), ("attach", "runtime", True), ("fins", True, door),
         ("record", {"trace": Path("t"), "journal": None, "verify": True}), ("start", True, True, door),
         ("serve", "", "port 4711", Path("memory.json"), True), "closed"]
     assert serving.network.tap is not None and len(plc.watchers) == 1 and log.exists()
