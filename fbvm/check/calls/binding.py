@@ -54,14 +54,14 @@ def _leave_out(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall, given: d
                     f"pass a variable: {missing[0].name} := ...")
 
 
-def bind_inputs(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
-    """Match the arguments of a call of an ACTION with the inputs of its POU `pou`; report those that do not fit."""
+def bind_of_action(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
+    """Match the arguments of a call of an ACTION with the parameters of its POU `pou`; report those that do not fit."""
     given: dict[str, tree.Node] = {}
-    inputs = {fold(variable.name) for variable in pou.parameters("VAR_INPUT")}
+    known = {fold(variable.name) for kind in PARAMETER_KINDS for variable in pou.parameters(kind)}
     for argument in call.arguments:
-        if argument.name is None or fold(argument.name.text) not in inputs:
-            hint = scope.project.choices(argument.name.text, inputs) if argument.name is not None else "write input := value"
-            scope.error("S0402", argument, f"an ACTION of {pou.name} takes inputs of {pou.name}, by name", hint)
+        if argument.name is None or fold(argument.name.text) not in known:
+            hint = scope.project.choices(argument.name.text, known) if argument.name is not None else "write input := value"
+            scope.error("S0402", argument, f"an ACTION of {pou.name} takes parameters of {pou.name}, by name", hint)
         else:
             _named(scope, argument, pou, bound, given)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, Elementary, EnumType, RefType, StringType, StructType, Type, base, fold
 from fbvm.check.calls import generics, methods, standard
-from fbvm.check.calls.binding import bind, bind_inputs
+from fbvm.check.calls.binding import bind, bind_of_action
 from fbvm.check.expressions import names, objects, qualified
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
@@ -113,7 +113,7 @@ def _bind_action(scope: Scope, call: tree.Call, found: tuple[Pou, tree.Expr | No
     called, instance = found
     bound = PouCall(called, instance, dynamic=objects.may_be_derived(scope, instance))
     if call.arguments and scope.dialect.action_inputs and instance is not None and called.home is not None:
-        bind_inputs(scope, call, called.home, bound)
+        bind_of_action(scope, call, called.home, bound)
     elif call.arguments:
         scope.error("S0402", call.arguments[0], f"the ACTION {called.tree.name.text} has no parameters",
                     "write the inputs of its instance first" +

@@ -34,10 +34,12 @@ def run(body: BodyContext, call: tree.Expr, called: PouCall) -> None:
             _enabled(callee, call, ())
         return
     callee = Callee(body, called, _instance(body, called) or Place(("self", 0, ()), BOOL), None)
-    if called.inputs:
+    if called.inputs or called.in_outs:
         _inputs(callee, body.site(call))
     with frame_stack.frame(body, called, body.site(call)):
         body.emit(dispatch.call(body, called, callee.instance, body.site(call)))
+    _outputs(callee, called.outputs, body.site(call))
+    _forget(callee)
 
 
 def value(body: BodyContext, call: tree.Call, called: PouCall) -> Node:
@@ -187,8 +189,15 @@ def _execute(callee: Callee, site: int, eno: Variable | None) -> None:
         statement = ("if", ((("not", "b", body.slot(called.tasked).load()), (statement,)),), ())
     body.emit(statement)
     _outputs(callee, called.outputs, site)
-    for variable, expr in called.in_outs if called.pou.actions else ():
-        if _may_end(body, expr):  # an ACTION that is called later finds NULL instead of what has ended
+    if called.pou.actions:
+        _forget(callee)
+
+
+def _forget(callee: Callee) -> None:
+    """Have an ACTION that is called later find NULL in place of arguments of in-outs that may have ended by then."""
+    body = callee.body
+    for variable, expr in callee.called.in_outs:
+        if _may_end(body, expr):
             body.emit(("store", "ref", callee.slot(variable).address, ("const", "ref", 0)))
 
 
