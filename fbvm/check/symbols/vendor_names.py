@@ -55,7 +55,7 @@ _LIBRARIES = (
     (r"ADS(?:READ|WRITE|RDWRT|RDSTATE|WRTCTL|LOG)\w*|FB_(?:File|EOF|SimpleAdsLogEvent)\w*|T_AmsNetId\w*|T_AmsPort|"
      r"T_IPv4Addr|TwinCAT_SystemInfoVarList|_AppInfo|_TaskInfo|PlcTaskSystemInfo|PlcAppSystemInfo|GETCURTASKINDEX\w*|"
      r"F_GetSystemTime", "TwinCAT's Tc2_System"),
-    (r"FB_(?:FormatString|LocalSystemTime|GetTimeZone\w*|TzSpecific\w*|HashTable\w*|CTRL_\w+)|NT_\w+|T_Arg|F_"
+    (r"FB_(?:FormatString|LocalSystemTime|GetTimeZone\w*|TzSpecific\w*|LinkedList\w*|CTRL_\w+)|NT_\w+|T_Arg|F_"
      r"(?:SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|BYTE|WORD|DWORD|LWORD|BOOL|REAL|LREAL|STRING)|SYSTEMTIME_TO_\w+|"
      r"(?:BYTE|WORD|DWORD|LWORD)_TO_(?:BIN|OCT|DEC)STR|TIMESTRUCT|LREAL_TO_FMTSTR|DINT_TO_DECSTR|FindAnd(?:Delete|Replace|Split)|"
      r"T_FILETIME|FILETIME_TO_\w+", "TwinCAT's Tc2_Utilities"),
@@ -70,9 +70,7 @@ _LIBRARIES = (
     (r"FB_IotMqtt\w+", "TwinCAT's Tc3_IotBase"),
     (r"(?:FB|E|ST)_IPCDiag\w+", "TwinCAT's Tc3_IPCDiag"),
     (r"ST_(?:Plc)?DriveRef|FB_SoE\w+", "TwinCAT's Tc2_Drive"),
-    (r"FB_CSVMemBuffer\w+|ARG_TO_CSVFIELD|CSVFIELD_TO_ARG|DEFAULT_CSV_FIELD_SEP|F_BIGTYPE|FB_HashTable\w+",
-     "TwinCAT's Tc2_Utilities"),
-    (r"F_CheckMemoryArea|E_TcMemoryArea|F_GetTaskInfo", "TwinCAT's Tc2_System"),
+    (r"F_GetTaskInfo", "TwinCAT's Tc2_System"),
     (r"FB_SQL\w+|FB_PLCDB\w+", "TwinCAT's Tc3_Database"),
     (r"FB_MB(?:Read|Write|Diagnose)\w*", "TwinCAT's Tc2_ModbusSrv"),
     (r"Button|Led|TextCtrl|GetBoolString", "the svgui of older versions of Beremiz"),
