@@ -127,6 +127,33 @@ def test_a_copy_leaves_out_where_instances_begin() -> None:
     assert next(runs(fields["b"])) == (8, fields["b"].fields["T"].offset - 8)
 
 
+FRAMES = """FUNCTION F : INT
+VAR_INPUT a : INT; r : REFERENCE TO INT; END_VAR
+VAR CONSTANT K : INT := 3; END_VAR
+VAR b : ARRAY[1..2] OF DINT; END_VAR
+    F := a + K;
+END_FUNCTION
+FUNCTION_BLOCK B VAR n : INT; END_VAR VAR_TEMP t : LINT; END_VAR t := n; END_FUNCTION_BLOCK
+PROGRAM Main VAR n : INT; b : B; END_VAR VAR_TEMP t : INT; END_VAR
+    n := F(n, n); b(); FOR t := 1 TO 3 DO n := n + t; END_FOR
+END_PROGRAM
+"""
+
+
+def test_variables_of_frames_are_found_by_their_names() -> None:
+    made = image(FRAMES, dialect="codesys")
+    shown = {pou: {name: (field.name, field.type.name, field.kind, field.reference, field.constant, field.absolute)
+                   for name, field in fields.items()} for pou, fields in made.frames.items() if fields}
+    assert {name: row for name, row in shown["F"].items() if name != "F"} == {
+        "A": ("a", "INT", "VAR_INPUT", False, False, True), "R": ("r", "REFERENCE TO INT", "VAR_INPUT", False, False, True),
+        "B": ("b", "ARRAY [1..2] OF DINT", "VAR", False, False, True), **({"K": shown["F"]["K"]} if "K" in shown["F"] else {})}
+    assert shown["B"] == {"T": ("t", "LINT", "VAR_TEMP", False, False, True)}
+    assert shown["MAIN"] == {"T": ("t", "INT", "VAR_TEMP", False, False, True)}
+    places = [(field.offset, field.type.size) for fields in made.frames.values() for field in fields.values()]
+    assert len({offset for offset, _ in places}) == len(places)
+    assert all(field.frame_at == () for fields in made.frames.values() for field in fields.values())
+
+
 PATHS = """{{attribute 'reflection'}}
 FUNCTION_BLOCK B
 VAR
