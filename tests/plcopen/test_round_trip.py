@@ -100,7 +100,7 @@ def round_trips(folder: str, each: int = 1) -> Counter[str]:
     cannot be said."""
     count: Counter[str] = Counter()
     for program in list(programs(ROOT / "tests" / "lang" / folder))[::each]:
-        if not program.runs or program.trap:
+        if not program.runs or program.trap or "__POSITION" in program.text:  # lines and columns are others behind it
             continue
         made = export_xml([Source(program.name, program.text)])
         lawful(made)

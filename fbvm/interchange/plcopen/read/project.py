@@ -317,6 +317,8 @@ def _added(reading: Reading, root: Element) -> None:
         name = element.get("name")
         last = name.rstrip("/").rpartition("/")[2].lower()
         if last in SETTINGS:
+            if reading.producer.family == "fbvm":  # the structure that an export adds for TwinCAT, which is in the elements
+                continue
             reading.count("identities and settings of the tool in addData are not taken over", element)
         elif last not in READ and name not in (LOCATION, MNEMONIC):
             reading.count(f"addData {name} is not taken over", element)
