@@ -120,7 +120,7 @@ def bound_of_dimension(body: BodyContext, called: StandardCall) -> Node:
         return known[int(constant) - 1]
     site = body.site(dimension)
     checked = ("check", "i64", body.as_i64(dimension), 1, len(known), "R0102", site)
-    number = body.to_temporary(checked, always=True)
+    number = body.to_temporary(checked)
     found = known[0]
     for each, bound in enumerate(known[1:], start=2):
         found = ("select", "i64", ("eq", "b", "i64", number, ("const", "i64", each)), found, bound)
