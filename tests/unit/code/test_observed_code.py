@@ -26,8 +26,9 @@ FOR a := 1 TO b DO t := NOT t; END_FOR
 r REF= b; b := r;
 END_PROGRAM
 """
-NAMES = {"self+8": "a", "self+10": "b", "self+10+2*t1": "s[a]", "self+14": "s[2]", "self+16": "p", "self+20": "q", "self+40": "c.i",
-         "self+48": "t"}  # fmt: skip
+NAMES = {"self+8": "a", "self+10": "b", "self+10+2*t1": "s[a]", "self+14": "s[2]", "self+16": "p", "self+20": "q",
+         "self+40": "c.i", "self+48": "t"}  # fmt: skip
+"""The variables of Main by their places."""
 
 
 def told(image: Image, pou: str) -> str:
@@ -43,7 +44,7 @@ def told(image: Image, pou: str) -> str:
             lines.append("nowhere")
         if inside and "observe" in line:
             _, what, *_, place = line[10:].split()
-            lines[-1] += f" {what} {NAMES.get(place, place)}"
+            lines[-1] += f" {what} {NAMES.get(place, place) if pou == 'PROGRAM Main' else place}"
     return "\n".join(lines)
 
 
