@@ -176,12 +176,19 @@ def test_the_script_limits(load: Load, small: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(script.run, "work_ms", lambda folder, *words: 1.0)
     monkeypatch.setattr(script.run, "STARTS", 1)
     many = "logic   cyclic 10,000 345 48.9 10.3 100,005 1.0 0.2 0.4 0"
-    monkeypatch.setattr(script, "subprocess", SimpleNamespace(
-        run=script.subprocess.run, check_output=lambda words, **options: many if "cyclic" in words else "700"))
+
+    def check_output(words: list[str], **options: Any) -> str:
+        if words[-1] == script.IN_ONE_PROCESS:
+            return json.dumps(script.in_one_process())
+        return many if "cyclic" in words else "700"
+
+    monkeypatch.setattr(script, "PROCESSES", 2)
+    monkeypatch.setattr(script, "subprocess", SimpleNamespace(run=script.subprocess.run, check_output=check_output))
     monkeypatch.setattr(sys, "argv", ["limits.py", "starting", "compiling", "many", "programs"])
     script.main()
     said = capsys.readouterr().out
     assert "10,000 PLCs at 100 ms, logic: of a core, missed, each" in said and "10.3 %, 0, 48.9 KiB   <= 25 %, 0, 50 KiB" in said
+    assert "crc: machine code, times C by hand, 2 processes" in said and "1.00 (1.00 to 1.00)   <= 1.4" in said
     assert "from start to first native scan" in said and "crc: python engine, times C by hand" in said
 
 

@@ -309,6 +309,12 @@ def test_a_product_and_a_sum_are_rounded_each(machine: str) -> None:
     assert "mul" in assembly and "fma" not in assembly.lower() and "fmadd" not in assembly.lower()
 
 
+def test_shifts_across_two_registers_are_not_for_processors_of_amd() -> None:
+    assert native_compiler.tuning("znver5") == ",+slow-shld" and native_compiler.tuning("skylake") == ""
+    _, _, processor, features = native_compiler.host()
+    assert features.endswith(native_compiler.tuning(processor))
+
+
 def test_behind_a_body_that_is_inlined_nobody_looks_whether_it_has_ended() -> None:
     """The steps that are left behind a charge are never taken for a point: a task that takes its bodies in has no look."""
     program = compile_text("PROGRAM Main VAR t : TON; q : BOOL; END_VAR t(IN := NOT q, PT := T#1s); q := t.Q; END_PROGRAM").image

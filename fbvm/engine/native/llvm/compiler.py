@@ -21,6 +21,9 @@ FAULTS = {
     "-disable-loop-idiom-hashrecognize": (22,),  # 22.1.0: a CRC loop whose counter is used afterwards has a wrong counter
 }
 """Options that switch off passes of LLVM with known faults, and the first version that knows each option."""
+TUNING = {"znver": ",+slow-shld"}
+"""What LLVM is told of processors whose names begin so, beside their features: AMD's take a shift across two registers apart
+into six operations, which LLVM 22 does not know of the newest; two shifts and an OR are faster."""
 _PYTHON = {"double_to_string": "PyOS_double_to_string", "string_to_double": "PyOS_string_to_double",
            "free": "PyMem_Free"}
 """Functions of the interpreter by which machine code writes and reads floats, so that the texts are those of the Python engine.
@@ -72,8 +75,14 @@ def host() -> tuple[str, str, str, str]:
     import llvmlite
 
     binding = llvm()
-    return (llvmlite.__version__, binding.get_process_triple(), binding.get_host_cpu_name(),
-            binding.get_host_cpu_features().flatten())
+    processor: str = binding.get_host_cpu_name()
+    features = binding.get_host_cpu_features().flatten() + tuning(processor)
+    return llvmlite.__version__, binding.get_process_triple(), processor, features
+
+
+def tuning(processor: str) -> str:
+    """What stands of a processor in `TUNING`, to be appended to its features; "" for most."""
+    return next((more for name, more in TUNING.items() if processor.startswith(name)), "")
 
 
 @cache
