@@ -100,13 +100,15 @@ class Calls:
         context.set_output(Wire(item, "ENO"), eno)
 
     def _next_sinks(self, item: Object) -> list[tuple[Object, Wire]]:
-        """The output variables that a call can write itself: those that directly follow the block in the order of evaluation."""
+        """The output variables that a call can write itself, one for each output: those that directly follow the block in the
+        order of evaluation."""
         objects = self.context.network.objects
-        found = []
+        found: list[tuple[Object, Wire]] = []
         for other in objects[objects.index(item) + 1:]:
             wires = other.inputs[0].wires if other.kind == "outVariable" else []
             if len(wires) == 1 and wires[0].source is item and not (other.negated or other.edge or other.storage):
-                if wires[0].pin.upper() == "ENO" or any(pin.name == wires[0].pin for pin in item.in_outs):
+                if wires[0].pin.upper() == "ENO" or any(pin.name == wires[0].pin for pin in item.in_outs) \
+                        or any(wires[0] == wire for _, wire in found):
                     break
                 found.append((other, wires[0]))
             elif other.kind != "inVariable":
@@ -116,7 +118,7 @@ class Calls:
     def _eno(self, item: Object, arguments: list[str], wanted: bool = False) -> Value | None:
         """A variable for ENO, if ENO is used or `wanted`; added to the arguments of the call."""
         context = self.context
-        if not context.uses[item, "ENO"] and not wanted:
+        if not context.is_used(Wire(item, "ENO")) and not wanted:
             return None
         name = context.scope.new(f"Enabled_{item.id}", "BOOL", context.apart)
         arguments.append(f"ENO => {name}")
@@ -161,7 +163,7 @@ class Calls:
         context = self.context
         result = next((pin for pin in item.outputs if pin.name.upper() != "ENO"), None)
         wire = Wire(item, result.name if result else "")
-        if not context.is_used(wire) and not context.uses[item, "ENO"]:
+        if not context.is_used(wire) and not context.is_used(Wire(item, "ENO")):
             context.warn_unused(item)
             for pin in item.inputs:
                 context.value_at(item, pin)
@@ -214,7 +216,7 @@ class Calls:
         context, scope = self.context, self.context.scope
         if (sink := self._next_sink(item, wire)) is not None:
             context.assign(sink, value, condition)
-        elif context.uses[wire.source, wire.pin]:
+        elif context.is_used(wire):
             eno = scope.new(f"Enabled_{item.id}", "BOOL", context.apart)
             enabled = variable(eno)
             name = self._result(item, wire)
@@ -228,7 +230,7 @@ class Calls:
 
     def _next_sink(self, item: Object, wire: Wire) -> Object | None:
         """The output variable of a result, if it is the only consumer and directly follows in the order of evaluation."""
-        if self.context.uses[item, wire.pin] != 1 or self.context.uses[item, "ENO"]:
+        if self.context.uses[item, wire.pin] != 1 or self.context.is_used(Wire(item, "ENO")) or self.context.is_remembered(wire):
             return None
         return next((sink for sink, found in self._next_sinks(item) if found == wire), None)
 
@@ -256,7 +258,7 @@ class Calls:
             value = Value(f"{item.text}({', '.join(arguments)})", ATOM - 1, self.reads | {SHARED})
             context.set_output(wire, negation(value) if result.negated else value)
             return
-        self._as_statement(item, wire if context.uses[item, wire.pin] else None, condition, arguments, frozenset(writes))
+        self._as_statement(item, wire if context.is_used(wire) else None, condition, arguments, frozenset(writes))
         self._lead_on(item, in_outs)
 
     def _result_pin(self, item: Object) -> Pin | None:
@@ -270,8 +272,8 @@ class Calls:
         executed."""
         context = self.context
         for pin in item.outputs:
-            if pin is not result and pin.name.upper() != "ENO" and context.uses[item, pin.name]:
-                wire = Wire(item, pin.name)
+            wire = Wire(item, pin.name)
+            if pin is not result and pin.name.upper() != "ENO" and context.is_used(wire):
                 name = context.scope.new(f"{pin.name}_{item.id}", context.scope.wire_type(wire) or "BOOL", keeps)
                 arguments.append(f"{pin.name} => {name}")
                 context.set_output(wire, variable(name))
@@ -279,7 +281,7 @@ class Calls:
     def _is_expression(self, item: Object, result: Pin, arguments: list[str]) -> bool:
         """Whether the call of a function can stand where its result is used: once, and nothing else of the call is used."""
         uses = self.context.uses
-        has_outputs = bool(uses[item, "ENO"] or item.in_outs or any("=>" in text for text in arguments))
+        has_outputs = bool(self.context.is_used(Wire(item, "ENO")) or item.in_outs or any("=>" in text for text in arguments))
         return not has_outputs and uses[item, result.name] == 1 and not result.edge
 
     def _as_statement(self, item: Object, wire: Wire | None, condition: Value | None, arguments: list[str],

@@ -75,8 +75,8 @@ class NetworkContext:
         self._clear()
         self.network = network
         self.uses = Counter((wire.source, wire.pin) for item in network.objects for pin in item.pins for wire in pin.wires)
-        for _, wire in network.cut:
-            self.uses[wire.source, wire.pin] -= 1
+        for consumer, wire in network.cut:
+            self.uses[wire.source, wire.pin] -= sum(pin.wires.count(wire) for pin in consumer.pins)
         for consumer, wire in sorted(network.cut, key=lambda cut: (cut[0].place, cut[1].source.place)):
             self._add_memory(consumer, wire)
 
@@ -150,7 +150,11 @@ class NetworkContext:
 
     def is_used(self, wire: Wire) -> bool:
         """Whether something uses an output, in this pass or the next."""
-        return self.uses[wire.source, wire.pin] > 0 or (wire.source, wire.pin) in self.memories
+        return self.uses[wire.source, wire.pin] > 0 or self.is_remembered(wire)
+
+    def is_remembered(self, wire: Wire) -> bool:
+        """Whether the value of an output is kept for the next pass in a variable."""
+        return (wire.source, wire.pin) in self.memories
 
     def set_output(self, wire: Wire, value: Value, keep: bool = False) -> None:
         """Set the value of an output.  With `keep`, a value with several consumers goes to a variable, to be evaluated once."""

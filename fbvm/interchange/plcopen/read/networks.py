@@ -123,7 +123,8 @@ def _generated(free: list[Object], groups: list[list[Object]], scope: Scope, ord
         if len(group) > LARGEST or len(loops) > MOST_LOOPS:
             found.append(_refused(group))
         else:
-            found.append(Network(group, loops, rereads=_rereads(group, known)))
+            through = any(item.kind == "contact" for item, _ in loops)
+            found.append(Network(group, loops, rereads=through or _rereads(group, known)))
     return found
 
 
@@ -237,11 +238,11 @@ def _network(group: list[Object], flat: bool) -> Network:
     cut: set[tuple[Object, Wire]] = set()
     order: list[Object] = []
     done: set[Object] = set()
-    waiting = {item: len(_feeds(item, inside, cut)) for item in group}
-    consumers: dict[Object, list[Object]] = {}
+    waiting = {item: set(_feeds(item, inside, cut)) for item in group}
+    consumers: dict[Object, dict[Object, None]] = {}
     for item in group:
         for wire in _feeds(item, inside, cut):
-            consumers.setdefault(wire.source, []).append(item)
+            consumers.setdefault(wire.source, {})[item] = None
     ready = [(_key(item, flat), at) for at, item in enumerate(group) if not waiting[item]]
     heapq.heapify(ready)
     place = {item: at for at, item in enumerate(group)}
@@ -251,15 +252,16 @@ def _network(group: list[Object], flat: bool) -> Network:
                 return _refused(group)
             item, wire = _back([one for one in group if one not in done], inside, cut, flat)
             cut.add((item, wire))
-            waiting[item] -= 1
+            waiting[item].discard(wire)
             if not waiting[item]:
                 heapq.heappush(ready, (_key(item, flat), place[item]))
         item = group[heapq.heappop(ready)[1]]
         order.append(item)
         done.add(item)
         for consumer in consumers.get(item, ()):
-            waiting[consumer] -= 1
-            if not waiting[consumer] and consumer not in done:
+            left = {wire for wire in waiting[consumer] if wire.source is not item}
+            waiting[consumer], was_waiting = left, bool(waiting[consumer])
+            if was_waiting and not left:
                 heapq.heappush(ready, (_key(consumer, flat), place[consumer]))
     return Network(order, cut)
 

@@ -2,6 +2,7 @@
 
 The generator goes through the sinks of a body, and through its blocks, and writes what each needs in front of it, a block once.
 A block counts as written before its inputs are looked at: so a wire that comes back to it carries the value of the pass before.
+Contacts are part of the expressions that they stand in front of, and are written for each anew.
 A variable that a diagram reads and writes at one place (inOutVariable) is written at its turn; whoever reads it does not wait for
 that.
 
@@ -68,32 +69,55 @@ class _Generation:
         self.done: set[Object] = set()
 
     def add(self, start: Object) -> None:
-        """Add an object behind all that it needs, unless it is there already."""
+        """Add an object behind all blocks that it needs, unless it is there already."""
         if start in self.begun:
             return
         self.begun.add(start)
-        todo = [(start, self._numbered(start), self._wires(start))]
+        todo = [(start, self._blocks(start))]
         while todo:
-            item, waits, wires = todo[-1]
-            wire = next(wires, None)
+            item, blocks = todo[-1]
+            block = next((one for one in blocks if one not in self.begun), None)
+            if block is None:
+                todo.pop()
+                self._finish(item)
+            else:
+                self.begun.add(block)
+                todo.append((block, self._blocks(block)))
+
+    def _blocks(self, item: Object) -> Iterator[Object]:
+        """The blocks that are to be called in front of an object, also those behind contacts, in the order of the wires."""
+        seen: set[Object] = set()
+        todo = [] if self._numbered(item) else self._sources(item)[::-1]
+        while todo:
+            source = todo.pop().source
+            if source.kind == "block":
+                yield source
+            elif source not in seen:
+                seen.add(source)
+                todo += self._sources(source)[::-1]
+
+    def _finish(self, start: Object) -> None:
+        """Add an object behind the contacts and variables in front of it.  These wait for nothing: their wires from blocks
+        that are still to be called are cut."""
+        todo = [(start, iter(self._sources(start)))]
+        while todo:
+            item, wires = todo[-1]
+            wire = next((one for one in wires if one.source not in self.done), None)
             if wire is None:
                 todo.pop()
                 self.done.add(item)
                 self.made.append(item)
-                continue
-            source = wire.source
-            if source not in self.inside or source in self.done or source.kind == "inOutVariable":
-                continue
-            if source in self.begun or (waits and source.kind == "block"):
+            elif wire.source.kind == "block" or any(wire.source is one for one, _ in todo):
                 self.cut.add((item, wire))
-                continue
-            self.begun.add(source)
-            todo.append((source, waits if source.kind == "contact" else self._numbered(source), self._wires(source)))
+            else:
+                self.begun.add(wire.source)
+                todo.append((wire.source, iter(self._sources(wire.source))))
 
     def _numbered(self, item: Object) -> bool:
         """Whether an object reads blocks that are still to come as they are: one of these kinds with an executionOrderId does."""
         return item.kind in self.waiting and item.order > 0
 
-    @staticmethod
-    def _wires(item: Object) -> Iterator[Wire]:
-        return iter([wire for pin in item.pins for wire in pin.wires])
+    def _sources(self, item: Object) -> list[Wire]:
+        """The wires into an object; variables that are read and written at one place are not waited for."""
+        return [wire for pin in item.pins for wire in pin.wires
+                if wire.source in self.inside and wire.source.kind != "inOutVariable"]

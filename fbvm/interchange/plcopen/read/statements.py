@@ -71,7 +71,8 @@ class Statements:
             context.warn(item, f"negated and {item.storage}: Beremiz and OpenPLC Editor assign the inverse in every scan")
             context.write(f"{target} := {value.text};", writes)
         elif item.storage in ("set", "reset"):
-            context.write(when(value, f"{target} := {'TRUE' if item.storage == 'set' else 'FALSE'};"), writes)
+            power = both(guard, value) if guard else value
+            context.write(when(power, f"{target} := {'TRUE' if item.storage == 'set' else 'FALSE'};"), writes)
         elif item.storage:
             raise Unexecutable(item, f"there is no storage {item.storage!r}", "")
         elif guard:
