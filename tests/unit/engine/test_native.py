@@ -36,7 +36,7 @@ from fbvm.engine.native.emit.module import BodyWriter, translate
 from fbvm.engine.native.emit.writer import TRAPPED
 from fbvm.engine.native.llvm import compiler as native_compiler
 from fbvm.engine.native.llvm import entry_points as entries
-from fbvm.engine.native.llvm.worker import worker
+from fbvm.engine.native.llvm.worker import LONGEST_HERE, worker
 from fbvm.engine.native.scans.scans import ScheduledTask
 
 ONE = const("i16", 1)
@@ -173,6 +173,23 @@ def test_the_helper_process_optimises() -> None:
         assert ctypes.CFUNCTYPE(ctypes.c_int32)(linked.address("f"))() == 7
     finally:
         helper.stop()
+
+
+@pytest.mark.slow
+def test_large_modules_have_a_helper_process_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """LLVM's options are those of a process, and some are for large modules only."""
+    monkeypatch.setitem(LONGEST_HERE, 2, 100)
+    helper, small = type(worker)(), b"define i32 @f() { ret i32 7 }"
+    large, used = small + 100 * b"\n", []
+    try:
+        for text in (small, large, large, small):
+            assert ctypes.CFUNCTYPE(ctypes.c_int32)(native_compiler.Linked(helper._answer(text), ["f"]).address("f"))() == 7
+            used.append(helper._process)
+    finally:
+        helper.stop()
+    first, second, third, last = used
+    assert second is third and len({first, second, last}) == 3
+    assert [process.args[-1].endswith("True)") for process in used if process] == [False, True, True, False]  # type: ignore[union-attr]
 
 
 class Job:

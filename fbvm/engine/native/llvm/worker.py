@@ -16,7 +16,7 @@ from typing import IO, Protocol
 from weakref import ref
 
 from fbvm.engine.apart import DEAF, run_apart
-from fbvm.engine.native.llvm.compiler import compile_text
+from fbvm.engine.native.llvm.compiler import compile_text, search_less
 
 _SIZE_BYTES = 8
 LONGEST_HERE = {0: 4 << 20, 1: 1 << 20, 2: 1 << 19}
@@ -29,11 +29,13 @@ def _program(call: str) -> str:
             f"from fbvm.engine.native.llvm import worker\nworker.{call.format('sys.stdin.buffer, sys.stdout.buffer')}")
 
 
-def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
-    """Runs in the helper process: compiles one module after the other until `jobs` ends.
+def serve(jobs: IO[bytes], answers: IO[bytes], large: bool = False) -> None:
+    """Runs in the helper process: compiles one module after the other until `jobs` ends.  All are `large`, or none is.
 
     A job is the size of a text in eight bytes, and the text of a module; an answer the size of an object file, and the object
     file, which is empty if the compilation failed."""
+    if large:
+        search_less()
     while len(head := jobs.read(_SIZE_BYTES)) == _SIZE_BYTES:
         text = jobs.read(int.from_bytes(head, "little")).decode()
         try:
@@ -53,7 +55,8 @@ def compile_apart(text: str, level: int) -> bytes:
 
 
 def serve_one(job: IO[bytes], answer: IO[bytes], level: int) -> None:
-    """Runs in the process of `compile_apart`: compiles one module."""
+    """Runs in the process of `compile_apart`: compiles one large module."""
+    search_less()
     answer.write(compile_text(job.read().decode(), level))
 
 
@@ -77,6 +80,7 @@ class Worker:
         self._lock = threading.Lock()
         self._busy = False
         self._process: subprocess.Popen[bytes] | None = None
+        self._large = False
         self._owner = os.getpid()
 
     def compile(self, job: Job) -> None:
@@ -102,7 +106,7 @@ class Worker:
 
     def _answer(self, text: bytes) -> bytes:
         try:
-            process = self._started()
+            process = self._started(len(text) > LONGEST_HERE[2])
             assert process.stdin and process.stdout
             process.stdin.write(len(text).to_bytes(_SIZE_BYTES, "little") + text)
             process.stdin.flush()
@@ -111,10 +115,14 @@ class Worker:
         except (OSError, ValueError):
             return b""
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _started(self, large: bool = False) -> subprocess.Popen[bytes]:
+        """The helper process for large modules, or the one for others: options of LLVM are those of a whole process."""
+        if large is not self._large:
+            self.stop()
+            self._large = large
         process = self._process  # which `stop` may take away meanwhile
         if process is None or process.poll() is not None or self._owner != os.getpid():
-            command = [sys.executable, "-c", DEAF + _program("serve({})")]
+            command = [sys.executable, "-c", DEAF + _program(f"serve({{}}, {large})")]
             process = self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                                        stderr=subprocess.DEVNULL)
             self._owner = os.getpid()
