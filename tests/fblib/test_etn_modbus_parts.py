@@ -36,7 +36,8 @@ def test_a_request_puts_the_other_switches_of_its_area_out_and_a_close_leaves_th
     socket: int, switch: int, before: list[int], after: list[int]
 ) -> None:
     made = plc()
-    made.memory.words("CIO")[1519:1523] = memoryview(bytes(word >> 8 * half & 0xFF for word in before for half in (0, 1))).cast("H")
+    for number, word in enumerate(before, 1519):
+        made.memory.words("CIO")[number] = word
     area = 30018 + 10 * (socket - 1)
     for number in range(30008, 30108):
         made.write(f"D{number}", number % 7 + 1)
