@@ -108,3 +108,22 @@ def test_a_change_within_the_folder_of_a_container_begins_its_program_anew(
     gone = projects.forget_container((folder / changed).resolve())
     wanted = forgotten if changed != "main.st" else ["main.st Pump.st", "line3.cxt"]
     assert (named(gone), named(projects.all)) == (wanted, [name for name in before if name not in wanted])
+
+
+@each_of(("changed", "forgotten"), [
+    ("Drives/FB_Motor.TcPOU", True), ("Drives/FB_Engine.TcPOU", False), ("../main.st", False), ("Drives/FB_Motor.txt", False)])
+def test_a_program_that_consists_of_other_files_now_is_begun_anew(tmp_path: Path, changed: str, forgotten: bool) -> None:
+    """An object of a project of TwinCAT that a project file names is none of the files that it names itself."""
+    folder = tmp_path / "plant"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(HOUSE / "examples" / "twincat", folder)
+    (folder / "fbvm.toml").write_text('[plc.a]\nsources = ["Conveyor.plcproj"]\n', encoding="utf-8")
+    projects = opened(folder, "FB_Conveyor.TcPOU")
+    [made] = projects.all
+    path = (folder / changed).resolve()
+    assert projects.forget_regrouped(path) == [] and projects.all == [made], "nothing has changed yet"
+    if path.exists():
+        path.unlink()
+    else:
+        path.write_text("", encoding="utf-8")
+    assert (projects.forget_regrouped(path) == [made]) is forgotten and (projects.all == []) is forgotten
