@@ -178,7 +178,7 @@ def _loop(x: Execution, state: State, head: Block, body: Block, tail: Block) -> 
             x.trap(following, x.terms.true, UNWOUND, site)
             break
         x.step()
-        at = following.child(following.path) if ends or returned else following
+        at = following  # one of its own if a path has left
         count += 1
         if count >= FIRST_COMPARED and count & count - 1 == 0:
             seen = at.held()
