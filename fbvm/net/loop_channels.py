@@ -107,7 +107,7 @@ class WiredConnection(Channel):
         if end.fin_arrived and not end.inbox and not self._fin_told:
             self._fin_told = True
             told.append(PeerClosed(self.channel))
-        if end.error and not self._break_told:
+        if end.error:
             self._break_told = True
             end.inbox.clear()
             told.append(Broken(self.channel, end.error))
