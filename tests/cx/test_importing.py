@@ -13,7 +13,7 @@ from fbvm import Plc
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.cx.compression import compress
-from fbvm.interchange.cx.markup import CxText, is_project, read_markup
+from fbvm.interchange.cx.markup import CxText, _fields, is_project, read_markup
 from fbvm.interchange.cx.read.importing import import_project
 from fbvm.interchange.cx.read.memory import initial_values
 from fbvm.interchange.cx.write.exporting import export_into
@@ -106,6 +106,14 @@ def test_no_damage_raises() -> None:
             hurt[seeded.randrange(len(hurt))] = seeded.randrange(256)
         made = import_project(bytes(hurt[: seeded.randrange(len(hurt))] if seeded.random() < 0.3 else hurt), "line.cxt")
         assert made.files or made.diagnostics
+
+
+@each_of(("line", "fields"), [
+    ('a,"b,c",d;', ["a", "b,c", "d"]), ('"a","b","c";', ["a", "b", "c"]), ('"a" b,c;', ['"a" b', "c"]),
+    ('"a""b",c;', ['a""b', "c"]), ('a,"b;', ["a", '"b']), (";", [""]), (",;", ["", ""]), ('"";', [""]),
+    ('"a,b",,"";', ["a,b", "", ""]), ("a;;", ["a;"])])
+def test_the_fields_of_a_row(line: str, fields: list[str]) -> None:
+    assert _fields(line) == fields
 
 
 # --- symbols ---

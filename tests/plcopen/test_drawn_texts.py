@@ -121,6 +121,13 @@ DRAWINGS: dict[str, str] = {
     "a block that is enabled": value(2, "a") + value(3, "b") + block(4, "CTU", "EN=2 CU=3", "ENO,Q,CV", "s")
         + result(5, "4.Q", "x")
         + result(6, "4.CV", "n") + result(7, "4.ENO", "y"),
+    "one whose results are taken negated": value(2, "a") + value(3, "b") + block(4, "CTU", "EN=2 CU=3", "ENO,Q,CV", "s")
+        + result(5, "4.Q", "x", 'negated="true"') + result(6, "4.Q", "y", 'edge="rising"') + result(7, "4.CV", "n"),
+    "one whose result is set": value(2, "a") + value(3, "b") + block(4, "CTU", "EN=2 CU=3", "ENO,Q,CV", "s")
+        + result(5, "4.Q", "x", 'storage="set"') + result(6, "4.Q", "y"),
+    "an address that is written between": value(2, "%QX0.0", 'negated="true"') + result(3, "2", "%QX0.0") + result(4, "2", "x"),
+    "an address that another one reads": value(2, "%MW1") + block(3, "ADD", "IN1=2 IN2=2", "OUT") + result(4, "3", "%MW2")
+        + result(5, "3", "m"),
     "one whose results go further": value(2, "a") + value(3, "b") + block(4, "CTU", "EN=2 CU=3", "ENO,Q,CV", "s")
         + block(5, "ADD", "IN1=4.CV IN2=4.CV", "OUT") + result(6, "5", "n") + coil(7, "4.Q", "x") + result(8, "4.Q", "y"),
     "a call between contacts": RAIL + contact(2, "1", "a") + value(3, "T#1s") + block(4, "TON", "EN=2 PT=3", "ENO,Q", "t")

@@ -154,7 +154,7 @@ class Operands:
                                f"{'bit' if wanted in 'bB' else 'word'}", "a bit is written as word.bit, as in 0.05 or W3.15")
         if wanted in "bBwWnv":
             shown = f"{address.area}{address.number}" if address.area in FLAG_AREAS else str(address).replace(" ", "")
-            return Direct(start, end, f"%{shown}")
+            return Direct(start, end, f"%{shown.removeprefix('%')}")
         return NameRef(start, end, self._at(address, wanted, start, end))
 
     def _at(self, address: Address, wanted: str, start: int, end: int) -> str:
@@ -163,7 +163,8 @@ class Operands:
         key = str(address), wanted
         if key not in self.located:
             name = Name(start, end, f"${address}:{wanted}")
-            self.located[key] = tree.VarDecl(start, end, (name,), tree.Location(start, end, str(address)),
+            place = f"%{address.area}W{address.byte_offset() // 2}" if wanted == "A" and address.size_bits else str(address)
+            self.located[key] = tree.VarDecl(start, end, (name,), tree.Location(start, end, place),
                                              _spec(address, wanted, start, end), None)
         return self.located[key].names[0].text
 
@@ -331,6 +332,7 @@ def _spec(address: Address, wanted: str, start: int, end: int) -> tree.TypeSpec:
     """The type of a variable at an address: words up to the end of the area, or the number that begins there."""
     if wanted not in "aA":
         return tree.NamedType(start, end, _REALS.get(wanted) or _TYPES[wanted])
-    count = AREAS[address.area].count if address.area in AREAS else E_WORDS
-    bounds = tuple(Literal(start, end, "int", value, None, str(value)) for value in (0, count - 1 - address.number))
+    size_bytes = AREAS[address.area].size_bytes if address.area in AREAS else 2 * E_WORDS
+    last = (size_bytes - address.byte_offset()) // 2 - 1
+    bounds = tuple(Literal(start, end, "int", value, None, str(value)) for value in (0, last))
     return tree.ArraySpec(start, end, ((bounds[0], bounds[1]),), tree.NamedType(start, end, "WORD"))
