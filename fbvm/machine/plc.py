@@ -246,7 +246,6 @@ class Plc(NamedValues):
                 return None
             fresh.discard(due.pop(0))
             if trap:
-                due.clear()
                 return trap
         self._first = False
         return None

@@ -115,26 +115,24 @@ def end_forces(asked: Asked) -> bytes:
 
 def fetch(memory: Memory, span: Span, first: int, count: int) -> bytes:
     """Elements as FINS has them: a word is two bytes, high byte first, a bit or a flag one."""
-    start = span.start
     if span.size == 2:
-        words = array("H", memory.words(span.area)[start + first : start + first + count].tobytes())
+        words = array("H", memory.words(span.area)[first : first + count].tobytes())
         if byteorder == "little":
             words.byteswap()
         return words.tobytes()
-    data, offset = memory.u8, 8 * memory.areas[span.area].offset + (16 if span.has_bits else 1) * start + first
+    data, offset = memory.u8, 8 * memory.areas[span.area].offset + first
     return bytes(data[at >> 3] >> (at & 7) & 1 for at in range(offset, offset + count))
 
 
 def store(memory: Memory, span: Span, first: int, data: bytes) -> None:
     """Writes elements from their form in FINS; of a bit's byte, bit 0 counts."""
-    start = span.start
     if span.size == 2:
         words = array("H", data)
         if byteorder == "little":
             words.byteswap()
-        memory.words(span.area)[start + first : start + first + len(words)] = memoryview(words)
+        memory.words(span.area)[first : first + len(words)] = memoryview(words)
         return
-    there, offset = memory.u8, 8 * memory.areas[span.area].offset + (16 if span.has_bits else 1) * start + first
+    there, offset = memory.u8, 8 * memory.areas[span.area].offset + first
     for at, value in enumerate(data, offset):
         there[at >> 3] = there[at >> 3] & ~(1 << (at & 7)) | (value & 1) << (at & 7)
 
@@ -157,7 +155,7 @@ def _writable(memory: Memory, address: bytes, count: int) -> tuple[Span, int]:
     """As `_range`, for elements that are written."""
     span, first = _range(memory, address, count)
     protected = READ_ONLY.get(span.area, 0)
-    if count and span.start + (first // 16 if span.has_bits else first) < protected:
+    if count and (first // 16 if span.has_bits else first) < protected:
         raise Refused(EndCode.READ_ONLY)
     return span, first
 

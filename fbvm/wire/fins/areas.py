@@ -16,14 +16,13 @@ LAST_BIT = 15
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """The elements of one area that a code names: FINS numbers `first` to `first` + `count` - 1 are those of `area` from `start`
-    on.  `size` is 2 for words, 1 for bits of words (`has_bits`) and for flags."""
+    """The elements of one area that a code names: FINS numbers `first` to `first` + `count` - 1 are those of `area` from its
+    first one on.  `size` is 2 for words, 1 for bits of words (`has_bits`) and for flags."""
 
     code: int
     first: int
     count: int
     area: str
-    start: int = 0
     size: int = 2
     has_bits: bool = False
 
@@ -35,20 +34,20 @@ class Span:
     def address(self, element: int) -> Address:
         """The PLC's address of an element of this span."""
         if self.has_bits:
-            return Address(self.area, self.start + element // 16, element % 16)
-        return Address(self.area, self.start + element)
+            return Address(self.area, element // 16, element % 16)
+        return Address(self.area, element)
 
 
-def _words(code: int, first: int, count: int, area: str, start: int = 0) -> Span:
-    return Span(code, first, count, area, start)
+def _words(code: int, first: int, count: int, area: str) -> Span:
+    return Span(code, first, count, area)
 
 
-def _bits(code: int, first: int, count: int, area: str, start: int = 0) -> Span:
-    return Span(code, first, count, area, start, 1, True)
+def _bits(code: int, first: int, count: int, area: str) -> Span:
+    return Span(code, first, count, area, 1, True)
 
 
 def _flags(code: int, first: int, count: int, area: str) -> Span:
-    return Span(code, first, count, area, 0, 1)
+    return Span(code, first, count, area, 1)
 
 
 _BANKS = tuple(span for bank in range(E_BANKS) for span in (
