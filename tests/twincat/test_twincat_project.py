@@ -160,3 +160,14 @@ def test_a_task_of_which_a_file_says_nothing_runs_as_a_new_one_does(said: str, o
     parsed = parse_markup(f'<Task Name="T">{said}</Task>'.encode(), "T.TcTTO")
     assert isinstance(parsed, tuple)
     assert _own(parsed[1]) == own
+
+
+@pytest.mark.parametrize(("properties", "names"), [
+    ("<Title>Core</Title>", ["Core"]), ("<DefaultNamespace>Space</DefaultNamespace><Title>Core</Title>", ["Space"]),
+    ("<DefaultNamespace>Space</DefaultNamespace>", ["Space"]), ("<Name>Other</Name>", []), ("<Title>A.B</Title>", []),
+    ("<Title>2 words</Title>", []),
+])  # fmt: skip
+def test_which_name_may_stand_in_front_of_names_of_a_project(tmp_path: Path, properties: str, names: list[str]) -> None:
+    path = tmp_path / "P.plcproj"
+    path.write_text(f"<Project><PropertyGroup>{properties}</PropertyGroup></Project>", encoding="utf-8")
+    assert [Path(source.name).stem for source in read_project(path).sources] == names
