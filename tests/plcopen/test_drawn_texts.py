@@ -128,6 +128,8 @@ DRAWINGS: dict[str, str] = {
     "an address that is written between": value(2, "%QX0.0", 'negated="true"') + result(3, "2", "%QX0.0") + result(4, "2", "x"),
     "an address that another one reads": value(2, "%MW1") + block(3, "ADD", "IN1=2 IN2=2", "OUT") + result(4, "3", "%MW2")
         + result(5, "3", "m"),
+    "a block that writes what is read in front of it and behind": value(2, "shared") + result(3, "2", "n") + value(8, "m")
+        + value(9, "a") + block(4, "Part", "u=9", "done", "p", in_outs="io=8") + result(5, "4.done", "x") + result(7, "2", "k"),
     "one whose results go further": value(2, "a") + value(3, "b") + block(4, "CTU", "EN=2 CU=3", "ENO,Q,CV", "s")
         + block(5, "ADD", "IN1=4.CV IN2=4.CV", "OUT") + result(6, "5", "n") + coil(7, "4.Q", "x") + result(8, "4.Q", "y"),
     "a call between contacts": RAIL + contact(2, "1", "a") + value(3, "T#1s") + block(4, "TON", "EN=2 PT=3", "ENO,Q", "t")

@@ -151,3 +151,10 @@ def test_a_damaged_library_is_refused() -> None:
         assert not made.files and [error.code for error in made.errors] == ["X0105"]
     for cut in range(60, len(LIBRARY), 37):
         import_codesys2(LIBRARY[:cut], "own.lib")
+
+
+def test_a_diagram_in_the_first_line_of_an_export_has_the_name_of_its_pou() -> None:
+    text = "PROGRAM First\nVAR\nEND_VAR\n_LD_BODY\n_NETWORKS : 0\nEND_PROGRAM\n(* @NESTEDCOMMENTS := 'Yes' *)\n"
+    [error] = import_codesys2(text.encode(), "first.exp").errors
+    assert error.message == "the body of PROGRAM First is a diagram (LD), which is not read from an export as text"
+    assert error.source.text[error.start : error.end] == "_LD_BODY"
