@@ -56,7 +56,7 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
         banks = [str(name) for name in about.get("banks", ())]
         program = None if about["program"] is None else str(about["program"])
         choice = {str(name): str(value) for name, value in about.get("chosen", {}).items()}
-    except (KeyError, TypeError, ValueError):
+    except (AttributeError, KeyError, TypeError, ValueError):
         raise JournalError("it holds no program; one that Python wrote is done again from Python") from None
     for folder in folders:
         if not folder.is_dir():

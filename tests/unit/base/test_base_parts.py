@@ -16,7 +16,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base import arithmetic, cache, data, files, host, strings
-from fbvm.base.areas import AREAS, AddressError, parse_address
+from fbvm.base.areas import AREAS, E_PLC_ADDRESS, E_WORDS, PLC_ADDRESSES, AddressError, parse_address
 from fbvm.base.arithmetic import Undefined
 from fbvm.base.memory import Memory, changes, compare
 from fbvm.base.types import ELEMENTARY, families_of
@@ -106,6 +106,15 @@ def test_what_is_no_address_is_told_why(text: str, said: str) -> None:
     with pytest.raises(AddressError) as error:
         parse_address(text)
     assert said in str(error.value), str(error.value)
+
+
+def test_where_index_registers_point() -> None:
+    """From memory of the family, assumed: 4 K of flags each, then CIO, A, H, W, T, C and D; E banks behind D."""
+    assert PLC_ADDRESSES == {"TF": 48640, "CNF": 48896, "CIO": 49152, "A": 55296, "H": 56320, "W": 56832, "T": 57344, "C": 61440,
+                             "D": 65536}  # fmt: skip
+    assert PLC_ADDRESSES["A"] - PLC_ADDRESSES["CIO"] == AREAS["CIO"].count
+    assert PLC_ADDRESSES["D"] + AREAS["D"].count == E_PLC_ADDRESS
+    assert PLC_ADDRESSES["T"] - PLC_ADDRESSES["W"] == AREAS["W"].count and E_WORDS == 32768
 
 
 # --- memory -------------------------------------------------------------------------------------------------------------
