@@ -1,7 +1,12 @@
-"""Dialects: each is a row of data, every switch has its question, and all ways to choose one lead to the same."""
+"""Dialects: each is a row of data, every switch has its question, and all ways to choose one lead to the same.
+
+`FBVM_REWRITE=1 pytest` of this file writes `dialects.txt` anew, which has a line for each question: read the difference."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -21,6 +26,32 @@ def test_every_switch_has_its_question_and_somebody_who_turns_it() -> None:
         assert not getattr(DIALECTS["standard"], switch)
         assert any(getattr(row, switch) for row in DIALECTS.values()), switch
         assert QUESTIONS[switch][0] in page()
+
+
+KEPT = Path(__file__).with_name("dialects.txt")
+
+
+def answers() -> Iterator[str]:
+    """A line for each field: which dialects have another value than the standard, and which one that is."""
+    standard = DIALECTS["standard"]
+    for field in fields(standard):
+        if field.name not in ("name", "for_whom"):
+            usual = getattr(standard, field.name)
+            others = [(name, getattr(row, field.name)) for name, row in DIALECTS.items()]
+            said = [name if value is True else f"{name}={_in_words(value)}" for name, value in others if value != usual]
+            yield f"{field.name}: {', '.join(said)}"
+
+
+def _in_words(value: object) -> str:
+    names = sorted(value) if isinstance(value, frozenset) else value
+    return " ".join(names) if isinstance(names, list | tuple) else str(value)
+
+
+def test_which_dialects_answer_otherwise() -> None:
+    text = "\n".join(answers()) + "\n"
+    if os.environ.get("FBVM_REWRITE"):
+        KEPT.write_text(text, encoding="utf-8")
+    assert text == KEPT.read_text(encoding="utf-8")
 
 
 def test_the_page_says_whose_programs_each_dialect_is_for() -> None:
