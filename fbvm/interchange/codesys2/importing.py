@@ -17,6 +17,8 @@ from fbvm.syntax.text import decode
 
 FAMILY = "codesys2"
 _MARKS = re.compile(r"(?ms)^\(\* @[A-Z_]+ := .*?\*\)[ \t]*\r?\n?")
+_LINES_LEFT = re.compile(r"\n(?:[ \t]*\n){3,}")
+"""What is left of the lines of a diagram, of which few are needed for its text."""
 _FRONT = re.compile(r"(?m)(?:^\(\* @(?:NESTEDCOMMENTS|GLOBAL_VARIABLE_LIST|PATH|OBJECTFLAGS|SYMFILEFLAGS) := .*\r?\n)+")
 """The marks in front of an object."""
 _DECLARED = re.compile(r"(?m)^[ \t]*(?:(?:FUNCTION_?BLOCK|FUNCTION|PROGRAM|TYPE)\s+(\w+)|VAR_GLOBAL\b|VAR_CONFIG\b|TYPE\b)")
@@ -78,7 +80,7 @@ def _objects(text: str) -> Iterator[tuple[str, str]]:
     starts = [found.start() for found in _FRONT.finditer(text)] or [0]
     for start, end in pairwise((*starts, len(text))):
         listed, declared = _LIST_NAME.search(text, start, end), _DECLARED.search(text, start, end)
-        written = _MARKS.sub("", text[start:end]).strip()
+        written = _LINES_LEFT.sub("\n\n", _MARKS.sub("", text[start:end]).strip())
         if written and declared and not _is_empty(written):
             yield listed[1] if listed else declared[1] or "Globals", written
 

@@ -101,7 +101,7 @@ def test_a_diagram_of_an_export_is_refused_by_name() -> None:
     made = import_codesys2(DIAGRAM.encode(), "project.exp")
     error, = made.errors
     assert error.code == "X0203" and "PROGRAM PLC_PRG is a diagram (FBD)" in error.message
-    assert DIAGRAM[error.start:].startswith("_FBD_BODY")
+    assert DIAGRAM[error.start:].startswith("_OUTPUTS : 0")
 
 
 def _text(text: str) -> bytes:
@@ -154,7 +154,8 @@ def test_a_damaged_library_is_refused() -> None:
 
 
 def test_a_diagram_in_the_first_line_of_an_export_has_the_name_of_its_pou() -> None:
-    text = "PROGRAM First\nVAR\nEND_VAR\n_LD_BODY\n_NETWORKS : 0\nEND_PROGRAM\n(* @NESTEDCOMMENTS := 'Yes' *)\n"
+    text = "PROGRAM First\nVAR\nEND_VAR\n_CFC_BODY\n_ITEMS : 0\nEND_PROGRAM\n(* @NESTEDCOMMENTS := 'Yes' *)\n"
     [error] = import_codesys2(text.encode(), "first.exp").errors
-    assert error.message == "the body of PROGRAM First is a diagram (LD), which is not read from an export as text"
-    assert error.source.text[error.start : error.end] == "_LD_BODY"
+    assert error.message == ("the body of PROGRAM First is a diagram (CFC), which is not read from an export as text: "
+                             "only ladder and FBD are read")
+    assert error.source.text[error.start : error.end] == "_CFC_BODY"

@@ -271,13 +271,20 @@ def _library_files() -> dict[str, Path]:
 
 
 @cache
-def _library_pins(block: str) -> dict[str, str]:
-    """Types of the pins of a library's block, by name in capitals."""
+def library_block(block: str) -> tuple[Source, tree.Pou] | None:
+    """The declaration of a library's block, whose name is given in capitals."""
     path = _library_files().get(block)
     source = read(path, path.name) if path else None
     if not isinstance(source, Source):
-        return {}
+        return None
     declared = (d for d in parse(source)[0].declarations if isinstance(d, tree.Pou) and d.name.text.upper() == block)
-    return {name.text.upper(): source.text[variable.spec.start:variable.spec.end] for pou in declared
-            for section in pou.sections if section.kind in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT")
-            for variable in section.variables for name in variable.names}
+    return next(((source, pou) for pou in declared), None)
+
+
+@cache
+def _library_pins(block: str) -> dict[str, str]:
+    """Types of the pins of a library's block, by name in capitals."""
+    found = library_block(block)
+    return {} if found is None else {
+        name.text.upper(): found[0].text[variable.spec.start:variable.spec.end] for section in found[1].sections
+        if section.kind in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT") for variable in section.variables for name in variable.names}
