@@ -196,7 +196,10 @@ class Etn21:
         inside, fins_ns = self._processor, self._fins.wake_ns if self._fins else NEVER
         if inside is None:
             return fins_ns
-        return 0 if inside.mail.has_events else min(fins_ns, int(inside.wake[0]))
+        if inside.mail.has_events:
+            return 0
+        wake_ns: int = inside.wake[0]
+        return wake_ns if wake_ns < fins_ns else fins_ns
 
     @property
     def link_up(self) -> bool:
