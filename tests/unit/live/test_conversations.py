@@ -16,6 +16,7 @@ import pytest
 from browsers import Page
 
 from fbvm.base.data import data_folder
+from fbvm.live.messages import ACTIONS
 from fbvm.live.session import Session
 from fbvm.live.updates import UPDATE_NS, VIEW_NS
 
@@ -77,6 +78,12 @@ def whole(conversation: str) -> str:
     for line in asked:
         made += [line, *(talk.lines(line) if not line.startswith("#") else ())]
     return "".join(f"{line}\n" for line in made)
+
+
+def test_which_messages_change_anything() -> None:
+    assert {name for name, action in ACTIONS.items() if action.changes} == {
+        "predict", "check", "write", "force", "release", "group", "run", "pause", "step", "statement", "break", "unbreak", "speed",
+        "mode", "start", "restart", "branch", "cable", "fault", "mend"}  # fmt: skip
 
 
 @pytest.mark.parametrize("file", [pytest.param(file, id=file.stem) for file in sorted(HERE.glob("*.txt"))])
