@@ -82,8 +82,8 @@ def whole(conversation: str) -> str:
 
 def test_which_messages_change_anything() -> None:
     assert {name for name, action in ACTIONS.items() if action.changes} == {
-        "predict", "check", "write", "force", "release", "group", "run", "pause", "step", "statement", "break", "unbreak", "speed",
-        "mode", "start", "restart", "branch", "cable", "fault", "mend"}  # fmt: skip
+        "predict", "check", "write", "force", "release", "group", "run", "pause", "step", "statement", "break", "unbreak",
+        "speed", "mode", "start", "restart", "branch", "cable", "fault", "mend"}  # fmt: skip
 
 
 @pytest.mark.parametrize("file", [pytest.param(file, id=file.stem) for file in sorted(HERE.glob("*.txt"))])
