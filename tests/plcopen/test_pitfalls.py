@@ -510,3 +510,17 @@ def test_what_is_wrong_with_an_element_is_said_where_it_stands(what: str) -> Non
     made = imported(pou(body, declared, language=language))
     assert codes(made) and any(message in error.message for error in made.errors), [each.message for each in made.diagnostics]
     assert "was not taken over" in made.files["Main.st"]
+
+
+def test_a_body_that_is_a_whole_pou_is_taken_as_it_is() -> None:
+    whole = "PROGRAM Main\nVAR\n    n : INT := 4;\nEND_VAR\nn := n + 1;\nEND_PROGRAM"
+    made = imported(f'<pou name="Main" pouType="PROGRAM"><body><st><![CDATA[\n{whole}\n]]></st></body></pou>')
+    assert codes(made) == ["X0292"]
+    machine = plc(made)
+    machine.scan()
+    assert machine.read("Main.n") == 5
+    beside = imported(pou(f"<p>{whole}</p>", "m", language="ST"))
+    assert [error.message for error in beside.errors] == [
+        "POU Main: the body is a whole PROGRAM, and beside it the document declares parts of it"]
+    other = imported(pou(f"<p>{whole.replace('Main', 'Other')}</p>", "", language="ST"))
+    assert "PROGRAM Other" in other.files["Main.st"]

@@ -232,13 +232,13 @@ def _body(reading: Reading, element: Element) -> Body | None:
             return Body(chart.name, chart)
         if last_word(data) not in READ | SETTINGS:
             reading.report("X0203", data, f"the body that the tool keeps in addData {data.get('name')} is not taken over")
-    inner = next((part for part in element.children if part.name in LANGUAGES), None)
+    inner = next((part for part in element.children if part.name.upper() in LANGUAGES), None)
     if inner is None:
         strange = next((part for part in element.children if part.name not in ("addData", "documentation")), None)
         if strange is not None:
             reading.report("X0203", strange, f"a body in {strange.name} is not taken over", f"read are {', '.join(LANGUAGES)}")
         return None
-    return Body(inner.name, inner)
+    return Body(inner.name.upper(), inner)
 
 
 # --- configurations ---------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -18,6 +19,8 @@ OUTSIDE = "extensions"
 """Name of the file for globals that other files of a project of Beremiz declare."""
 SERVED = ("PYTHON_EVAL", "PYTHON_POLL", "PYTHON_GEAR", "CSV_READ_BY_STRING", "CSV_READ_BY_INT", "CSV_RELOAD")
 """Blocks that ask a program on the host of the PLC (Beremiz, py_ext)."""
+_WHOLE = re.compile(r"(?is)\s*(FUNCTION_BLOCK|FUNCTION|PROGRAM)\s+(\w+)\b.*\bEND_\1\s*;?\s*")
+"""A body that is a whole POU."""
 
 
 def sources(reading: Reading, document: Document) -> dict[str, str]:
@@ -93,6 +96,8 @@ def _variable(variable: Variable) -> str:
 
 
 def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
+    if whole := _whole_text(reading, pou):
+        return whole
     bodies = Bodies(reading, document, pou)
     main = bodies.lines(pou.body) if pou.body else []
     actions = [(name, [with_new_names(line, bodies.renamed) for line in bodies.lines(body)]) for name, body in pou.actions]
@@ -109,6 +114,20 @@ def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
     for member in pou.members:
         lines += ["", *(_pou(reading, document, member))]
     return [*lines, f"END_{pou.kind}"]
+
+
+def _whole_text(reading: Reading, pou: Pou) -> list[str]:
+    """The lines of a body that is a whole POU, from PROGRAM to END_PROGRAM, as some tools write it; none for another body."""
+    text = pou.body.element.text if pou.body is not None and pou.body.language == "ST" else ""
+    found = _WHOLE.fullmatch(text)
+    if found is None or (found[1].upper(), found[2].upper()) != (pou.kind, pou.name.upper()) or pou.body is None:
+        return []
+    if pou.lists or pou.actions or pou.members:
+        reading.report("X0203", pou.body.element, f"the body is a whole {pou.kind}, and beside it the document declares parts of "
+                       "it", "leave out one of the two")
+        return [f"{pou.kind} {pou.name}", f"END_{pou.kind}"]
+    reading.report("X0292", pou.body.element, f"the body is a whole {pou.kind}, which is taken as it is")
+    return text.expandtabs(4).strip().splitlines()
 
 
 def _head(pou: Pou) -> str:
