@@ -170,7 +170,7 @@ class Adapter:
 
     def _launch(self, arguments: Arguments) -> None:
         assert self._waiting is not None
-        if self.debug.debugger is not None or self._arguments is not None:
+        if self._arguments is not None:
             raise Refusal("something is debugged already: one launch a session")
         self._open(str(self._waiting["command"]), arguments)
 

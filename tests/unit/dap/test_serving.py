@@ -1,0 +1,53 @@
+"""How serving a client ends: by its wish, without it, in the middle of a message, or with bytes that are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from fbvm.dap.framing import encode
+from fbvm.dap.server import serve_until_ended
+from fbvm.dap.target import LaunchError, Target
+
+
+def refuse(how: str, arguments: object) -> Target:
+    raise LaunchError("nothing can be debugged here")
+
+
+def asked(command: str, **arguments: object) -> bytes:
+    return encode({"seq": 1, "type": "request", "command": command, "arguments": arguments})
+
+
+def gone(data: bytes) -> None:
+    raise BrokenPipeError
+
+
+def keep(data: bytes) -> None:
+    """Takes what is written."""
+
+
+@pytest.mark.parametrize(("pieces", "write", "ended"), [
+    ([asked("disconnect", terminateDebuggee=True)], keep, ("", True)), ([asked("disconnect")], keep, ("", False)),
+    ([asked("initialize")], keep, ("", False)), ([], keep, ("", False)), ([asked("initialize")], gone, ("", False)),
+    ([asked("initialize")[:-3]], keep, ("the client is gone in the middle of a message", False)),
+    ([b"Content-Length: x\r\n\r\n"], keep, ("no length of a message: x", False)),
+    ([asked("disconnect", terminateDebuggee=True)[:9], asked("disconnect", terminateDebuggee=True)[9:]], keep, ("", True)),
+])  # fmt: skip
+def test_how_serving_a_client_ends(pieces: list[bytes], write: Callable[[bytes], None], ended: tuple[str, bool]) -> None:
+    waiting = iter([*pieces, b""])
+    assert serve_until_ended(refuse, lambda: next(waiting), write) == ended
+
+
+def test_a_client_that_says_nothing_is_left_when_somebody_says_so() -> None:
+    looks: list[int] = []
+
+    def meanwhile() -> bool:
+        looks.append(1)
+        return len(looks) == 2
+
+    def never() -> bytes:
+        raise OSError  # the connection fails, and nothing more comes
+
+    assert serve_until_ended(refuse, lambda: asked("initialize"), keep, lambda: True) == ("", False)
+    assert serve_until_ended(refuse, never, keep, meanwhile) == ("", False)
