@@ -205,6 +205,16 @@ def ignore(numbers: Iterable[signal.Signals]) -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
+def give_way() -> None:
+    """Lets other processes have the processor first, where a process can ask for that: for work that nobody waits for."""
+    if sys.platform != "win32":
+        os.nice(NICENESS)
+
+
+NICENESS = 10
+"""Beside a process that is busy, one that gives way has a tenth of a processor."""
+
+
 def can_end_others() -> bool:
     """True if a program can ask another one to end, and not only end it: Windows has no SIGTERM."""
     return sys.platform != "win32"

@@ -113,6 +113,15 @@ def test_another_thread_interrupts_the_main_one(system: str, monkeypatch: pytest
         time.sleep(5)
 
 
+def test_work_that_nobody_waits_for_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr("os.nice", asked.append, raising=False)
+    for system in ("linux", "darwin", "win32"):
+        monkeypatch.setattr(host, "sys", SimpleNamespace(platform=system))
+        host.give_way()
+    assert asked == [10, 10]
+
+
 def test_ctrl_c_waits_for_the_end_of_what_holds_it(monkeypatch: pytest.MonkeyPatch) -> None:
     done = []
     with pytest.raises(KeyboardInterrupt), host.interrupt_held():

@@ -15,6 +15,7 @@ from contextlib import suppress
 from typing import IO, Protocol
 from weakref import ref
 
+from fbvm.base.host import give_way
 from fbvm.engine.apart import DEAF, run_apart
 from fbvm.engine.native.llvm.compiler import compile_text, search_less
 
@@ -33,7 +34,8 @@ def serve(jobs: IO[bytes], answers: IO[bytes], large: bool = False) -> None:
     """Runs in the helper process: compiles one module after the other until `jobs` ends.  All are `large`, or none is.
 
     A job is the size of a text in eight bytes, and the text of a module; an answer the size of an object file, and the object
-    file, which is empty if the compilation failed."""
+    file, which is empty if the compilation failed.  Scans, of this PLC and others, come first."""
+    give_way()
     if large:
         search_less()
     while len(head := jobs.read(_SIZE_BYTES)) == _SIZE_BYTES:
