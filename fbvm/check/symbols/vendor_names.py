@@ -78,12 +78,14 @@ _LIBRARIES = (
      r"MQTT_(?:(?:DIS)?CONNECT(?:_AUTH)?|RECEIVE|SEND|(?:UN)?SUBSCRIBE)|SM_(?:\d+\w+|BAS|HOME|INDUSTRIAL|RTD)|"
      r"TCP_(?:CLOSE|CONNECT|RECEIVE|SEND)", "OpenPLC Editor's libraries for boards, CAN, MQTT and TCP"),
     (r"FB_(?:EcSoE|EcCoE|EcGet|EcSet|EcMaster)\w*|ST_Ec\w+|Tc2_EtherCAT", "TwinCAT's Tc2_EtherCAT"),
-    (r"FB_Json\w+|SJsonValue|SJsonAIterator", "TwinCAT's Tc3_JsonXml"),
+    (r"FB_Json\w+|SJsonValue|SJsonAIterator|FB_Xml(?:Dom|Sax)\w+|SXml\w+", "TwinCAT's Tc3_JsonXml"),
     (r"FB_TcMessage|FB_TcAlarm|FB_TcEvent|TcEventSeverity|TcEventEntry|I_TcMessage|I_TcSourceInfo", "TwinCAT's Tc3_EventLogger"),
     (r"TcUnit|FB_TestSuite|TEST|TEST_FINISHED|Assert(?:Array[23d]*)?Equals\w*|AssertTrue|AssertFalse|WRITE_PROTECTED_\w+|GVL_TcUnit|"
      r"F_AnyToUnionValue|U_ExpectedOrActual|F_GetCpuCounterAs64bit", "TcUnit"),
     (r"Sys(?:Time|File|Mem|Sock|Com|Task|Target|Process|Cpu|Dir|Event|Lib)\w+|RTS_IEC_\w+|CmpErrors2?|TimerSwitch",
      "CODESYS's system libraries"),
+    (r"FPU", "CODESYS's FloatingPointUtils"),
+    (r"Stu", "CODESYS's StringUtils"),
     (r"GEN|GEN_MODE|PD|PID|PID_FIXCYCLE|DERIVATIVE|BASE64",
      "CODESYS's Util"),
 )
