@@ -80,6 +80,7 @@ def test_a_document_of_twincat_is_imported(tmp_path: Path) -> None:
     assert done.exit_code == 0
     assert "--dialect twincat" in done.output
     assert "P_Strokes : UDINT" in (tmp_path / "made" / "FB_Press.st").read_text(encoding="utf-8")
+    assert "// network 7\n    Edge_70000000002(CLK := bStart);" in (tmp_path / "made" / "MAIN.st").read_text(encoding="utf-8")
     refused = CliRunner().invoke(main, ["import", str(DOCUMENTS / "x.TcPOU"), "-o", str(tmp_path / "made")])
     assert refused.exit_code == 2
 

@@ -177,3 +177,9 @@ def test_documents_that_were_spoiled_raise_nothing(data: st.DataObject) -> None:
     made = import_xml(text[:at] + put + text[at + length:])
     for diagnostic in made.diagnostics:
         assert diagnostic.render()
+
+
+def test_a_local_id_of_thousands_of_digits_is_a_name_like_any_other() -> None:
+    number = "9" * 5_000
+    made = imported(pou(value(number, "a") + result(2, number, "b"), "a b", language="FBD"))
+    assert made.errors == [] and "b := a;" in made.files["Main.st"]

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
 
+from fbvm.base.digits import whole_number
 from fbvm.interchange.plcopen.read.accesses import Access, accesses
 from fbvm.interchange.plcopen.read.diagram import Diagram, Object, Wire
 from fbvm.interchange.plcopen.read.producer import NETWORK
@@ -25,6 +26,8 @@ from fbvm.interchange.plcopen.read.sequence import sequence
 
 LARGEST, MOST_LOOPS = 5_000, 200
 """Most objects and most loops of a network that is taken over; drawings of people have far fewer."""
+BAND = 10_000_000_000
+"""Distance of the localIds of one network of an FBD from those of the next (CODESYS, TwinCAT)."""
 MIXED = 40
 """Most networks standing among one another of which each pair is compared; more become one network."""
 RAILS = ("leftPowerRail", "rightPowerRail")
@@ -67,9 +70,16 @@ def networks(diagram: Diagram, scope: Scope, order: str = NETWORK) -> list[Netwo
     else:
         made = _generated(free, list(groups.values()), scope, order)
     for number, network in enumerate(made, 1):
-        network.number = number
+        network.number = _shown(network) or number
     _comment(made, diagram.comments, flat)
     return made
+
+
+def _shown(network: Network) -> int:
+    """The number of a network in the editor of CODESYS or TwinCAT, by the localIds of an FBD; 0 if these do not tell it."""
+    numbers = {whole_number(item.id) // BAND if item.id.isdecimal() else 0 for item in network.objects}
+    shown = numbers.pop() if len(numbers) == 1 else 0
+    return shown if shown <= LARGEST else 0
 
 
 def _place(item: Object, flat: bool) -> tuple[float, float, int]:

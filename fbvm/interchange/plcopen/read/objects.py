@@ -8,7 +8,7 @@
     variable/addData/data[name=.../inputassignments]    InputAssignments/InputAssignment/[Name,] Value, for FB_init
     project/addData/data[name=.../interface]/Interface  Methods/Method, Properties/Property, Inheritance, addData
 
-Source: exports of CODESYS V3; that of properties is assumed.
+Source: exports of CODESYS V3 and TwinCAT 3.1.
 """
 
 from __future__ import annotations
