@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from fbvm.live.messages import ACTIONS
 from fbvm.live.session import Session
 from fbvm.live.updates import UPDATE_NS, VIEW_NS
 
+WORDS, KINDS = re.compile(">([^<>]+)</text>"), re.compile('class="([^"]*)"')
+"""In a drawing: its texts, and the kinds of its lines, some of which are those with power."""
 HERE = Path(__file__).with_name("conversations")
 
 pytestmark = pytest.mark.slow
@@ -31,6 +34,9 @@ def short(message: dict[str, Any]) -> str:
     for name in ("taken", "times"):
         if name in update:
             update[name] = bool(update[name])
+    for picture in update.get("inside", {}).get("pictures", ()):
+        drawn = picture.pop()
+        picture.append(f"{' '.join(WORDS.findall(drawn))}; {', '.join(KINDS.findall(drawn))}")
     for unit in update.get("units", ()):
         unit["words"] = [row for row in unit["words"] if row[2] not in ("FALSE", "0 (16#0000)", "0")]
     return json.dumps(message, ensure_ascii=False)
