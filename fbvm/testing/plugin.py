@@ -13,7 +13,7 @@ from __future__ import annotations
 import ast
 import linecache
 import textwrap
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
@@ -104,39 +104,33 @@ def plc(request: pytest.FixtureRequest) -> RigMaker:
 
 
 @pytest.fixture
-def plant(request: pytest.FixtureRequest) -> Iterator[PlantMaker]:
+def plant(request: pytest.FixtureRequest) -> PlantMaker:
     """The PLCs of a project file, on one network in memory: `plant()` is that of fbvm.toml near the test.
 
     Each is a rig: `plant().pump.Running`, `made["pump[3]"]`; `run("1s")`, `scan()` and `until("pump.Main.Done", max="5s")` move
     all of them, `made.network` is their network."""
     from fbvm.testing.plant_rig import PlantRig, project_near
 
-    made: list[PlantRig] = []
-
     def make(project: str = "fbvm.toml") -> PlantRig:
         __tracebackhide__ = True
         near = project_near(search_folders(request.path, request.config.rootpath), project)
-        made.append(PlantRig(near, varied=varied_run(request.config)))
-        _rigs(request.node).extend(made[-1].rigs.values())
-        for rig in made[-1].rigs.values():
+        made = PlantRig(near, varied=varied_run(request.config))
+        _rigs(request.node).extend(made.rigs.values())
+        for rig in made.rigs.values():
             _instrument(request, rig)
-        return made[-1]
+        return made
 
-    yield make
-    for plants in made:
-        plants.network.close()
+    return make
 
 
 @pytest.fixture
-def network() -> Iterator[LoopNetwork]:
+def network() -> LoopNetwork:
     """A network in memory and in virtual time, for `fb(..., etn21="192.168.250.21", network=network)`.
 
     `network.place(Peer(...), ModbusPeer())` puts a server there, `network.faults.append(Fault(...))` a fault."""
     from fbvm.net.loop import LoopNetwork
 
-    made = LoopNetwork()
-    yield made
-    made.close()
+    return LoopNetwork()
 
 
 @pytest.fixture

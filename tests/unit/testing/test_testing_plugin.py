@@ -377,8 +377,8 @@ def test_the_file_of_a_block_is_named_wherever_it_is(project: pytest.Pytester) -
 def test_a_failed_assert_shows_line_and_values(project: pytest.Pytester) -> None:
     project.makefile(".st", test_pump="""\
 PROGRAM Test_wrong
-VAR P : Pump; n : INT; Done : BOOL; END_VAR
-    P(Start := n > 2);
+VAR P : Pump; n, before : INT; Done : BOOL; END_VAR
+    before := before + 1; P(Start := n > 2);
     ASSERT(n < 3 OR NOT P.Running);
     n := n + 1;
     ASSERT(n < 100);
@@ -396,6 +396,7 @@ END_PROGRAM
         "every scan, in a browser: .fbvm/*.html",
         "FAILED test_pump.st::Test_wrong*",
     ])  # fmt: skip
+    result.stdout.no_fnmatch_line("E   before*")  # an earlier statement has read it
     [page] = (project.path / ".fbvm").glob("*.html")
     assert "test_pump.st:4: in Test_wrong, scan 8 (80ms)\n&gt;   ASSERT(n &lt; 3 OR NOT P.Running);\nE   n = 8\n" in \
         page.read_text(encoding="utf-8")

@@ -269,3 +269,10 @@ def test_a_source_that_is_gone_is_told_in_its_page(tmp_path: Path) -> None:
 
 def test_what_a_stub_has_written_is_told() -> None:
     assert Report._by(cast(Any, None), cast(Any, SimpleNamespace(site=None))) == "a stub"
+
+
+def test_only_blocks_and_programs_have_names() -> None:
+    rig = Rig.of("Main", text="PROGRAM Main VAR n : INT; d : TON; END_VAR END_PROGRAM")
+    told = Report(rig.plc, cast(Any, None), cast(Any, None), cast(Any, None))
+    assert [told.names_in(prefix) for prefix in ("", "Main.", "Main.n.", "D0..D3.")] == [[], ["n", "d"], [], []]
+    assert told.names_in("Main.d.")[:2] == ["IN", "PT"]
