@@ -81,7 +81,7 @@ class Guard:
 
     def _is_own(self, host: str) -> bool:
         name, colon, port = host.rpartition(":")
-        if not colon or not port.isascii() or not port.isdecimal() or port != str(self.port):
+        if not colon or port != str(self.port):
             return False
         return name.lower() in self._names or self._is_open and _is_ipv4(name)
 
