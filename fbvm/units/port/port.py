@@ -24,8 +24,6 @@ class Port:
         self.number = number
         self._first_word, self._size = lines.first_word, lines.size
         self._lines = [Line(channel, lines, number_of) for channel in range(lines.count)]
-        self._active: set[int] = set()
-        """Lines with a connection, or a close that is not confirmed, also when they carry another number by now."""
         self._at = at = lines.words
         self._states = {number: name.upper() for name, number in asdict(lines.states).items()}
         self._module = at.module
@@ -41,13 +39,12 @@ class Port:
                 self._lines[event.channel].take(event, self._line(words, event.channel))
 
     def exchange(self, words: memoryview) -> list[Request]:
-        """What the network has to do for the program's commands; `words` is the whole mailbox."""
+        """What the network has to do for the program's commands; `words` is the whole mailbox.  A line with a connection, or with
+        a close that is not confirmed, is asked also when it carries another number by now."""
         requests: list[Request] = []
-        modules = words[self._modules].tolist()
-        for channel in [line for line, module in enumerate(modules) if module == self.number or line in self._active]:
-            line = self._lines[channel]
-            requests += line.exchange(self._line(words, channel), modules[channel] == self.number)
-            (self._active.discard if line.is_idle else self._active.add)(channel)
+        for channel, (line, module) in enumerate(zip(self._lines, words[self._modules].tolist(), strict=True)):
+            if module == self.number or not line.is_idle:
+                requests += line.exchange(self._line(words, channel), module == self.number)
         return requests
 
     def reset(self, words: memoryview | None) -> list[Request]:

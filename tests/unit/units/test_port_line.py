@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from array import array
+from dataclasses import replace
 
 from rows import each_of
 
 from fbvm.units.port.line import Line
+from fbvm.units.port.port import Port
 from fbvm.units.port.words import Commands, Lines, LineWords, States
 from fbvm.wire.link import (
     Broken,
@@ -174,3 +176,25 @@ def test_a_line_of_another_unit_is_closed_and_its_words_are_left_to_that() -> No
     rig.hear(Closed(3))
     rig.words[AT.state], rig.words[AT.sending] = OPEN, 4
     assert rig.ask(is_mine=False) == [] and (rig.state, rig.words[AT.sending]) == (OPEN, 4)
+
+
+def test_a_port_asks_its_own_lines_and_those_with_a_connection_that_carry_another_number_by_now() -> None:
+    port, words = Port(5, replace(LINES, count=3), NUMBERS.__getitem__), memoryview(array("H", bytes(2 * 3 * 22)))
+    lines = [words[at : at + 22] for at in (0, 22, 44)]
+    for line, module in zip(lines, (6, 5, 5), strict=True):
+        line[AT.module], line[AT.state], line[AT.command] = module, CLOSED, CONNECT
+        line[AT.remote_ip], line[AT.remote_ip + 1], line[AT.remote_port] = 0x0A00, 0x0102, 502
+    assert port.exchange(words) == [Connect(1, PEER), Connect(2, PEER)]
+    port.take(words, [Opened(1, 1024, PEER), Opened(-1, 1, PEER), Opened(3, 1, PEER)])
+    assert [line[AT.state] for line in lines] == [CLOSED, OPEN, OPENING]
+    assert port.exchange(words) == [Grant(1, 8)]
+    lines[1][AT.module] = 6
+    assert port.exchange(words) == [Close(1)] and lines[1][AT.state] == CLOSING
+    assert port.exchange(words) == []
+    port.take(words, [Closed(1)])
+    lines[1][AT.state] = OPEN
+    assert port.exchange(words) == [] and lines[1][AT.state] == OPEN, "it is the other unit's"
+    lines[0][AT.module] = 5
+    assert port.exchange(words) == [Connect(0, PEER)]
+    assert port.reset(words) == [Close(0, True), Close(2, True)]
+    assert [(line[AT.command], line[AT.state]) for line in lines] == [(0, 0), (CONNECT, OPEN), (0, 0)]
