@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
@@ -50,6 +51,8 @@ declare i64 @llvm.lrint.i64.f64(double)
 declare float @llvm.fabs.f32(float)
 declare double @llvm.fabs.f64(double)
 """
+_OUTSIDE = re.compile(r"@((?:llvm|fbvm)[\w.]+)\(")
+"""A function that a module calls, or declares, by a name that stands for all modules."""
 _WIDTHS = ("i1", "i8", "i16", "i32", "i64")
 # A body that others call keeps no registers for them (#6): to save and restore six takes longer than most calls.  LLVM knows
 # that of a call, not of a jump at the end of a function that has to keep them, which `notail` forbids.
@@ -121,16 +124,20 @@ def _translated(image: Image, stops: bool) -> Translation:
     table = f"@caught = internal constant [{len(rows) + 1} x i32] [{', '.join(['i32 0', *rows])}]"
     routines = [declaration(name) for name in sorted(module.routines)]
     text = "\n".join([*definitions(module.constants), objects(image.objects), *[table] * module.attempts, *bodies, *tasks,
-                      *routines, *_declarations(), ASK, ATTRIBUTES, METADATA, *[GUARD] * stops])
+                      *routines, ASK, ATTRIBUTES, METADATA, *[GUARD] * stops])
+    known = _declarations()
+    text = "\n".join([text, *(known[name] for name in sorted(set(_OUTSIDE.findall(text)) & known.keys()))])
     return Translation(text, tuple(module.regions), tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
                        module.counting.facts if module.counting else [], module.marks_at,
                        tuple(sorted(module.routines)))
 
 
 @cache
-def _declarations() -> tuple[str, ...]:
-    """Declarations of functions that modules call: LLVM's intrinsics, and those of C's math.h."""
-    lines = [_FUNCTIONS]
+def _declarations() -> dict[str, str]:
+    """By name the declarations of functions that modules call: LLVM's intrinsics, and those of C's math.h.
+
+    A module has those of the functions that it calls: a hundred more take LLVM a third of its time for a small one."""
+    lines = _FUNCTIONS.splitlines()
     lines += [f"declare {kind} @llvm.{name}.{kind}({kind}, {kind})"
               for name in ("umin", "umax", "smin", "smax") for kind in _WIDTHS]
     lines += [f"declare {kind} @llvm.{name}.{kind}({kind}, {kind}, {kind})"
@@ -140,7 +147,7 @@ def _declarations() -> tuple[str, ...]:
               for kind, suffix in (("i32", ""), ("i64", "64")) if ONE_STEP]
     lines += [f"declare {kind} @llvm.abs.{kind}({kind}, i1)" for kind in _WIDTHS[1:]]
     lines += [f"declare double @fbvm_{name}({', '.join(['double'] * count)}) #2" for name, count in MATH.items()]
-    return tuple(lines)
+    return {name: line for line in lines for name in _OUTSIDE.findall(line)}
 
 
 def _body(module: Module, number: int) -> str:
