@@ -192,6 +192,15 @@ def test_large_modules_have_a_helper_process_of_their_own(monkeypatch: pytest.Mo
     assert [process.args[-1].endswith("True)") for process in used if process] == [False, True, True, False]  # type: ignore[union-attr]
 
 
+def test_a_module_declares_what_it_calls_and_nothing_else() -> None:
+    """LLVM goes through all that is declared, which takes longer than a small body."""
+    root: Node = ("pow", "f64", const("f64", 2.0), ("math", "f64", "sqrt", load("f64", 0)))
+    text = translate(image((store("f64", 8, root),))).text
+    called = set(re.findall(r"call .*?@([\w.]+)\(", text))
+    assert set(re.findall(r"(?m)^declare .*?@([\w.]+)\(", text)) <= called
+    assert {"fbvm_pow", "llvm.sqrt.f64"} <= called
+
+
 class Job:
     """What wants a module with this text, and tells when it has it."""
 
