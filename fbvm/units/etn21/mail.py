@@ -248,10 +248,7 @@ class Mail:
                 kind, channel, _, _, _, _, _, high, low, size = row
                 if kind == agreed.send:
                     data, part = fetch(memory, high, low, size), agreed.part_bytes
-                    if size <= part:
-                        requests.append(Send(channel, data))
-                    else:
-                        requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
+                    requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
                 elif kind == agreed.grant:
                     requests.append(Grant(channel, size))
                 else:
