@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 import pytest
 
 from fbvm.dap.framing import encode
-from fbvm.dap.server import serve_until_ended
+from fbvm.dap.server import DebugDoor, serve_until_ended
 from fbvm.dap.target import LaunchError, Target
 
 
@@ -51,3 +52,23 @@ def test_a_client_that_says_nothing_is_left_when_somebody_says_so() -> None:
 
     assert serve_until_ended(refuse, lambda: asked("initialize"), keep, lambda: True) == ("", False)
     assert serve_until_ended(refuse, never, keep, meanwhile) == ("", False)
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_a_door_serves_one_caller_after_another_until_nobody_can_call_any_more(ends: bool) -> None:
+    closed: list[int] = []
+    calls = iter([1, 2])
+    came = threading.Event()
+
+    def accept() -> tuple[Callable[[], bytes], Callable[[bytes], None], Callable[[], None]]:
+        number = next(calls, 0)
+        if not number:
+            came.set()
+            raise OSError
+        said = iter([asked("disconnect", terminateDebuggee=ends), b""])
+        return lambda: next(said), keep, lambda: closed.append(number)
+
+    door = DebugDoor(accept)
+    assert came.wait(10) and door.is_called
+    assert [door.serve(refuse), door.serve(refuse)] == [ends, ends] and closed == [1, 2]
+    assert not door.is_called and door.serve(refuse) is False
