@@ -35,7 +35,7 @@ def scopes(debug: DebugSession, frame: StackFrame) -> list[Body]:
     session = debug.plc(frame.plc)
     _add_sections(debug, rows, frame)
     facts = session.facts
-    found = [_found(session, field.name) for field in facts.symbols.values() if not field.reference and "$" not in field.name]
+    found = [_found(session, field.name) for field in facts.symbols.values()]
     programs = [place for place in found if isinstance(place.type, StructType) and place.type.block]
     variables_of = [place for place in found if place not in programs]
     _add(debug, rows, "Globals", _places(debug, session, variables_of), len(variables_of))
