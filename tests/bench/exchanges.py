@@ -33,11 +33,16 @@ from pathlib import Path
 
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
+sys.path.insert(0, str(HOUSE / "tests" / "bench"))
+
+import native  # noqa: E402
 
 from fbvm import Etn21, Peer, Plc, TcpNetwork, compile_files  # noqa: E402
 from fbvm.cli.running.demo import modbus_server  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
+from fbvm.processor.processor import contract  # noqa: E402
 from fbvm.run import run  # noqa: E402
+from fbvm.units.etn21.inside import PROGRAM as ETN21_PROGRAM  # noqa: E402
 
 BENCH = Path(__file__).resolve().parent
 SERVER = Peer("192.168.250.1", 502)
@@ -97,6 +102,8 @@ class Blocks:
     """MTCP_ETN_Fn03 on a PLC: its exchanges, and its scans."""
 
     def __init__(self, stack: ExitStack, image: Image, port: int, engine: str, pace: str, cycle_ms: int) -> None:
+        if engine == "native":
+            native.optimise(image, contract(ETN21_PROGRAM).image)
         network = TcpNetwork({SERVER: ("127.0.0.1", port)})
         stack.callback(network.close)
         self.plc = Plc(image, cycle_ms * 1_000_000, engine=engine)

@@ -42,10 +42,15 @@ from typing import Any
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 sys.path.insert(0, str(HOUSE / "tests" / "interop"))
+sys.path.insert(0, str(HOUSE / "tests" / "bench"))
+
+import native  # noqa: E402
 
 from fbvm import Etn21, Noc, Peer, Plc, TcpNetwork, Tianxing, compile_text  # noqa: E402
 from fbvm.engine.native.scans import scans as native_scans  # noqa: E402
+from fbvm.processor.processor import contract  # noqa: E402
 from fbvm.run import run  # noqa: E402
+from fbvm.units.etn21.inside import PROGRAM as ETN21_PROGRAM  # noqa: E402
 
 BENCH = Path(__file__).resolve().parent
 ROUNDS, ROUND_MS, IN_TURN, AT_ONCE = 5, 400, 100, 8
@@ -71,6 +76,7 @@ def serve(name: str, is_measured: bool) -> None:
     make, text = PROGRAMS[name]
     compilation = compile_text(f"PROGRAM Main VAR {text}")
     assert compilation.image
+    native.optimise(compilation.image, contract(ETN21_PROGRAM).image)
     unit = make()
     network = TcpNetwork({Peer(unit.address, 502): ("127.0.0.1", 0)})
     used = dict.fromkeys((*PARTS, "scans", "all"), 0)
