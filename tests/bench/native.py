@@ -11,14 +11,15 @@ and words of state that C does not have.  A build that can be stopped costs a lo
 LLVM sees less far across them.
 
 The figure of logic is that of one process.  On an AMD of family 26 it is 0.7 in half of all processes; in the others some
-0.2 to 1 are added, since the processor guesses wrong which loads have to wait for stores that are still under way.  It keeps its
-guesses by the physical addresses of instructions, so that loads in different pages of code share one as the pages happen to lie.
-Of 60 placements of one image's code in one process 55 % took 87 to 94 ns, the others up to 210.  A placement keeps its figure at
-other virtual addresses; code of loads alone or of stores alone has no bad ones.  Where a scan takes 150 in place of 90 ns, more
-than half of it falls on four instructions that read a BOOL which no store under way touches.  PID, CRC and Fn03, whose code is in
-one page, are within 3 % everywhere.  What was tried without success: huge pages (below a virtual machine the host gives each
-page a place of its own), less inlining, fewer charges, no vectors, more loads and fewer spilled registers, by which no placement
-is good.  So limits.py measures new processes, and their median counts."""
+0.2 to 1 are added, as it seems because the processor guesses wrong which loads have to wait for stores that are still under
+way, and keeps its guesses by the physical addresses of instructions, so that loads in different pages of code share one as
+the pages happen to lie.  Of 60 placements of one image's code in one process 55 % took 87 to 94 ns, the others up to 210.  A
+placement keeps its figure at other virtual addresses; code of loads alone or of stores alone has no bad ones.  Where a scan
+takes 150 in place of 90 ns, more than half of it falls on four instructions that read a BOOL which no store under way
+touches.  PID, CRC and Fn03, whose code is in one page, are within 3 % everywhere.  What was tried without success: huge
+pages (below a virtual machine the host gives each page a place of its own), less inlining, fewer charges, no vectors, more
+loads and fewer spilled registers, by which no placement is good.  So limits.py measures new processes, and their median
+counts."""
 
 from __future__ import annotations
 
