@@ -68,6 +68,7 @@ def test_lines_and_columns_are_counted_as_the_client_does(client: dict[str, obje
     assert found.place(Site("pump.st", "Main", 1, 1)) == {"line": first, "column": first}
     assert found.locations("pump.st", 2, 2) == [{"line": 1 + first, "column": column + first} for column in (4, 15)]
     assert found.locations("pump.st", 3, 9) == [{"line": 2 + first, "column": first}] and found.locations("x.st", 1, 9) == []
+    assert [found.line_text("lib/T.st", line) for line in (0, 1, 2)] == ["", "q := 1;", ""]
     assert found.lines("pump.st", 0, 1) == [(1, "PROGRAM Main")] and found.lines("x.st", 1, 9) == []
     assert found.lines("pump.st", 4, 9) == [(4, "END_PROGRAM"), (5, "")]
     assert [found.line_text("pump.st", line) for line in (0, 1, 5, 6)] == ["", "PROGRAM Main", "", ""]
