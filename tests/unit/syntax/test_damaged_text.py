@@ -69,7 +69,8 @@ def test_what_is_said_of_a_damaged_text(how: str) -> None:
 
 
 MISTAKES = [text for text, *_ in ONE_ERROR] + [
-    "x := a SHL 2", "x := 2 DIV", "x := a NAND b", "x := SQRT a", "x := 1,5", "x := FLOAT(a)", "x := INT a", "x = = 2",
+    "(a : INT", "(a : INT)", "(a : INT) : BOOL", "x := a SHL 2", "x := 2 DIV", "x := a NAND b", "x := SQRT a",
+    "x := 1,5", "x := FLOAT(a)", "x := INT a", "x = = 2",
     "x :=", "IF a", "IF a THEN",
     "FOR i := 1 TO", "CASE a OF 1", "f(a :=", "x := a[", "x := (", "VAR a :", "VAR a : ARRAY [", "VAR a : STRING[",
     "VAR a AT", "x := b#2",

@@ -115,3 +115,15 @@ def read(text: str) -> str:
     rungs = read_rungs(text, 0, len(text), report)
     found = [" ".join((line.step.prefix + line.step.mnemonic, *line.step.operands)) for rung in rungs for line in rung.lines]
     return " | ".join(wrong) or ", ".join(found)
+
+
+@pytest.mark.slow
+def test_how_far_from_its_contact_an_operand_may_stand() -> None:
+    """Of one, of two words that belong to a comparison, and of one that stands in the row above that."""
+    lines = []
+    for text, contact in (("a", "┤ ├"), ("D0 #5", "┤=├"), ("n", "┤P├")):
+        for shift in range(26 - len(text)):
+            above = ("│" + " " * shift + text).ljust(31) + "b   │"
+            rung = f"{above}\n├────────{contact}──────────────────( )──┤\n"
+            lines.append(f"{shift} {text}: {read(rung)}")
+    check("operands.txt", lines)
