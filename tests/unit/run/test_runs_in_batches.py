@@ -12,7 +12,7 @@ from rows import each_of
 
 from fbvm.base.areas import NEVER
 from fbvm.machine.plc import Plc
-from fbvm.run import run_all, running
+from fbvm.run import loop, run_all, running
 from fbvm.run.plant import Plant
 from fbvm.run.project import Project, read_project
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
@@ -41,6 +41,17 @@ def test_a_run_is_scanned_with_others_if_nothing_is_wanted_behind_its_next_scans
         assert (entered.run, entered.place, entered.behind_ns) == (run, place, 1000 * MS)
         last_ns = settings.get("for_ns", entered.until_ns - 990 * MS) - 10 * MS
         assert entered.until_ns == last_ns + 1000 * MS, "behind its last scan it looks whether it has ended"
+
+
+@pytest.mark.parametrize(("resumed", "due_ns"), [(True, [20 * MS, 50 * MS]), (False, [50 * MS, 50 * MS])])
+def test_runs_that_go_on_begin_where_each_plc_stands_and_others_where_the_latest_does(resumed: bool, due_ns: list[int]) -> None:
+    runs = []
+    for scans in (2, 5):
+        plc = Plc(counter_image())
+        plc.run(scans=scans)
+        runs.append(Running(plc, scans=9, pace=EVENT))
+    loop._begin_in_virtual_time(runs, resumed, False)
+    assert [run.due_ns for run in runs] == due_ns and {(run.pace, run.alone) for run in runs} == {(CYCLIC, False)}
 
 
 @pytest.mark.slow
