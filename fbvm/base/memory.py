@@ -15,11 +15,21 @@ from fbvm.base.host import anonymous_memory
 
 WHOLE_BYTES = 255
 """Bit number of a value that fills bytes."""
+OBJECT_SHIFT, OFFSET_SHIFT, OFFSET_MASK, BIT_MASK = 40, 8, (1 << 32) - 1, 255
+"""Where the parts of a reference lie in its 64 bits."""
+BUFFER_OBJECT = 1
+"""The object that the whole buffer is."""
 FORMATS = {"b": "?", "i8": "b", "u8": "B", "i16": "h", "u16": "H", "i32": "i", "u32": "I", "i64": "q", "u64": "Q",
            "f32": "f", "f64": "d", "ref": "Q"}
 """Machine types and the letters by which `struct` and memoryview know them."""
 STRUCTS = {machine: struct.Struct("<" + letter) for machine, letter in FORMATS.items()}
 _ZERO_PAGE = bytes(PAGE_BYTES)
+
+
+def reference_to_byte(number: int) -> int:
+    """The reference to the byte of that number in the buffer; one so far from NULL where no program has a variable."""
+    whole = BUFFER_OBJECT << OBJECT_SHIFT | WHOLE_BYTES if number >= PAGE_BYTES else 0
+    return number << OFFSET_SHIFT | whole
 
 
 @dataclass(frozen=True, eq=False)

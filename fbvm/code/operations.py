@@ -33,6 +33,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from fbvm.base.arithmetic import limits as limits
+from fbvm.base.memory import BIT_MASK as BIT_MASK
+from fbvm.base.memory import BUFFER_OBJECT as BUFFER_OBJECT
+from fbvm.base.memory import OBJECT_SHIFT as OBJECT_SHIFT
+from fbvm.base.memory import OFFSET_MASK as OFFSET_MASK
+from fbvm.base.memory import OFFSET_SHIFT as OFFSET_SHIFT
 from fbvm.base.memory import WHOLE_BYTES as WHOLE_BYTES
 
 Node = tuple[Any, ...]
@@ -44,10 +49,8 @@ INTEGERS = ("i8", "i16", "i32", "i64", "u8", "u16", "u32", "u64")
 FLOATS = ("f32", "f64")
 TEXT_UNITS = {"s8": 1, "s16": 2}
 """Bytes of a character of each form of text; constants are `bytes`, and for s16 a `str` of UTF-16 units."""
-OBJECT_SHIFT, OFFSET_SHIFT, OFFSET_MASK, BIT_MASK = 40, 8, (1 << 32) - 1, 255
-"""Where the parts of a reference lie in its 64 bits."""
-BUFFER_OBJECT, FIRST_OBJECT, LEASED = 1, 2, 1 << 23
-"""Numbers of objects: the whole buffer, the first row of the extents, the first lease."""
+FIRST_OBJECT, LEASED = 2, 1 << 23
+"""Numbers of objects behind that of the whole buffer: the first row of the extents, the first lease."""
 LEASE_BYTES = 16
 """A lease in the buffer: offset of the first byte and of the first behind, the number under which it is held now (0:
 it has ended), how often it was given; 32 bits each."""

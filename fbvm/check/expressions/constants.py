@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fbvm.base import arithmetic
-from fbvm.base.memory import STRUCTS
+from fbvm.base.memory import STRUCTS, reference_to_byte
 from fbvm.base.strings import packed
 from fbvm.base.types import BOOL, DAY_NS, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
 from fbvm.base.types import base as base_of
@@ -26,7 +26,7 @@ def encode(kind: Type, value: Value) -> bytes:
     if form == "f32" and isinstance(value, float | int):
         return STRUCTS[form].pack(arithmetic.single(float(value)))
     if form == "ref":
-        return bytes(8)  # 0, CODESYS's NULL
+        return STRUCTS[form].pack(reference_to_byte(int(value)))  # CODESYS: 0 is NULL, other numbers are addresses
     return STRUCTS[form].pack(value)
 
 

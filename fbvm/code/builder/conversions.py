@@ -44,12 +44,12 @@ def _byte_number(reference: Node, form: str) -> Node:
 
 
 def _at_byte(emitter: Emitter, number: Node, form: str) -> Node:
-    """The pointer to the byte of that number in the buffer; NULL for 0 and for what no program has a variable in."""
+    """What `reference_to_byte` makes of a number that the program computes."""
     at = emitter.to_temporary(("convert", "u64", form, number))
-    whole = BUFFER_OBJECT << OBJECT_SHIFT | WHOLE_BYTES
-    made = ("or", "u64", ("mul", "u64", at, ("const", "u64", 1 << OFFSET_SHIFT)), ("const", "u64", whole))
+    whole = ("const", "u64", BUFFER_OBJECT << OBJECT_SHIFT | WHOLE_BYTES)
     is_outside = ("lt", "b", "u64", at, ("const", "u64", PAGE_BYTES))
-    return ("bits", "ref", "u64", ("select", "u64", is_outside, made, ("const", "u64", 0)))
+    place = ("mul", "u64", at, ("const", "u64", 1 << OFFSET_SHIFT))
+    return ("bits", "ref", "u64", ("or", "u64", place, ("select", "u64", is_outside, whole, ("const", "u64", 0))))
 
 
 def to_float(node: Node, kind: Type, form: str) -> Node:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from fbvm.base.memory import reference_to_byte
 from fbvm.base.types import BOOL, UDINT, RefType, StructType, Type, base, machine
 from fbvm.check.checker import Checker
 from fbvm.check.declarations.interfaces import OBJECTS_AT
@@ -106,6 +107,8 @@ class BodyContext(Emitter):
             form = machine(target)
             if form in FLOATS or form == "b" or form in TEXT_UNITS:
                 known = convert_constant(known, target)
+            elif form == "ref":
+                known = reference_to_byte(int(known))
             return constant(target, known)
         if want is None or want is kind:
             return self.cut_if_deep(self._values[type(expr)](self, expr))
