@@ -92,8 +92,9 @@ def comments(text: str) -> list[str]:
     return ["\n".join(line.strip() for line in comment.text.split("\n")) for _, comment in ordered]
 
 
-SPELLINGS = ("spaced_durations", "bits_by_name", "doubled_quotes")
-"""Forms that the canonical form does not have: `T# 5s` becomes `T#5s`, `w.%Xk` becomes `w.k`, '''' becomes '$''."""
+SPELLINGS = ("spaced_durations", "bits_by_name", "doubled_quotes", "glued_words")
+"""Forms that the canonical form does not have: `T# 5s` becomes `T#5s`, `w.%Xk` becomes `w.k`, '''' becomes '$'', `-1DO` becomes
+`-1 DO`."""
 
 
 def meaning(value: Any) -> Any:

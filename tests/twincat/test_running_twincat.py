@@ -95,7 +95,7 @@ def test_an_object_is_exported_with_its_methods_of_which_others_are_warned(tmp_p
         done = CliRunner().invoke(main, ["export", str(file), "-o", str(out)])
         assert (done.exit_code, warned in done.output) == (0, is_object), done.output
         written = out.read_text(encoding="utf-8")
-        assert '<pou name="FB_Counter"' in written and ('<Method name="Reset">' in written) == is_object
+        assert '<pou name="FB_Counter"' in written and ('<Method name="Reset" ' in written) == is_object
 
 
 def test_what_the_system_calls_before_the_first_cycle_is_not_warned_of() -> None:
