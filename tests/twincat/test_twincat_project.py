@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,14 @@ def test_without_a_solution_around_it_a_project_has_no_neighbours(tmp_path: Path
     line = write_solution(tmp_path)
     (tmp_path / "All.sln").unlink()
     assert not any("FB_Axis" in name for name in given_sources([line]))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a right under Windows")
+def test_a_neighbour_whose_file_is_gone_is_passed_over(tmp_path: Path) -> None:
+    line = write_solution(tmp_path)
+    (tmp_path / "Away").mkdir()
+    (tmp_path / "Away" / "Away.plcproj").symlink_to(tmp_path / "nowhere.plcproj")
+    assert sum("FB_Axis" in name for name in given_sources([line])) == 1
 
 
 SYSTEM = """<?xml version="1.0"?>

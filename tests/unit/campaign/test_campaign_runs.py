@@ -344,6 +344,19 @@ def test_what_of_a_campaign_file_does_not_fit_its_program_is_said_with_the_file(
 
 
 @pytest.mark.slow
+def test_a_golden_file_is_written_and_the_next_run_is_compared_with_it(folder: Path) -> None:
+    (folder / "mixed.toml").write_text(
+        '[campaign]\nsources = ["mix.st"]\nfor = "500ms"\n[[golden]]\nfile = "mix.txt"\nnames = ["Main.Count", "Main.Up"]\n')
+    assert fbvm("mixed.toml", "--write-golden") == (0, "mix.txt is written\n")
+    golden = (folder / "mix.txt").read_text()
+    assert [line.split()[-1] for line in golden.splitlines() if "scan" in line][1:] == ["0", "1", "2", "3", "4", "FALSE", "TRUE"]
+    assert fbvm("mixed.toml")[0] == 0
+    (folder / "mix.txt").write_text(golden.replace("TRUE", "FALSE"))
+    status, text = fbvm("mixed.toml", "--fresh")
+    assert (status, "mix.txt: Main.Up" in text) == (1, True), text
+
+
+@pytest.mark.slow
 def test_parameters_that_json_cannot_write_are_texts_there(folder: Path) -> None:
     (folder / "real.st").write_text("PROGRAM Main\nVAR r : REAL; b : BOOL; END_VAR\nb := r > 1.0;\nEND_PROGRAM\n")
     status, said = fbvm("real.st", "--vary", "Main.r=0.5,inf", "--for", "100ms", "--never", "Main.b", "--json")

@@ -12,6 +12,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -190,6 +191,23 @@ def test_large_modules_have_a_helper_process_of_their_own(monkeypatch: pytest.Mo
     first, second, third, last = used
     assert second is third and len({first, second, last}) == 3
     assert [process.args[-1].endswith("True)") for process in used if process] == [False, True, True, False]  # type: ignore[union-attr]
+
+
+def test_a_helper_process_is_begun_anew_where_the_last_one_has_ended_or_is_anothers(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[SimpleNamespace] = []
+
+    def begin(*command: object, **pipes: object) -> SimpleNamespace:
+        begun.append(SimpleNamespace(poll=lambda: begun[-1].status, status=None))
+        return begun[-1]
+
+    monkeypatch.setattr("fbvm.engine.native.llvm.worker.subprocess.Popen", begin)
+    monkeypatch.setattr("atexit.register", lambda stop: None)
+    helper = type(worker)()
+    assert helper._started() is helper._started() is begun[0]
+    begun[0].status = -9
+    assert helper._started() is begun[1]
+    helper._owner = -1  # as behind a fork
+    assert helper._started() is begun[2] and len(begun) == 3
 
 
 def test_a_module_declares_what_it_calls_and_nothing_else() -> None:

@@ -109,6 +109,18 @@ def test_scans_in_front_of_a_failure_are_recorded_too(scan: int, before: int) ->
         scan, 4711, "scans", "scans", None)
 
 
+def test_scans_with_failures_are_shown_again_behind_a_run() -> None:
+    test, shown = SuiteTestResult(True, True, False, 1, 0.0, []), []
+    plc = SimpleNamespace(elapsed_ns=results.LIMIT_NS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "_plc", lambda image: plc)
+        patch.setattr(results, "_results", lambda plc, path: [("adds", test)])
+        patch.setattr(results, "_FailedIn", lambda plc, suites: SimpleNamespace(scans={("Main.suite", 1): 7, ("gone", 1): 8}))
+        patch.setattr(results, "_show_again", lambda image, failed: shown.extend(failed))
+        made = results.run_suites(cast(Any, SimpleNamespace(bodies=[])), ["Main.suite"])
+    assert shown == [(7, test)] and made.results == {("Main.suite", "adds"): test} and not made.is_over
+
+
 def test_so_many_scans_are_shown_again_and_no_more() -> None:
     done: list[str] = []
     failed = [(scan, SuiteTestResult(True, True, False, 1, 0.0, [])) for scan in range(30, 0, -1)]

@@ -88,6 +88,8 @@ def test_values_know_what_they_are() -> None:
     made = read("TON", {"IN": True, "PT": 5_000_000})
     assert (list(made), repr(made["PT"])) == (["IN", "PT"], "T#5ms")
     assert type(read("REAL", 1.0)) is float
+    kind = cast(Any, Rig.of("Main", text="PROGRAM Main VAR x : TON; END_VAR END_PROGRAM").find("x")).type
+    assert for_writing(kind, {"PT": "5ms", "Unknown": "5ms"}, "x") == {"PT": 5_000_000, "Unknown": "5ms"}
 
 
 @each_of("kind, value, given", [
