@@ -50,7 +50,13 @@ def test_a_client_that_says_nothing_is_left_when_somebody_says_so() -> None:
     def never() -> bytes:
         raise OSError  # the connection fails, and nothing more comes
 
-    assert serve_until_ended(refuse, lambda: asked("initialize"), keep, lambda: True) == ("", False)
+    left = threading.Event()
+
+    def silent() -> bytes:
+        return b"" if left.wait(10) else asked("disconnect", terminateDebuggee=True)
+
+    assert serve_until_ended(refuse, silent, keep, lambda: True) == ("", False)
+    left.set()
     assert serve_until_ended(refuse, never, keep, meanwhile) == ("", False)
 
 
