@@ -94,6 +94,7 @@ def serve(name: str, is_measured: bool) -> None:
             for method in methods:
                 if hasattr(owner, method):
                     setattr(owner, method, timed(getattr(owner, method), used, part))
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background of a shell ignores it
     signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     signal.signal(signal.SIGUSR1, lambda *_: used.update(dict.fromkeys(PARTS, 0), scans=plc.scans, all=time.process_time_ns()))
     print(network.host_endpoint(Peer(unit.address, 502)).port, flush=True)
