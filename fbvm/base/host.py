@@ -199,6 +199,12 @@ def deaf_children() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+def handle_from_now_on(numbers: Iterable[signal.Signals], handle: Handle) -> None:
+    """Has `handle` called for some signals until the process ends."""
+    for number in numbers:
+        signal.signal(number, handle)
+
+
 def ignore(numbers: Iterable[signal.Signals]) -> None:
     """Lets some signals have no effect from now on, while the process ends."""
     for number in numbers:

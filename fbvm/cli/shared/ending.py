@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
 from typing import NoReturn, Protocol
 
-from fbvm.base.host import ending_signals, handling, ignore, interrupt
+from fbvm.base.host import ending_signals, handle_from_now_on, handling, ignore, interrupt
 
 AGAIN_S = 0.01
 """After this time Ctrl-C comes again that Python could not let through."""
@@ -55,11 +55,16 @@ def _pass_on(number: int, frame: FrameType | None) -> None:
     signal.raise_signal(signal.SIGINT)
 
 
+def _left_alone() -> list[signal.Signals]:
+    """The signals that ask for the end and that nobody handles or ignores yet."""
+    return [number for number in ending_signals() if signal.getsignal(number) is signal.SIG_DFL]
+
+
 @contextmanager
 def heard() -> Iterator[None]:
     """Passes the signals on that ask for the end, inside the `with` block.  One that is ignored, as by nohup, stays so."""
     global _asked
-    numbers = [number for number in ending_signals() if signal.getsignal(number) is signal.SIG_DFL]
+    numbers = _left_alone()
     try:
         with handling(numbers, _pass_on):
             yield
@@ -102,28 +107,27 @@ def run_process(verb: Callable[[], object]) -> NoReturn:
 
     sys.unraisablehook = unraisable
     try:
-        with heard():
-            try:
-                verb()
-            except KeyboardInterrupt:
-                sys.stderr.write(f"{sentence()}\n")
-                _exit_now(exit_status())
-            except SystemExit as end:
-                if end.code == exit_status():
-                    _exit_now(exit_status())
-                raise
+        handle_from_now_on(_left_alone(), _pass_on)  # a signal may come at once, so inside of the `try`
+        verb()
+    except KeyboardInterrupt:
+        _exit_now(f"{sentence()}\n")
+    except SystemExit as end:
+        if end.code == exit_status():
+            _exit_now()
+        raise
     finally:
         ignore((signal.SIGINT, *ending_signals()))
     sys.exit()
 
 
-def _exit_now(code: int) -> NoReturn:
-    """Ends the process with this status.
+def _exit_now(said: str = "") -> NoReturn:
+    """Ends the process with the status of the signal, after these words.
 
     An ordinary end would be one by SIGINT if the KeyboardInterrupt has passed through an `exec`, whoever has caught it."""
     ignore((signal.SIGINT, *ending_signals()))
+    sys.stderr.write(said)
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()
-    os._exit(code)
+    os._exit(exit_status())

@@ -6,6 +6,7 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -17,13 +18,15 @@ from rows import each_of
 from fbvm.cli.editors import lsp
 from fbvm.cli.shared import ending
 
+needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM to react to")
+
 
 class Ended(BaseException):
     """Stands in for the end of the process."""
 
 
 @pytest.fixture
-def exits(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+def exits(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     done: list[Any] = []
 
     def leave(code: int) -> None:
@@ -35,7 +38,10 @@ def exits(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     monkeypatch.setattr(ending.atexit, "_run_exitfuncs", lambda: done.append("at exit"), raising=False)
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
     monkeypatch.setattr(ending, "_is_process", False)
-    return done
+    before = {number: signal.getsignal(number) for number in ending.ending_signals()}
+    yield done
+    for number, handle in before.items():
+        signal.signal(number, handle)
 
 
 @each_of("error, done, said", [
@@ -51,6 +57,24 @@ def test_a_process_that_was_interrupted_ends_with_its_status(error: BaseExceptio
     with pytest.raises(Ended):
         ending.run_process(verb)
     assert exits == done and capsys.readouterr().err == said and ending._is_process
+
+
+@needs_signals
+def test_a_process_that_is_asked_to_end_before_it_has_begun_says_so(exits: list[Any], monkeypatch: pytest.MonkeyPatch,
+                                                                    capsys: pytest.CaptureFixture[str]) -> None:  # fmt: skip
+    handle = signal.signal
+
+    def answered_at_once(number: signal.Signals, call: Any) -> Any:
+        before = handle(number, call)
+        signal.raise_signal(number)
+        return before
+
+    monkeypatch.setattr(signal, "signal", answered_at_once)
+    monkeypatch.setattr(ending, "_asked", signal.SIGINT)
+    with pytest.raises(Ended):
+        ending.run_process(lambda: exits.append("begun"))
+    monkeypatch.undo()
+    assert exits == ["ignored", "at exit", 143, "ignored"] and capsys.readouterr().err == "terminated\n"
 
 
 @each_of("error, code", [(None, None), (SystemExit(3), 3), (SystemExit(0), 0)])
