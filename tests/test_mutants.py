@@ -25,6 +25,7 @@ def load() -> Any:
 
 
 m = load()
+import forked  # noqa: E402
 from reached import Reached  # noqa: E402
 
 PYTHON = '''"""Text with 1 < 2."""
@@ -147,9 +148,11 @@ def test_a_mutant_within_functions_is_tried_in_a_fork(tmp_path: Path) -> None:
         "def test_outer():\n    assert (KEPT(), made.outer()()) == (2, 2)\n\n"
         "@pytest.mark.slow\ndef test_get():\n    assert made.Made().get() == 4\n", encoding="utf-8")
 
+    tests = ["tests/unit/wire/test_made.py"]
+
     def found(number: int, marks: str) -> bool:
         at = text.index(f" {number}\n") + 1
-        return bool(copy.finds_in_fork(m.Mutant(path, at, at + 1, "0"), ["tests/unit/wire/test_made.py"], marks, 20))
+        return bool(copy.finds_in_fork(m.Mutant(path, at, at + 1, "0"), tests, marks, 20))
 
     try:
         assert found(2, "not slow") and not found(4, "not slow") and found(4, "slow") and not found(5, "slow")
@@ -217,3 +220,42 @@ def test_tests_of_other_rooms_that_execute_the_statement_are_tried(tmp_path: Pat
     assert reached.among([f"{other}::test_two"], [missed, other]) == [missed, f"{other}::test_two"], "it was not measured"
     (copy.folder / other).write_text(looks.replace("== 2", "> 0"), encoding="utf-8")
     assert reached.elsewhere([f"{other}::test_two"], []) == reached.among([f"{other}::test_two"], [other]) == [other]
+
+
+def test_tests_of_the_own_folder_come_first_and_then_those_that_execute_few_lines(tmp_path: Path) -> None:
+    """Of each folder: what executes few lines takes little time.  What changed since then is tried as a whole file."""
+    own = [f"tests/unit/record/test_{name}.py" for name in "ab"]
+    files = [*own, "tests/unit/cli/test_c.py"]
+    for folder in ("then", "now"):
+        for file in [*files, "fbvm/x.py"]:
+            (tmp_path / folder / file).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / folder / file).write_text("a = 1\nb = 2\nc = 3\n", encoding="utf-8")
+    data = coverage.CoverageData(str(tmp_path / "map"))
+    for test, lines in {f"{files[0]}::big": [1, 2, 3], f"{files[1]}::small": [1, 2], f"{files[2]}::smallest": [2],
+                        f"{files[2]}::other": [1, 2, 3]}.items():  # fmt: skip
+        data.set_context(f"{test}|run")
+        data.add_lines({str(tmp_path / "then" / "fbvm" / "x.py"): lines})
+    data.write()
+    reached = Reached(tmp_path / "map", tmp_path / "now")
+    reaching = reached.tests(Path("fbvm/x.py"), "a = 1\nb = 2\nc = 3\n", 6)
+    big, small, other, smallest = f"{files[0]}::big", f"{files[1]}::small", f"{files[2]}::other", f"{files[2]}::smallest"
+    assert reached.among(reaching, files) == [small, big, smallest, other]
+    assert reached.elsewhere(reaching, own) == [smallest, other]
+    (tmp_path / "now" / files[2]).write_text("", encoding="utf-8")
+    assert reached.among(reaching, files) == [files[2], small, big]
+
+
+def test_of_named_tests_so_many_are_tried_and_files_are_tried_whole() -> None:
+    class Item:
+        def __init__(self, nodeid: str, is_slow: bool = False) -> None:
+            self.nodeid, self.is_slow = nodeid, is_slow
+
+        def get_closest_marker(self, name: str) -> object:
+            return object() if self.is_slow else None
+
+    items: list[Any] = [Item("a.py::one"), Item("b.py::one"), Item("b.py::two"), Item("b.py::three", True), Item("c.py::one"),
+                        Item("c.py::two")]  # fmt: skip
+    tests = ["c.py", "b.py::three", "b.py::two", "b.py::one", "a.py::one"]
+    quick = [item.nodeid for item in forked._chosen(items, tests, False, 2)]
+    assert quick == ["c.py::one", "c.py::two", "b.py::two", "b.py::one"]
+    assert [item.nodeid for item in forked._chosen(items, tests, True, 2)] == ["b.py::three"]

@@ -43,12 +43,15 @@ class Forked:
         self._socket, self._answers = own, own.makefile(encoding="utf-8")
         self._answer()  # all sources have been imported
 
-    def failure(self, path: Path, then: str, now: str, tests: list[str], marks: str, limit_s: int) -> str | None:
-        """Which of the tests fails first if a source has another text, or None if all pass; "" if it took too long.
+    def failure(self, path: Path, then: str, now: str, tests: list[str], marks: str, most: int,
+                limit_s: int) -> str | None:  # fmt: skip
+        """Which of the tests, of those with a name `most` with these marks, fails first if a source has another text.
+
+        None if all pass; "" if it took too long.
 
         Raises NotImplementedError for a change outside of functions, and RuntimeError if the session has ended."""
         question = {"path": path.as_posix(), "then": then, "now": now, "tests": tests, "slow": marks == "slow",
-                    "limit_s": limit_s}  # fmt: skip
+                    "most": most, "limit_s": limit_s}  # fmt: skip
         self._socket.sendall((json.dumps(question) + "\n").encode())
         found = self._answer()
         if not found["is_within_functions"]:
@@ -113,7 +116,7 @@ def _answer(items: list[pytest.Item], functions: dict[Key, list[types.FunctionTy
     changed = list(_changed(*(compile(question[name], file, "exec", dont_inherit=True) for name in ("then", "now"))))
     if any(new is None for _, new in changed):
         return {"is_within_functions": False, "failed": ""}
-    chosen = list(_chosen(items, question["tests"], question["slow"]))
+    chosen = _chosen(items, question["tests"], question["slow"], question["most"])
     return {"is_within_functions": True, "failed": _in_fork(chosen, changed, functions, question["limit_s"])}
 
 
@@ -139,11 +142,13 @@ def _own(code: types.CodeType) -> tuple[object, ...]:
     return code.co_code, constants, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
 
 
-def _chosen(items: list[pytest.Item], tests: list[str], slow: bool) -> Iterator[pytest.Item]:
+def _chosen(items: list[pytest.Item], tests: list[str], slow: bool, most: int) -> list[pytest.Item]:
     order = {test: number for number, test in enumerate(tests)}
     ranked = [(rank, item) for item in items if (item.get_closest_marker("slow") is not None) == slow
               and (rank := order.get(item.nodeid, order.get(item.nodeid.partition("::")[0]))) is not None]
-    return (item for _, item in sorted(ranked, key=lambda one: one[0]))
+    chosen = [item for _, item in sorted(ranked, key=lambda one: one[0])]
+    left_out = {item.nodeid for item in [item for item in chosen if item.nodeid in order][most:]}
+    return [item for item in chosen if item.nodeid not in left_out]
 
 
 def _in_fork(items: list[pytest.Item], changed: list[Change], functions: dict[Key, list[types.FunctionType]],

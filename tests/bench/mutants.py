@@ -1,6 +1,6 @@
 """Breaks fbvm in small ways and counts how many of them the tests find.  It gates nothing.
 
-    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--quick] [--reach FILE] [--fork]
+    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T] [--quick] [--reach FILE] [--limit N] [--fork]
 
 ROOM is a folder or file of `fbvm/` or `fblib/`: `check`, `units/etn21`, `omron/mtcp_etn`, `record/draw/why.py`.  A mutant is
 one edit of one file: another relation, AND for OR, a constant plus one, a condition negated, a statement removed, None for a
@@ -10,8 +10,9 @@ given.  The last line counts both, and a mutant that no test finds is printed as
 
 Which tests of the whole suite execute a line is known with `--reach FILE`, the `.coverage` of a run (with `pip install
 pytest-cov`) of `pytest -n auto --cov=fbvm --cov-context=test --cov-report= -W ignore`: then only those of the room's tests run
-that execute the changed statement, and a mutant that they do not find is tried with those of other rooms.  The sources of that
-run stay where they were: what was changed since is told by comparing.
+that execute the changed statement, first those of the room's own folder, and of each folder those that execute the fewest lines,
+`--limit` of them at most; a mutant that they do not find is tried with those of other rooms.  The sources of that run stay where
+they were: what was changed since is told by comparing.
 
 With `--fork` a mutant within functions is first tried in forks of one session of pytest that has collected all tests, which takes
 a fraction of a second; only what is not found there is tried in new processes (forked.py; POSIX).
@@ -90,6 +91,8 @@ STAGES = {"quick": ("not slow", 60), "slow": ("slow", 200)}
 processor time a process of theirs may take: a mutant that takes longer runs for ever, and is found."""
 ELSEWHERE = "others'"
 """The stage of the tests of other rooms that execute the changed statement."""
+MOST = 400
+"""So many tests that execute the changed statement are tried at a time, unless `--limit` says it."""
 DISTURBED = 3
 """So many tests that fail without the mutant, too, are left out; with more of them, nothing is found."""
 NO_TEST = 5
@@ -233,7 +236,8 @@ def files_of(room: str, house: Path = HOUSE) -> list[Path]:
 
 
 def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
-    """The test files for a source file, in the order in which they run: first those that name the file, by folder."""
+    """The test files for a source file, in the order in which they run: first those of the room's own folder, and of
+    each folder those that name the file."""
     room = path.parts[0] if path.parts[0] == "fblib" else path.parts[1].removesuffix(".py")
     parts = ["/".join(path.parts[1:count]) for count in range(3, len(path.parts) + 1)]
     files: list[Path] = []
@@ -241,15 +245,17 @@ def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
     for name in dict.fromkeys([*TESTS.get(room, (f"tests/unit/{room}",)), *of_parts]):
         place = house / name
         files += [place] if place.is_file() else sorted(place.rglob("test_*.py"))
-    files.sort(key=lambda file: re.search(rf"\b{path.stem}\b", file.read_text(encoding="utf-8")) is None)
+    own = files[0].parent if files else house
+    files.sort(key=lambda file: (file.parent != own, re.search(rf"\b{path.stem}\b", file.read_text(encoding="utf-8")) is None))
     return [file.relative_to(house).as_posix() for file in files]
 
 
 class Copy:
     """A copy of the repository in which the tests run; the repository itself is only read."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, most: int = MOST) -> None:
         self.folder = folder / "fbvm"
+        self._most = most
         self._environment = {**os.environ, "PYTHONPATH": str(self.folder), "XDG_CACHE_HOME": str(folder / "cache")}
         self._forked: Forked | None = None
         for name in COPIED:
@@ -263,7 +269,8 @@ class Copy:
 
         "" if it is not known, as after `limit_s` seconds of processor time."""
         chosen, said = self.folder.parent / "tests.txt", self.folder.parent / "said.txt"
-        chosen.write_text("\n".join(tests), encoding="utf-8")
+        left_out = set([test for test in tests if "::" in test][self._most :])
+        chosen.write_text("\n".join(test for test in tests if test not in left_out), encoding="utf-8")
         # `ulimit -t` holds for every process that a test starts, also for one in a session of its own, out of killpg's reach.
         pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-rfE", "--tb=no", "-p", "no:cacheprovider", "-m", marks,
                   *(word for test in without for word in ("--deselect", test)), f"@{chosen}"]  # fmt: skip
@@ -289,11 +296,11 @@ class Copy:
         text = file.read_text(encoding="utf-8")
         try:
             _write(file, mutant.apply(text))  # for the processes that tests start
-            failed = self._forked.failure(mutant.path, text, mutant.apply(text), tests, marks, limit_s)
+            failed = self._forked.failure(mutant.path, text, mutant.apply(text), tests, marks, self._most, limit_s)
         finally:
             _write(file, text)
         again = [failed] if failed else tests
-        return failed is not None and self._forked.failure(mutant.path, text, text, again, marks, limit_s) is None
+        return failed is not None and self._forked.failure(mutant.path, text, text, again, marks, self._most, limit_s) is None
 
     def close(self) -> None:
         """Ends the session of the forks."""
@@ -374,13 +381,14 @@ def main() -> int:
     options.add_argument("--quick", action="store_true", help="only the quick tests of the room")
     options.add_argument("--fork", action="store_true", help="try forks of one session of pytest first")
     options.add_argument("--reach", metavar="FILE", type=Path, help="which tests execute which lines: a .coverage with contexts")
+    options.add_argument("--limit", metavar="N", type=int, default=MOST, help=f"with --reach: so many tests at a time ({MOST})")
     given = options.parse_args()
     begun = time.monotonic()
     texts = {path: (HOUSE / path).read_text(encoding="utf-8") for path in files_of(given.room)}
     found = [mutant for path, text in texts.items() for mutant in mutants(path, text)]
     chosen = random.Random(given.seed).sample(found, min(given.count, len(found)))
     with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(Path(folder))
+        copy = Copy(Path(folder), given.limit)
         reached = Reached(given.reach, copy.folder) if given.reach else None
         names = ["quick"] if given.quick else [*STAGES, ELSEWHERE] if reached else [*STAGES]
         ways = [copy.finds_in_fork, copy.finds] if given.fork else [copy.finds]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import difflib
+import sqlite3
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
-MOST = 400
-"""So many tests that execute a statement are tried, evenly chosen among all."""
 PACKAGE = "fbvm"
 
 
@@ -20,7 +21,8 @@ class Reached:
         self._data = CoverageData(str(file))
         self._data.read()
         self._house = house
-        self._known = {_file(context) for context in self._data.measured_contexts()}
+        self._sizes = _sizes(file)
+        self._known = {_file(test) for test in self._sizes}
         measured = next(Path(name) for name in self._data.measured_files() if f"/{PACKAGE}/" in name.replace("\\", "/"))
         self._root = next(folder.parent for folder in measured.parents if folder.name == PACKAGE)
 
@@ -36,18 +38,23 @@ class Reached:
 
     def among(self, reaching: list[str] | None, own: list[str]) -> list[str]:
         """Those tests of a room that execute the statement, and the whole files that were changed since or did not run; all if
-        none is known."""
+        none is known.  The tests of the folder of the first file come first."""
         if reaching is None:
             return own
         changed = [file for file in own if self._is_changed(file)]
-        order = {file: number for number, file in enumerate(own)}
-        known = [test for test in reaching if _file(test) in order and _file(test) not in changed]
-        return changed + sorted(_some(known), key=lambda test: order[_file(test)])
+        left = set(own) - set(changed)
+        known = self._small_first(test for test in reaching if _file(test) in left)
+        return changed + sorted(known, key=lambda test: _folder(test) != _folder(own[0]))
 
     def elsewhere(self, reaching: list[str] | None, own: list[str]) -> list[str]:
         """Those tests of other rooms that execute the statement; none if it is not known."""
         others = [test for test in reaching or () if _file(test) not in own and (self._house / _file(test)).is_file()]
-        return list(dict.fromkeys(_file(test) if self._is_changed(_file(test)) else test for test in _some(others)))
+        small = self._small_first(others)
+        return list(dict.fromkeys(_file(test) if self._is_changed(_file(test)) else test for test in small))
+
+    def _small_first(self, tests: Iterable[str]) -> list[str]:
+        """First the tests that execute few lines: they take little time, and say much about each line."""
+        return sorted(tests, key=lambda test: self._sizes[test])
 
     def _is_changed(self, file: str) -> bool:
         then = self._root / file
@@ -58,8 +65,19 @@ def _file(test: str) -> str:
     return test.partition("::")[0]
 
 
-def _some(tests: list[str]) -> list[str]:
-    return tests[:: -(-len(tests) // MOST)] if tests else []
+def _folder(test: str) -> str:
+    return _file(test).rpartition("/")[0]
+
+
+def _sizes(file: Path) -> Counter[str]:
+    """How many lines each test has executed; the API of coverage.py tells that of one file at a time."""
+    found = Counter[str]()
+    data = sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True)
+    for context, lines in data.execute("SELECT context, numbits FROM line_bits JOIN context ON context.id = context_id"):
+        if test := context.rpartition("|")[0]:
+            found[test] += int.from_bytes(lines, "little").bit_count()
+    data.close()
+    return found
 
 
 def _lines_then(then: str, now: str) -> dict[int, int]:
