@@ -78,7 +78,7 @@ def chart(
 
 
 def _moved(track: Track, before: dict[Signal, Value]) -> bool:
-    return len(track.changes) > 1 or any(value != before[track.signal] for _, value in track.changes)
+    return any(value != before[track.signal] for _, value in track.changes)
 
 
 def draw(

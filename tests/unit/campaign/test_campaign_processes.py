@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import signal
 import subprocess
 from collections.abc import Iterator
 from contextlib import suppress
@@ -15,6 +16,7 @@ from typing import Any, ClassVar
 import pytest
 from rows import each_of
 
+from fbvm.base.host import signals_held
 from fbvm.campaign import processes, shipped
 from fbvm.campaign.fleet import places, shard
 from fbvm.campaign.fleet.shard import BUILDING, FAILED, GO_ON, OVER, RUNNING, STOP, Figures, Shard
@@ -154,6 +156,18 @@ def test_a_process_is_killed_and_what_was_opened_for_it_closed() -> None:
     assert other.line is first
     other.end()
     assert log == ["kill", "wait", "line closed", "door"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX only")
+def test_a_process_can_be_ended_by_signals_although_it_was_started_while_they_were_held() -> None:
+    with signals_held(), Pool[int, set[int]](1, prepare, blocked) as pool:
+        assert list(pool.results([0], 60_000 * MS)) == [(0, set())]
+
+
+def blocked(number: int, task: int) -> set[int]:
+    """The signals that do not reach this process."""
+    return {int(each) for each in signal.pthread_sigmask(signal.SIG_BLOCK, [])}
 
 
 # --- beside the workers of a cluster ----------------------------------------------------------------------------------
