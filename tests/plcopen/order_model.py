@@ -9,8 +9,9 @@ a jump skips the networks up to its label, a return all that follow.  In the ord
 number, and nothing else counts.
 
 A contact lets power through while its variable is TRUE, a coil passes on what reaches it; a generator reads contacts anew for
-each output.  A box whose EN is FALSE is not executed, its ENO is FALSE, and an output variable at it is not written; its outputs
-stay as they are, but a function of a generator gives the first value of its type then, and its coils are written.
+each output.  A box whose EN is FALSE is not executed, its ENO is FALSE, and an output variable at it is not written (at
+its ENO: by a generator alone); its outputs stay as they are, but a function of a generator gives the first value of its type
+then, and its coils are written.
 """
 
 from __future__ import annotations
@@ -399,7 +400,7 @@ class Model:
         """Write the variable of a sink."""
         power, sources = self._at(node, ""), node.feeds[""]
         box = self.nodes[sources[0][0]]
-        if len(sources) == 1 and sources[0][1] != "ENO" and box.has_en and box.id in self.executed \
+        if len(sources) == 1 and (sources[0][1] != "ENO" or self.generates) and box.has_en and box.id in self.executed \
                 and not (node.kind == "coil" and self.generates) and not self.pins[box.id]["ENO"]:
             return
         if node.marks not in ("set", "reset"):

@@ -49,8 +49,9 @@ class Calls:
             self._function(item)
 
     def guard(self, pin: Pin) -> Value | None:
-        """The condition under which the value at a pin may be assigned; None if always."""
-        if len(pin.wires) != 1:
+        """The condition under which the value at a pin may be assigned; None if always.  A block behind a coil or a connector has
+        none (`GetUsedEno` of Beremiz)."""
+        if len(pin.wires) != 1 or [number for number, _, _ in pin.raw] != [pin.wires[0].source.id]:
             return None
         return self.guards.get((pin.wires[0].source, pin.wires[0].pin))
 
@@ -76,7 +77,7 @@ class Calls:
         for pin in item.outputs:
             wire = Wire(item, pin.name)
             if pin.name.upper() == "ENO":
-                context.set_output(wire, eno or TRUE)
+                self._set_eno(item, eno or TRUE, guards=enabled)
             else:
                 if eno and enabled:
                     self.guards[item, pin.name] = eno
@@ -224,9 +225,20 @@ class Calls:
             context.write(f"IF {eno} THEN {name} := {value.text}; END_IF;", frozenset((name.upper(),)))
             self.guards[item, wire.pin] = enabled
             context.set_output(wire, variable(name))
-            context.set_output(Wire(item, "ENO"), enabled)
+            self._set_eno(item, enabled, guards=True)
+        elif context.generates and context.uses[item, "ENO"]:
+            eno = scope.new(f"Enabled_{item.id}", "BOOL", context.apart)
+            context.write(f"{eno} := {condition.text};", frozenset((eno.upper(),)))
+            self._set_eno(item, variable(eno), guards=True)
         else:
             context.set_output(Wire(item, "ENO"), condition, keep=True)
+
+    def _set_eno(self, item: Object, eno: Value, guards: bool) -> None:
+        """Set the value at ENO.  With `guards` the block has an EN: a generator then writes a variable at ENO while ENO is TRUE,
+        as it does with those at other outputs."""
+        if guards and self.context.generates:
+            self.guards[item, "ENO"] = eno
+        self.context.set_output(Wire(item, "ENO"), eno)
 
     def _next_sink(self, item: Object, wire: Wire) -> Object | None:
         """The output variable of a result, if it is the only consumer and directly follows in the order of evaluation."""
@@ -303,6 +315,6 @@ class Calls:
             call = f"IF {enabled} THEN {call} END_IF;"
         context.write(call, writes)
         if eno:
-            context.set_output(Wire(item, "ENO"), eno)
+            self._set_eno(item, eno, guards=condition is not None)
         if wire is not None:
             context.set_output(wire, variable(target))
