@@ -130,8 +130,19 @@ def _operator(scope: Scope, call: tree.Call, name: str, kind: Elementary | Strin
               want: Type | None) -> Type | None:
     """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
     names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
-    values = Arguments(scope, call, names, name in functions.EXTENSIBLE_OPERATORS).in_order()
+    values = _assigned(scope, call) if name == "NOT" else None
+    values = values or Arguments(scope, call, names, name in functions.EXTENSIBLE_OPERATORS).in_order()
     return _meaning(scope, call, name, values, kind, want) if values is not None else None
+
+
+def _assigned(scope: Scope, call: tree.Call) -> list[tree.Expr] | None:
+    """The operand of `NOT (in := a)` where that assigns to a variable with the name of an input."""
+    if len(call.arguments) != 1 or not scope.dialect.assignments_are_values:
+        return None
+    name, value = call.arguments[0].name, call.arguments[0].value
+    if name is None or value is None or scope.variable(name.text) is None:
+        return None
+    return [tree.StructInit(name.start, value.end, ((name, value),))]
 
 
 def _time_operator(scope: Scope, call: tree.Call, name: str, wanted: tuple[str, str], want: Type | None) -> Type | None:

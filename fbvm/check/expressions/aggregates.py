@@ -67,7 +67,8 @@ def _has_place(scope: Scope, expr: Written, want: Type | None) -> bool:
             isinstance(want, StructType) and want.block or isinstance(want, ArrayType) and want.packed):
         return True
     if isinstance(expr, tree.StructInit) and len(expr.fields) == 1:
-        scope.error("S0101", expr.fields[0][0], "`=` expected, but `:=` found", "`=` compares, `:=` assigns")
+        at = scope.source.text.find(":=", expr.fields[0][0].end)
+        scope.error("S0101", tree.Name(at, at + 2, ":="), "`=` expected, but `:=` found", "`=` compares, `:=` assigns")
     else:
         scope.error("S0301", expr, f"{_form(expr)} stands here, but {want or 'something else'} is needed")
     return False

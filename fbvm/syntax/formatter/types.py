@@ -251,3 +251,5 @@ class TypeLayout(StatementLayout):
 
     def struct_field(self, token: Token, sign: Token, value: Phrase) -> Phrase:
         return self.argument_named(token, sign, value)
+
+    assigned_condition = struct_field

@@ -221,6 +221,12 @@ class Expressions(Builder):
         self.deepen_over(node, [value for _, value in fields])
         return node
 
+    def assigned_condition(self, name: Token, sign: Token, value: Expr) -> StructInit:
+        """`b := a` where a condition stands is `(b := a)`."""
+        node = StructInit(name.start, value.end, ((Name(name.start, name.end, name.text), value),))
+        self.deepen(node, value)
+        return node
+
     def empty_struct(self, opener: Token, closer: Token) -> StructInit:
         self.forms.append(Form("empty_structures", opener.start, closer.end, (
             "S0101", "() is no initial value", "leave it out: what has no initial value begins with that of its type")))
