@@ -3,8 +3,9 @@
 `python tests/plcopen/sweep.py DIR [DIALECT]` prints the counts, and the causes that kept documents from a stage.  Without a
 DIALECT, each document has that of the tool which its header names, and matiec if it names none.  A document
 counts as imported if nothing of its program is lost, as checked if the sources have no errors, as run if 50 scans with inputs
-at random stop at no trap, and as equal if the document that is made of the sources gives the same values in every scan.  A
-document without a program that runs is compiled, and goes no further.  Documents belong to whoever wrote them: they are never
+at random stop at no trap, and as equal if the document that is made of the sources gives the same values in every scan; each
+stage counts only documents that have reached the one before.  A document without a program that runs is compiled, and goes no
+further.  Documents belong to whoever wrote them: they are never
 part of this repository."""
 
 from __future__ import annotations
@@ -40,8 +41,7 @@ def sweep(folder: Path, dialect: str = "") -> Sweep:
 def _document(made: Sweep, path: Path, name: str, dialect: str) -> None:
     imported = import_xml(path, name)
     dialect = dialect or FAMILIES.get(imported.family, "matiec")
-    made.note("imported", name, cause(imported.errors))
-    if not imported.files:
+    if not made.note("imported", name, cause(imported.errors) or ("" if imported.files else "nothing is in it")):
         return
     sources = [Source(file, text) for file, text in imported.files.items()]
     checked = compile_sources(sources, dialect=dialect, lint=False)
