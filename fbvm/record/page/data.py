@@ -197,7 +197,7 @@ def frame_rows(rows: Sequence[tuple[int, Packet]]) -> list[list[Any]]:
 
 
 def _in_order(source: ScanSource) -> list[Signal]:
-    """All signals: first the programs' own variables, then described addresses, then members of instances."""
+    """All signals: first the programs' own variables, then members of their instances, described addresses, and the others."""
     programs = {field.name for field in source.symbols.values() if isinstance(field.type, StructType) and field.type.block}
 
     def rank(signal: Signal) -> int:
