@@ -63,16 +63,13 @@ def _row(debug: DebugSession, session: Stepping, frame: StackFrame) -> tuple[Sta
     facts = session.facts
     name = facts.body_name(frame.frame.body)
     path = session.names.instance(frame.frame.base)
-    row: Body = {"name": f"{name}  {path}" if path and path.upper() != name.upper() else name, "line": 0, "column": 0,
-                 "canRestart": True}  # fmt: skip
-    if frame.site >= 0:
-        site = facts.sites[frame.site]
-        rung = next((rung for rung in reversed(facts.rungs) if rung.body == frame.frame.body and not rung.is_text
-                     and facts.sites[rung.site].line <= site.line), None)  # fmt: skip
-        if rung is not None:
-            row["name"] += f"  rung {rung.number}" + (f" {rung.comment}" if rung.comment else "")
-        source = debug.sources.source(site.file)
-        if "path" in source and "sourceReference" in source:
-            source["presentationHint"] = "deemphasize"
-        row |= {"source": source, **debug.sources.place(site)}
-    return frame, row
+    row: Body = {"name": f"{name}  {path}" if path and path.upper() != name.upper() else name}
+    site = facts.sites[frame.site]
+    rung = next((rung for rung in reversed(facts.rungs) if rung.body == frame.frame.body and not rung.is_text
+                 and facts.sites[rung.site].line <= site.line), None)  # fmt: skip
+    if rung is not None:
+        row["name"] += f"  rung {rung.number}" + (f" {rung.comment}" if rung.comment else "")
+    source = debug.sources.source(site.file)
+    if "path" in source and "sourceReference" in source:
+        source["presentationHint"] = "deemphasize"
+    return frame, {**row, "source": source, **debug.sources.place(site), "canRestart": True}

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from fbvm.base.areas import Area
-from fbvm.base.types import BOOL, ArrayType, EnumType, Field, StructType, base
+from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, Field, StructType, base
 from fbvm.dap.memory import reference_of
 from fbvm.dap.session import Body, Container, DebugSession, Refusal, StackFrame
 from fbvm.step.past_session import PastSession
@@ -303,14 +303,15 @@ def text_of(debug: DebugSession, session: Session | PastSession, place: Place, *
 
 
 def _shown(debug: DebugSession, place: Place, value: Value) -> str:
+    """The literal of a value; where hexadecimal is asked for, that of integers and bit strings."""
     plain = base(place.type)
-    is_number = isinstance(value, int) and not isinstance(value, bool)
-    if isinstance(plain, EnumType) and is_number:
-        return show(place.type, value)
     if debug.hexadecimal or place.hexadecimal:
-        return in_hexadecimal(place.type, value) if is_number and isinstance(value, int) else show(place.type, value, True)
+        is_number = isinstance(plain, Elementary) and not plain.families.isdisjoint(("ANY_INT", "ANY_BIT"))
+        if is_number and isinstance(value, int) and not isinstance(value, bool):
+            return in_hexadecimal(place.type, value)
+        return show(place.type, value, hexadecimal=True)
     text = show(place.type, value)
-    if place.area and is_number:
+    if place.area and isinstance(value, int) and not isinstance(value, bool) and not isinstance(plain, EnumType):
         text += f" ({show(place.type, value, hexadecimal=True)})"
     return text
 
