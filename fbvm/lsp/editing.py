@@ -159,11 +159,11 @@ def _formatted(server: Server, uri: str, only: types.Range | None) -> list[types
         start, end = touched[0].base, touched[-1].base + len(touched[-1].source.text)
     before = file.text[start:end]
     after, wrong = formatted(Source(file.name, before), OUTSIDE)
-    if wrong or after == before:
-        return []
     if only is not None:  # what stands between two declarations stays
         lead, tail = before[:len(before) - len(before.lstrip())], before[len(before.rstrip()):]
         after = lead + after.strip() + tail
+    if wrong or after == before:
+        return []
     same = common_beginning(before, after)
     behind = common_beginning(before[same:][::-1], after[same:][::-1])
     return [types.TextEdit(positions.range(start + same, end - behind), after[same:len(after) - behind])]

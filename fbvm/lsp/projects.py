@@ -169,7 +169,7 @@ class Projects:
         """The files of which a program consists as the disk is now."""
         paths = project.named if project.file is not None else self._together(project.named[0])
         return [path for path in foreign.gathered(paths, project.resource).paths
-                if foreign.is_container(path) or self.text(path) is not None]
+                if foreign.is_container(path) or self._read(path) != (None, [])]
 
     def _is_begun(self, described: Path) -> bool:
         return any(each.file == described for each in self.all)
@@ -214,7 +214,9 @@ class Projects:
         return project
 
     def take(self, project: Project, path: Path) -> bool:
-        """Gives a program the present text of a file; returns False if there is none.  Containers stay as they were read."""
+        """Gives a program the present text of a file; returns False if it has none, and nothing is said about it.
+
+        Containers stay as they were read."""
         if foreign.is_container(path):
             return False
         text, said = self._read(path)
@@ -224,7 +226,7 @@ class Projects:
             project.program.remove(str(path))
         else:
             project.program.replace(str(path), text)
-        return text is not None
+        return text is not None or bool(said)
 
     def text(self, path: Path) -> str | None:
         """The Structured Text of a file, unsaved or on disk; None for one that cannot be read."""

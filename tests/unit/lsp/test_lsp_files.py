@@ -230,6 +230,7 @@ def test_an_object_of_twincat_belongs_to_its_project(twincat: Path) -> None:
         assert (block["name"], block["selectionRange"]["start"]) == ("FB_Conveyor", {"line": 4, "character": 15})
         found = await desk.at("definition", name, 16, 14)
         assert found["uri"].endswith("Drives/I_Drive.TcIO")
+        assert "I_Drive" in (await desk.at("hover", name, 16, 6))["contents"]["value"]
         assert await desk.at("prepareRename", name, 16, 6) is None
         assert not await desk.of("formatting", name, options={"tabSize": 4, "insertSpaces": True})
         refused = await desk.answer("textDocument/rename", textDocument={"uri": desk.uri(name)}, newName="motor",
@@ -273,11 +274,14 @@ def test_a_project_of_cx_programmer_has_its_diagnostics_symbols_and_words_in_pla
         section = next(each for each in symbols if each["name"] == "NewProgram1")
         assert lines[section["range"]["start"]["line"]].strip() == "Program[0]:="
         assert section["range"] == section["selectionRange"]
+        assert "DOUBLE" in {each["name"] for each in symbols}
         line = next(number for number, each in enumerate(lines) if "LD Start_PB" in each)
         shown = await desk.at("hover", "line3.cxt", line, lines[line].index("Start_PB"))
         assert "start button" in shown["contents"]["value"]
         at = lines[line].index("Start_PB")
         assert shown["range"] == span(line, at, line, at + len("Start_PB"))
+        shown = await desk.at("hover", "line3.cxt", line, lines[line].index("LD"))
+        assert "Begins a block with a bit" in shown["contents"]["value"]
         assert await desk.at("hover", "line3.cxt", 0, 0) is None
 
     talk(tmp_path, about, "line3.cxt")

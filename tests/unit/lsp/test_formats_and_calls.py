@@ -1,0 +1,83 @@
+"""A text is formatted to its first and last blank; calls and words are looked for in the program that has them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from in_process import PUMP, Desk, span, talk
+
+from fbvm.base.diagnostics import Source
+from fbvm.interchange.imported import Place
+from fbvm.lsp.foreign import narrowed
+
+pytestmark = pytest.mark.slow  # pygls and the protocol take their time to be imported
+
+OPTIONS = {"tabSize": 4, "insertSpaces": True}
+WELL = "PROGRAM Main\nVAR\n    n : INT;\nEND_VAR\n    n := 1;\nEND_PROGRAM\n"
+
+
+def test_blank_lines_around_a_whole_text_go(tmp_path: Path) -> None:
+    async def about(desk: Desk) -> None:
+        desk.open("main.st", WELL)
+        assert await desk.of("formatting", "main.st", options=OPTIONS) == []
+        for lead, tail, at, wanted in (("\n\n", "", span(0, 0, 2, 0), ""), ("", "\n\n", span(6, 0, 8, 0), ""),
+                                       ("  ", "", span(0, 0, 0, 2), "")):  # fmt: skip
+            desk.open("main.st", lead + WELL + tail)
+            [edit] = await desk.of("formatting", "main.st", options=OPTIONS)
+            assert (edit["range"], edit["newText"]) == (at, wanted)
+            part = await desk.of("rangeFormatting", "main.st", options=OPTIONS, range=span(0, 0, 8, 0))
+            assert part == [], "what stands around the declarations stays when a part is formatted"
+            desk.close_file("main.st")
+
+    talk(tmp_path, about)
+
+
+def test_calls_are_looked_for_in_the_program_that_has_the_block(tmp_path: Path) -> None:
+    for name, call in (("one", "p"), ("other", "q")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "Pump.st").write_text(PUMP.replace("Pump", f"Pump_{name}"), encoding="utf-8")
+        (tmp_path / name / "main.st").write_text(
+            f"PROGRAM Main_{name}\nVAR {call} : Pump_{name}; END_VAR\n    {call}(Level := 1);\nEND_PROGRAM\n", encoding="utf-8")
+
+    async def about(desk: Desk) -> None:
+        await desk.checked()
+        for name in ("one", "other"):
+            [pump] = await desk.at("prepareCallHierarchy", f"{name}/main.st", 1, 10)
+            assert pump["name"] == f"Pump_{name}"
+            [incoming] = await desk.ask("callHierarchy/incomingCalls", item=pump)
+            assert (incoming["from"]["name"], incoming["from"]["uri"]) == (f"Main_{name}", desk.uri(f"{name}/main.st"))
+            [main] = await desk.at("prepareCallHierarchy", f"{name}/main.st", 0, 9)
+            [outgoing] = await desk.ask("callHierarchy/outgoingCalls", item=main)
+            assert (outgoing["to"]["name"], outgoing["fromRanges"]) == (f"Pump_{name}", [span(2, 4, 2, 17)])
+
+    talk(tmp_path, about, "one/main.st", "other/main.st")
+
+
+def test_a_word_is_looked_for_in_a_place_of_a_container() -> None:
+    document = Source("x.cxt", "  n0  LD In, Run  Out")
+    for text, wanted in (("LD", (6, 8)), ("In", (9, 11)), ("Out", (18, 21)), ("n", (4, 21)), ("Ru", (4, 21)), ("  ", (4, 21)),
+                         ("", (4, 21)), ("LD\nIn", (4, 21)), ("In,", (9, 12)), ("(", (4, 21))):  # fmt: skip
+        place = Place(document, 4, 21, "somewhere")
+        assert narrowed(place, text) == wanted, text
+
+
+def test_what_is_said_of_a_damaged_object_of_twincat_goes_when_it_is_mended(tmp_path: Path) -> None:
+    good = ('<?xml version="1.0" encoding="utf-8"?>\n<TcPlcObject Version="1.1.0.1">\n<DUT Name="Kind" Id="{1}">\n'
+            "<Declaration><![CDATA[TYPE Kind : (One, Two); END_TYPE\n]]></Declaration>\n</DUT>\n</TcPlcObject>\n")  # fmt: skip
+    (tmp_path / "Kind.TcDUT").write_text(good.replace("<TcPlcObject", "<TcPlcObjekt"), encoding="utf-8")
+
+    async def about(desk: Desk) -> None:
+        for damaged in ("<TcPlcObjekt", "<TcObject"):
+            await desk.shows("Kind.TcDUT", "X0101")
+            desk.replace("Kind.TcDUT", (1, 0), (1, 12), "<TcPlcObject")
+            await desk.shows("Kind.TcDUT")
+            [kind] = await desk.of("documentSymbol", "Kind.TcDUT")
+            assert kind["name"] == "Kind"
+            desk.replace("Kind.TcDUT", (1, 0), (1, 12), damaged)
+        await desk.shows("Kind.TcDUT", "X0101")
+        assert await desk.of("documentSymbol", "Kind.TcDUT") == []
+        projects = desk.server.projects
+        assert projects.forget_regrouped(tmp_path / "Kind.TcDUT") == [], "it consists of the same files as before"
+
+    talk(tmp_path, about, "Kind.TcDUT")
