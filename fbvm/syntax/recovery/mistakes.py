@@ -117,15 +117,20 @@ def _semicolon_in_call(automaton: Automaton, token: Token, following: list[Token
                   "`,` expected, but `;` found", "arguments are separated by commas")
 
 
+_ANOTHER = re.compile(r"\s*[^\W\d]\w*\s*(?:,[\s\w,]*)?:(?!=)")
+"""A declaration behind another one."""
+
+
 def _parameters_in_head(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
-    """`PROGRAM Main() ..`, `FUNCTION f(x : INT) ..`"""
+    """`PROGRAM Main() ..`, `FUNCTION f(x : INT; y : INT) ..`"""
     opener = open_bracket(automaton, "LPAR")
     head = next((v[0] for v in reversed(automaton.values) if isinstance(v, tuple) and hasattr(v[0], "end")), None)
     if opener is None or head is None or automaton.text[head.end:opener.start].strip():
         return None
-    while token.type not in ("RPAR", "SEMICOLON", "$END"):
+    while not (token.type in ("RPAR", "$END") or token.type.startswith("VAR") or
+               token.type == "SEMICOLON" and not _ANOTHER.match(automaton.text, token.end)):
         token = automaton.next()
-    rest = [token] if token.type == "$END" else []
+    rest = [token] if token.type.startswith("VAR") else []
     if token.type == "RPAR":
         rest = [automaton.next()]
         if rest[0].type == "COLON":  # the type of the result goes with them
