@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fbvm.base.types import ArrayType, RefType, Type, fold, machine
+from fbvm.base.types import ArrayType, RefType, StructType, Type, fold, machine
 from fbvm.check.expressions import references
 from fbvm.check.expressions.constants import decode
 from fbvm.check.expressions.scope import Scope
-from fbvm.check.symbols.facts import Pou, Variable
+from fbvm.check.symbols.facts import Pou, Variable, holds_block, is_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import changed
 
@@ -36,12 +36,11 @@ def replace_by_values(scope: Scope, expr: tree.Expr) -> bool:
     return bool(known)
 
 
-def varies(scope: Scope, initial: tree.Initial) -> bool:
-    """True for an initial value that names a variable, or calls a function of the program's own.
+def varies(scope: Scope, kind: Type, initial: tree.Initial) -> bool:
+    """True for the initial value of a type that names a variable, or calls a function of the program's own.
 
-    An array or structure that is written out is none where statements do not take it."""
-    if not isinstance(initial, tree.Expr) or isinstance(initial, tree.ArrayInit | tree.StructInit) and \
-            not scope.dialect.written_out:
+    Instances have one that is known before the program runs, but for the inputs of a single one."""
+    if isinstance(initial, tree.ArrayInit | tree.StructInit) and holds_block(kind) and not _gives_inputs(kind, initial):
         return False
     for node in _nodes(initial):
         if isinstance(node, tree.NameRef):
@@ -57,6 +56,13 @@ def varies(scope: Scope, initial: tree.Initial) -> bool:
     return False
 
 
+def _gives_inputs(kind: Type, initial: tree.Initial) -> bool:
+    """True for an instance of which inputs are given that hold no instances themselves: each can be assigned."""
+    return is_block(kind) and isinstance(initial, tree.StructInit) and isinstance(kind, StructType) and all(
+        (field := kind.member(name.text)) is not None and field.kind == "VAR_INPUT" and not holds_block(field.type)
+        for name, _ in initial.fields)
+
+
 def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
     """The tree of a POU whose body begins with assignments of the initial values of some declarations."""
     assigned: list[tree.Statement] = []
@@ -64,9 +70,14 @@ def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
         assert isinstance(each.initial, tree.Expr)
         for name in each.names:
             kind = pou.variables[fold(name.text)].type
+            target = tree.NameRef(name.start, name.end, name.text)
+            if is_block(kind) and isinstance(each.initial, tree.StructInit):
+                for pin, value in each.initial.fields:
+                    place = tree.Member(pin.start, pin.end, target, pin)
+                    assigned.append(tree.Assign(pin.start, value.end, (place,), ":=", value))
+                continue
             binds = isinstance(kind, RefType) and kind.follows
             value = references.named(each.initial) if binds else each.initial
-            target = tree.NameRef(name.start, name.end, name.text)
             assigned.append(tree.Assign(target.start, each.initial.end, (target,), "REF=" if binds else ":=", value))
     return changed(pou.tree, body=(*assigned, *pou.tree.body))
 

@@ -239,7 +239,7 @@ class _Interface:
         in_frame = section.kind == "VAR_TEMP" or self.pou.is_routine and section.kind in ("VAR", "VAR_OUTPUT")
         if not in_frame or is_constant(section):
             return initialized(self.scope, declared, resolved)
-        if self.scope.dialect.initial_variables and initializers.varies(self.scope, declared.initial):
+        if self.scope.dialect.initial_variables and initializers.varies(self.scope, resolved[0], declared.initial):
             self.at_start.append(declared)
             return resolved
         return initialized(Scope(self.context, self.pou.source, self.pou, late=True), declared, resolved)

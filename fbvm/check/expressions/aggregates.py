@@ -1,6 +1,7 @@
 """Arrays and structures that are written out in statements: `a := [1, x, 3]`, `F((left := 2, right := y))`.
 
-Some tools take them; the standard has them in declarations only.  What they leave out has the initial value of its type.
+Some tools take them; the standard has them in declarations only, which become statements where they name variables and the
+frame of a body gets them at each start.  What they leave out has the initial value of its type.
 Each has a variable of its own in the frame of its POU, to which its values are written whenever the statement is executed."""
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from fbvm.check.expressions.constants import default, encode
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import flattened, initialisable
 from fbvm.check.expressions.writes import writable
-from fbvm.check.symbols.facts import Aggregate, AggregatePart, Variable
+from fbvm.check.symbols.facts import Aggregate, AggregatePart, Pou, Variable
 from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
 
@@ -33,7 +34,7 @@ def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
     if not _has_place(scope, expr, want) or want is None:
         return None
     dialect, pou = scope.dialect, scope.pou
-    if not dialect.written_out or pou is None:
+    if pou is None or not dialect.written_out and not _is_declared(pou, expr):
         scope.error("S0903", expr, f"{_form(expr)} is an initial value: statements do not take it in the dialect "
                     f"{dialect.name}", f"assign the parts one by one, or take {takers('written_out')}")
         return None
@@ -42,6 +43,11 @@ def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
     parts = [part for part in (_part(scope, value, content) for value in values) if part is not None]
     scope.facts.aggregates[expr] = Aggregate(in_frame(scope, expr, want, _form(expr)), bytes(content), tuple(parts))
     return want
+
+
+def _is_declared(pou: Pou, expr: Written) -> bool:
+    """True for an initial value in a declaration of the POU."""
+    return any(section.start <= expr.start < section.end for section in pou.tree.sections)
 
 
 def _assigned(scope: Scope, expr: tree.StructInit) -> Type | None:
