@@ -234,6 +234,40 @@ def test_constants_that_would_trap_are_not_worked_out(node: Node, code: str) -> 
     assert undefined.value.args[0] == code or code in str(vars(undefined.value))
 
 
+NUMBERS = """FUNCTION_BLOCK Sum
+METHOD Down : DINT
+VAR_INPUT n : DINT; END_VAR
+VAR k : DINT; p : REF_TO DINT; END_VAR
+    p := REF(k); p^ := n;
+    IF n > 0 THEN Down := THIS.Down(n - 1) + k; END_IF
+END_METHOD
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR
+    a : BYTE; b : WORD; c : DWORD; d : LWORD; e : USINT := 250; f : UDINT; g : SINT; h : ARRAY[-3..3] OF INT;
+    i : INT(0..9); s : STRING[9];
+    x : BOOL; r : REF_TO WORD; k : LINT; sum : Sum;
+END_VAR
+    a := TO_BIG_ENDIAN(a); b := TO_BIG_ENDIAN(b); c := TO_BIG_ENDIAN(c); d := FROM_BIG_ENDIAN(d); f := TO_BIG_ENDIAN(f);
+    x := IS_VALID_BCD(b); b := SHL(b, 3) OR ROL(b, 5); b.%X15 := x; d.%B7 := a; e := e + 255; g := TO_SINT(k);
+    FOR g := -128 TO 120 BY 7 DO h[g MOD 4] := LIMIT(-32768, h[0], 32767); END_FOR
+    CASE i OF 0..4: r := REF(b); 9: r^ := 16#FFFF; END_CASE
+    k := sum.Down(3) + FIND(s, 'x') + SEL(x, 16#7FFF_FFFF_FFFF_FFFF, k); s := MID(s, 2, i); f := TO_UDINT(d);
+    i := MUX(e, 1, 2, i);
+END_PROGRAM
+"""
+
+
+@each_of("dialect", ["standard", "codesys", "rusty"])
+def test_constants_are_numbers_of_their_types(dialect: str) -> None:
+    """So that no back end has to cut one."""
+    found = [part for body in image(NUMBERS, dialect=dialect).bodies for part in flat(body.code)
+             if part[:1] == ("const",) and part[1][0] in "iu"]
+    assert len(found) > 60
+    ranges = {form: arithmetic.limits(form) for _, form, _ in found}
+    assert [part for part in found if not ranges[part[1]][0] <= part[2] <= ranges[part[1]][1]] == []
+
+
 # --- the emitter --------------------------------------------------------------------------------------------------------
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from datetime import datetime
 from io import BytesIO, StringIO
-from typing import cast
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from depth import times
@@ -12,11 +13,14 @@ from fins_rig import COUNTING, FinsRig, TcpClient, compiled
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from images import counter_image
+from rows import each_of
 
 from fbvm import Plc, Recording, RecordingFile, RecordingWriter, compile_text
+from fbvm.base.areas import NEVER
 from fbvm.base.memory import Memory
 from fbvm.machine.servicing.commands import changes, execute
 from fbvm.machine.servicing.cpu import Machine
+from fbvm.machine.servicing.peripheral import PeripheralServicing
 from fbvm.machine.servicing.registers import Registers
 from fbvm.net.journal import Journal, open_journal
 from fbvm.record.recording import recording as recording_module
@@ -100,6 +104,31 @@ def test_cycle_times_are_the_average_of_the_last_eight_the_longest_and_the_least
     assert seen[-1] == ((10 + 20 + 30 + 40 + 50 + 60 + 70 + 81) // 8, 90, 10)
     registers.forget_cycle_times()
     assert registers.cycle_times_ns == (0, 0, 0)
+
+
+@each_of("ports, clock, unit, requests, changed", [
+    (None, None, False, False, False), (False, False, False, False, False), (True, False, False, False, True),
+    (False, True, False, False, True), (False, False, True, False, True), (False, False, False, True, False),
+    (True, True, True, True, True),
+])
+def test_the_program_should_see_soon_what_ports_the_clock_or_a_unit_have_changed(
+        ports: bool | None, clock: bool | None, unit: bool, requests: bool, changed: bool) -> None:  # fmt: skip
+    machine = SimpleNamespace(memory=compiled().memory, is_running=False, units=[])
+    servicing, submitted = PeripheralServicing(cast(Any, machine), counter_image()), []
+    assert not servicing.is_needed
+    if ports is not None:
+        servicing._ports = cast(Any, SimpleNamespace(serve=lambda now_ns, send: ports, wake_ns=7))
+    if clock is not None:
+        servicing._setting = cast(Any, SimpleNamespace(serve=lambda registers, now_ns: clock))
+    assert servicing.is_needed == (ports is not None or clock is not None)
+    assert servicing.wake_ns == (NEVER if ports is None else 7)
+    one = SimpleNamespace(serve=lambda cpu, now_ns: ["send"] * requests, changed_words=unit)
+    other = SimpleNamespace(serve=lambda cpu, now_ns: [], changed_words=False)
+    link = SimpleNamespace(submit=lambda rows, now_ns: submitted.append((rows, now_ns)))
+    servicing._units = cast(Any, [(one, SimpleNamespace(link=link)), (other, SimpleNamespace(link=link))])
+    for _ in range(2):
+        assert servicing.serve(5) is changed
+    assert submitted == [(["send"], 5)] * 2 * requests
 
 
 @pytest.mark.slow
