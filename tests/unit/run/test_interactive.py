@@ -59,50 +59,6 @@ def ran(act: Callable[[int, Control, Plc], None], control: Control | None = None
     return plc, hands
 
 
-def nothing(turn: int, control: Control, plc: Plc) -> None:
-    """Lets it run."""
-
-
-def test_virtual_time_passes_as_the_clock_does() -> None:
-    plc, _ = ran(nothing)
-    assert 98 <= plc.scans <= 101
-
-
-def test_ten_times_slower_scans_a_tenth_as_often() -> None:
-    plc, _ = ran(nothing, Control(speed=0.1))
-    assert 9 <= plc.scans <= 11
-
-
-def test_ten_times_faster_scans_ten_times_as_often() -> None:
-    plc, _ = ran(nothing, Control(speed=10.0))
-    assert 980 <= plc.scans <= 1010
-
-
-def test_a_pause_stops_the_time_of_the_plc_and_nothing_is_made_up_for() -> None:
-    seen: list[int] = []
-
-    def act(turn: int, control: Control, plc: Plc) -> None:
-        if turn == 20:
-            control.pause()
-        if turn in (21, 79):
-            seen.append(plc.scans)
-        if turn == 80:
-            control.go_on()
-
-    plc, _ = ran(act)
-    assert seen[0] == seen[1]
-    assert 38 <= plc.scans <= 42
-
-
-def test_a_step_executes_so_many_scans_and_pauses() -> None:
-    def act(turn: int, control: Control, plc: Plc) -> None:
-        if turn == 10:
-            control.step(3)
-
-    plc, _ = ran(act, Control(is_paused=True))
-    assert (plc.scans, plc.read("Main.n")) == (3, 3)
-
-
 def test_after_a_trap_a_start_lets_the_plc_run_again() -> None:
     def act(turn: int, control: Control, plc: Plc) -> None:
         if turn == 50:
