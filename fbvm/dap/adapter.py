@@ -128,7 +128,7 @@ class Adapter:
         """The body of the answer.  Breakpoints may change while it runs; anything else about the position has to wait."""
         if command in BREAKPOINTS:
             if self.debug.debugger is None:
-                answer = self.breakpoints.pending(len(arguments.get(BREAKPOINTS[command]) or ()))
+                answer = self.breakpoints.pending(len(arguments.get(BREAKPOINTS[command]) or arguments.get("lines") or ()))
                 self._early.append((command, arguments, [row["id"] for row in answer["breakpoints"]]))
                 return answer
             interrupted = self.moves.interrupted()

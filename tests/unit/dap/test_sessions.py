@@ -16,9 +16,16 @@ from typing import Any
 
 import pytest
 
+from fbvm.base.diagnostics import Source
 from fbvm.cli.running.dap import open_target
+from fbvm.code.compiler import compile_sources
 from fbvm.dap.adapter import Adapter
+from fbvm.machine.plc import Plc
+from fbvm.record.recording.file_writer import Described, RecordingWriter
+from fbvm.record.recording.program_text import ProgramText
+from fbvm.record.recording.recording import Recording
 
+RECORDED = "pump.fbrec"
 HERE = Path(__file__).with_name("sessions")
 NAMED = re.compile(r'"\$([^"]*)"')
 
@@ -101,11 +108,28 @@ class Talk:
         return "".join(f"{line}\n" for line in made)
 
 
+def record(folder: Path) -> None:
+    """Six scans of `pump.st`; in the last one it ends with a trap."""
+    source = Source("pump.st", (folder / "pump.st").read_text(encoding="utf-8"))
+    image = compile_sources([source]).image
+    assert image is not None
+    plc = Plc(image)
+    with (folder / RECORDED).open("wb") as file:
+        made = Recording(file=RecordingWriter(file, "1", True))
+        made.add("pump", plc, Described(ProgramText(((source.name, source.text),))))
+        plc.run(scans=5)
+        plc.write("Main.Trips", True)
+        plc.run(scans=1)
+        made.close()
+
+
 @pytest.mark.parametrize("file", [pytest.param(file, id=file.stem) for file in sorted(HERE.glob("*.txt"))])
 def test_a_session_goes_as_it_is_kept(file: Path, tmp_path: Path) -> None:
     for source in (HERE / "sources").iterdir():
         (tmp_path / source.name).write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
     kept = file.read_text(encoding="utf-8")
+    if RECORDED in kept:
+        record(tmp_path)
     came = Talk(tmp_path).text(kept)
     if os.environ.get("FBVM_REWRITE"):
         file.write_text(came, encoding="utf-8")
