@@ -71,8 +71,7 @@ def test_code_that_holds_the_end_of_a_section_is_split_over_two() -> None:
 
 
 @pytest.mark.parametrize(("body", "said"), [
-    ("<NWL></NWL>", "a network diagram (ladder, FBD or IL)"), ("<SFC/>", "a sequential function chart"),
-    ("<CFC/>", "a continuous function chart"), ("<LADDER/>", "ladder"),
+    ("<SFC/>", "a sequential function chart"), ("<CFC/>", "a continuous function chart"), ("<LADDER/>", "ladder"),
 ])  # fmt: skip
 def test_bodies_in_other_languages_are_named_with_their_place(body: str, said: str) -> None:
     text = MAIN.replace(MAIN[MAIN.index("<ST>"):MAIN.index("</ST>") + 5], body)
@@ -82,6 +81,13 @@ def test_bodies_in_other_languages_are_named_with_their_place(body: str, said: s
     assert found.source.text[found.start:found.end].removeprefix("<").isalnum()
     assert found.source.place(found.start)[0] == 12
     assert made.source is not None and made.source.text.split()[-1] == "END_PROGRAM"
+
+
+def test_a_network_diagram_without_an_archive_is_named_with_its_place() -> None:
+    made = read_object(MAIN.replace("<ST>", "<NWL/><ST>").encode(), "MAIN.TcPOU")
+    [found] = made.diagnostics
+    assert (found.code, found.message) == ("X0203", "the network diagram of MAIN is empty or damaged")
+    assert found.source.place(found.start)[0] == 12
 
 
 @pytest.mark.parametrize(("text", "code", "said"), [

@@ -14,12 +14,12 @@ from html import unescape
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.markup import Element, parse_markup
+from fbvm.interchange.twincat.drawings import LANGUAGE, Drawings, Owner
 
 ROOT = "TcPlcObject"
 _CHILDREN = {"POU": "", "Itf": "INTERFACE", "DUT": "", "GVL": "", "Task": ""}
 """Children of the root, and what each of them declares where its text need not be asked."""
-_LANGUAGES = {"NWL": "a network diagram (ladder, FBD or IL)", "LADDER": "ladder", "SFC": "a sequential function chart",
-              "CFC": "a continuous function chart"}  # fmt: skip
+_LANGUAGES = {"LADDER": "ladder", "SFC": "a sequential function chart", "CFC": "a continuous function chart"}
 _NO_CODE = re.compile(r"//[^\n]*|\(\*.*?\*\)|\{[^}]*\}|'(?:\$.|[^'$])*'", re.S)
 _KIND = re.compile(r"\b(FUNCTION_BLOCK|FUNCTION|PROGRAM|INTERFACE|CLASS)\b", re.I)
 _TAG = re.compile(r"""<(?:"[^"]*"|'[^']*'|[^>"'])*>""")
@@ -81,19 +81,18 @@ class _Written:
 
     def object(self, element: Element) -> None:
         """A POU, an interface, a type or a list of global variables."""
-        self._code(element.one("Declaration"))
         kind = _CHILDREN[element.name] or _kind(element)
-        self._body(element)
+        drawings = self._declaration(element, kind, [element, *element.all("Action")])
+        self._body(element, drawings)
         for member in element.children:
             if member.name == "Method":
-                self._code(member.one("Declaration"))
-                self._body(member)
+                self._body(member, self._declaration(member, "METHOD", [member]))
                 self._words.append("END_METHOD")
             elif member.name == "Property":
                 self._property(member)
             elif member.name == "Action":
                 self._words.append(f"ACTION {member.get('Name')}:")
-                self._body(member)
+                self._body(member, drawings)
                 self._words.append("END_ACTION")
             elif member.name == "Transition":
                 self._report(member, f"the transition {member.get('Name')} belongs to a chart, which is not imported")
@@ -104,16 +103,31 @@ class _Written:
         self._code(element.one("Declaration"))
         for accessor in element.all("Get", "Set"):
             self._words.append(accessor.name.upper())
-            self._code(accessor.one("Declaration"))
-            self._body(accessor)
+            self._body(accessor, self._declaration(accessor, accessor.name.upper(), [accessor]))
             self._words.append(f"END_{accessor.name.upper()}")
         self._words.append("END_PROPERTY")
 
-    def _body(self, element: Element) -> None:
+    def _declaration(self, element: Element, kind: str, holders: list[Element]) -> Drawings | None:
+        """The declaration of a POU, method or accessor, with the variables that the network diagrams in `holders` need; those
+        diagrams, if there are any."""
+        declaration = element.one("Declaration")
+        self._code(declaration)
+        bodies = [part for holder in holders if (inside := holder.one("Implementation")) for part in inside.all(LANGUAGE)]
+        if not bodies:
+            return None
+        owner = Owner(kind, element.get("Name"), declaration.text if declaration else "")
+        drawings = Drawings(self._xml, owner, bodies)
+        self.diagnostics += drawings.diagnostics
+        self._words += drawings.variables()
+        return drawings
+
+    def _body(self, element: Element, drawings: Drawings | None) -> None:
         implementation = element.one("Implementation")
         for part in implementation.children if implementation else []:
             if part.name == "ST":
                 self._code(part)
+            elif part.name == LANGUAGE and drawings is not None:
+                self._lines(drawings.written[id(part)])
             elif part.name in _LANGUAGES:
                 language = _LANGUAGES[part.name]
                 self._report(part, f"the body of {element.get('Name')} is {language}, which is not read from this file")
@@ -142,6 +156,18 @@ class _Written:
             for name in ("code", "escaped", "text"):
                 if piece[name] is not None:
                     yield piece.start(name), piece.end(name), unescape(piece[name]) if name == "escaped" else piece[name]
+
+    def _lines(self, lines: list[tuple[int, str]]) -> None:
+        """Lines of rungs and statements, each on a line of its own: the first of a network on the one where the network begins,
+        or on the next that is free."""
+        for begins, line in lines:
+            at = self._xml.text.find("\n", max(begins, self._at)) + 1
+            if at > 0:
+                self._blank(at)
+                self._parts.append(line)
+            else:
+                self._parts.append(f"\n{line}\n")
+            self._ahead = len(line)
 
     def _blank(self, to: int) -> None:
         """Blanks up to an offset of the XML; words that wait stand in the first line that begins there, or at once."""

@@ -32,6 +32,8 @@ class Bodies:
         """The ACTIONs that charts of the POU need."""
         self.renamed: dict[str, str] = {}
         """By name in capitals, the new names of steps of charts that are written already."""
+        self.places: list[tuple[int, int]] = []
+        """Of the diagram that was written last, at which line each network begins, and its number."""
 
     def lines(self, body: Body) -> list[str]:
         """The lines of a body."""
@@ -76,7 +78,9 @@ class Bodies:
         lines: list[str] = []
         in_ladder = False
         statements = Statements(self.reading, self.scope)
+        self.places = []
         for place, network in enumerate(found):
+            self.places.append((len(lines), network.number))
             rung = self._rung(network, rungs[place])
             if place in among and not network.broken:
                 item = network.objects[0]
