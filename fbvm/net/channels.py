@@ -80,30 +80,29 @@ class ChannelLink(ABC):
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         """Carries out requests in order.  Raises ValueError for an open of a channel that is in use."""
-        channels = self.channels
         for request in requests:
-            open_channel = channels.get(request.channel)
-            match request:
-                case Send():
-                    error = open_channel.send(request.data, now_ns) if open_channel else "ENOTCONN"
-                    if error:
-                        self._fail(request.channel, error)
-                case Grant():
-                    if open_channel:
-                        open_channel.grant(request.size)
-                case Connect() | Listen() | Bind():
-                    if open_channel:
-                        raise ValueError(f"channel {request.channel} of {self.address} is in use")
-                    self.open(request, now_ns)
-                case Close(channel, reset):
-                    if open_channel:
-                        del channels[channel]
-                        open_channel.close(reset, now_ns)
-                    self.pending.append(Closed(channel))
-                case SendTo(channel, remote, data):
-                    error = open_channel.send_to(remote, data, now_ns) if open_channel else "ENOTCONN"
-                    if error:
-                        self._fail(channel, error)
+            channel = request.channel
+            there = self.channels.get(channel)
+            if isinstance(request, Send):  # `match` takes longer, and exchanges consist of sends
+                error = there.send(request.data, now_ns) if there else "ENOTCONN"
+                if error:
+                    self._fail(channel, error)
+            elif isinstance(request, Grant):
+                if there:
+                    there.grant(request.size)
+            elif isinstance(request, SendTo):
+                error = there.send_to(request.remote, request.data, now_ns) if there else "ENOTCONN"
+                if error:
+                    self._fail(channel, error)
+            elif isinstance(request, Close):
+                if there:
+                    del self.channels[channel]
+                    there.close(request.reset, now_ns)
+                self.pending.append(Closed(channel))
+            else:
+                if there:
+                    raise ValueError(f"channel {channel} of {self.address} is in use")
+                self.open(request, now_ns)
         if self.pending:
             self.mark_pending()
 

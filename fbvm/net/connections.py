@@ -32,6 +32,8 @@ class Connection(HostChannel):
         self.remote = request.remote
         self._keep_alive = request.keep_alive
         self._outbox: deque[bytes] = deque()
+        self._sent = Sent(self.channel, 0)
+        """What the last `Send` was answered with: the next one often has as many bytes, and nobody changes an event."""
 
     def open(self, now_ns: int) -> None:
         self._active = True
@@ -87,17 +89,17 @@ class Connection(HostChannel):
             self._opened(now_ns, True)
 
     def ready(self, ready: int, now_ns: int) -> None:
-        if self.sock and not self._connected:
+        if self._connected and not self._orphan:
+            if ready & READ and self.sock:
+                self.link.waiting[self] = None
+        elif self.sock and not self._connected:
             self._answered(self.sock, now_ns)
             return
-        if self._resetting:
+        elif self._resetting:
             self.give_up(now_ns)
             return
-        if ready & READ and self.sock:
-            if self._orphan:
-                self._receive(self.sock, now_ns)
-            else:
-                self.link.waiting[self] = None
+        elif ready & READ and self.sock:
+            self._receive(self.sock, now_ns)
         if ready & WRITE and self.sock:
             self._flush(self.sock, now_ns)
 
@@ -110,12 +112,14 @@ class Connection(HostChannel):
     def fetch(self, now_ns: int) -> None:
         """Reads the socket now and no earlier, since the unit may change its grant until it asks for events."""
         sock = self.sock
-        if sock and not self._stalled and not self._fin_seen:
+        if sock is None:
+            return
+        if not self._stalled and not self._fin_seen:
             self._receive(sock, now_ns)
-        elif sock and (code := sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)):
+        elif code := sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
             self._broke(code, now_ns)
-        if not self._stalled and not self._fin_seen:  # else the selector does not tell that it breaks
-            self.link.waiting.pop(self, None)
+        if (self._stalled or self._fin_seen) and self.sock:  # the selector does not tell that it breaks
+            self.link.waiting[self] = None
 
     def send(self, data: bytes, now_ns: int) -> str:
         sock, outbox = self.sock, self._outbox
@@ -178,7 +182,12 @@ class Connection(HostChannel):
         except OSError as error:
             self._broke(error, now_ns)
             return
-        if not data:
+        if data and wanted > 0 and not self._orphan:
+            self.granted -= len(data)
+            if self.network.tap:
+                self._tap(now_ns, DATA, False, data)
+            self.link.pending.append(Received(self.channel, data))
+        elif not data:
             self._fin_seen = True
             self._tap(now_ns, TapKind.FIN, False)
             self._report(PeerClosed(self.channel))
@@ -186,29 +195,28 @@ class Connection(HostChannel):
             self._watch()
         elif self._orphan:
             self.give_up(now_ns)
-        elif wanted <= 0:
+        else:
             self._stalled = True
             self._watch()
-        else:
-            self.granted -= len(data)
-            if self.network.tap:
-                self._tap(now_ns, DATA, False, data)
-            self.link.pending.append(Received(self.channel, data))
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
-        outbox = self._outbox
+        outbox, tap = self._outbox, self.network.tap
         try:
             while outbox:
-                rest = outbox[0][self._taken :] if self._taken else outbox[0]
+                data = outbox[0]
+                rest = data[self._taken :] if self._taken else data
                 size = sock.send(rest) if rest else 0
-                if size and self.network.tap:
+                if tap and size:
                     self._tap(now_ns, DATA, True, rest[:size])
                 if size < len(rest):
                     self._taken += size
                     continue
+                del outbox[0]
                 self._taken = 0
-                sent = Sent(self.channel, len(outbox.popleft()))
                 if not self._orphan:
+                    sent = self._sent
+                    if sent.size != len(data) or sent.channel != self.channel:
+                        sent = self._sent = Sent(self.channel, len(data))
                     self.link.pending.append(sent)
         except BlockingIOError:
             pass

@@ -16,10 +16,6 @@ class Host(Protocol):
     """Links with events that `wait` has to return for."""
 
     @property
-    def driven(self) -> bool:
-        """True if the caller of `serve` calls it for all links at once."""
-
-    @property
     def is_idle(self) -> bool:
         """True if no socket is registered with the selector, and no connection is under faults."""
 
@@ -32,6 +28,8 @@ class HostLink(ChannelLink):
 
     is_quiet = False
     """True if all events are fetched and the selector has reported nothing since."""
+    driven = False
+    """True if somebody calls `serve` of the network for all links at once."""
 
     def __init__(self, network: Host, address: str) -> None:
         super().__init__(address)
@@ -45,16 +43,20 @@ class HostLink(ChannelLink):
         if self.is_quiet:
             self.refreshes += 1
             return ()
-        driven = self._network.driven
-        if not driven:
+        if not self.driven:
             self._network.serve(now_ns)
         self.refreshes += 1
         if self.waiting:
-            for there in [*self.waiting]:
-                there.fetch(now_ns)
+            self.fetch(now_ns)
         events, self.pending = self.pending, []
-        self.is_quiet = not self.waiting and (driven or self._network.is_idle)
+        self.is_quiet = not self.waiting and (self.driven or self._network.is_idle)
         return events
+
+    def fetch(self, now_ns: int) -> None:
+        """Has all channels that wait fetch their data.  One that has to be asked in the next refresh, too, waits again then."""
+        waiting, self.waiting = self.waiting, {}
+        for there in waiting:
+            there.fetch(now_ns)
 
     def pass_by(self, refreshes: int) -> None:
         self.refreshes += refreshes

@@ -169,7 +169,7 @@ class Switchboard(ABC):
     def driven(self, driven: bool) -> None:
         self._driven = driven
         for link in self.links.values():
-            link.is_quiet = False
+            link.driven, link.is_quiet = driven, False
 
     @property
     def is_idle(self) -> bool:

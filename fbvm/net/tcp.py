@@ -48,6 +48,7 @@ class TcpNetwork(Switchboard):
         if address in self.links:
             raise ValueError(f"{address} is attached already")
         link = self.links[address] = TcpLink(self, address)
+        link.driven = self.driven
         return link
 
     def link_behind(self, address: str) -> HostLink:
@@ -108,8 +109,7 @@ class _LinkBehind(TcpLink):
     is_seen = False
 
     def events(self, now_ns: int) -> Sequence[Event]:
-        for there in list(self.waiting):
-            there.fetch(now_ns)
+        self.fetch(now_ns)
         events, self.pending = self.pending, []
         return events
 

@@ -6,7 +6,7 @@ is refused by a ContractError before anything runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from struct import Struct
@@ -19,6 +19,8 @@ from fbvm.watch.paths import Place, find_place
 
 Packer = Callable[..., None]
 """Takes a buffer, an offset in bytes and the values of a row's fields."""
+Unpacker = Callable[[memoryview, int], tuple[Any, ...]]
+"""Takes a view and an offset in bytes; the fields of the row that begins there, in the order in which they were named."""
 Rows = Callable[[memoryview], Iterator[tuple[Any, ...]]]
 """Takes a view of whole rows; the fields of each, in the order in which they were named."""
 
@@ -90,13 +92,21 @@ class Record:
 
     def rows(self, *names: str) -> Rows:
         """A function that reads these fields, in this order, of all rows in a view.  Takes two names at least."""
+        struct, as_named = self._named(names)
+        return (lambda view: map(as_named, struct.iter_unpack(view))) if as_named else struct.iter_unpack
+
+    def unpacker(self, *names: str) -> Unpacker:
+        """A function that reads these fields, in this order, of one row.  Takes two names at least."""
+        struct, as_named = self._named(names)
+        return (lambda view, offset: as_named(struct.unpack_from(view, offset))) if as_named else struct.unpack_from
+
+    def _named(self, names: Sequence[str]) -> tuple[Struct, itemgetter[Any] | None]:
+        """What reads a row, and what puts its values into the order of the names, None if they lie in that order."""
         leaves = [self[name] for name in names]
-        struct = self._struct(leaves)
         order = sorted(range(len(leaves)), key=lambda number: leaves[number].offset)
         if order == [*range(len(leaves))]:
-            return struct.iter_unpack
-        as_named = itemgetter(*(order.index(number) for number in range(len(leaves))))
-        return lambda view: map(as_named, struct.iter_unpack(view))
+            return self._struct(leaves), None
+        return self._struct(leaves), itemgetter(*(order.index(number) for number in range(len(leaves))))
 
     def _struct(self, leaves: Iterable[Leaf]) -> Struct:
         """A whole row, of which everything but these values is padding."""

@@ -16,7 +16,7 @@ from fbvm.watch.paths import Place, Span
 CYCLIC, EVENT = "cyclic", "event"
 PACES = (CYCLIC, EVENT)
 """cyclic: a fixed period.  event: at once when a unit changed words or a network has events, else when a timer ends."""
-MOST_AT_ONCE = 16
+MOST_AT_ONCE = 32
 """So many scans one burst has at most; then the loop looks at the networks and the other PLCs."""
 
 

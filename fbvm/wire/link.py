@@ -30,6 +30,10 @@ class Peer:
         return f"{self.host}:{self.port}"
 
 
+NOBODY = Peer("0.0.0.0", 0)
+"""In place of a peer: anybody, or nobody in particular."""
+
+
 def read_peer(host: object, port: object) -> Peer:
     """An endpoint as a file has it.  Raises ValueError for another one."""
     if type(port) is not int or not 0 <= port < 1 << 16:
@@ -59,7 +63,7 @@ class Listen:
 
     channel: int
     local_port: int
-    remote: Peer = Peer("0.0.0.0", 0)
+    remote: Peer = NOBODY
     keep_alive: bool = False
 
 
@@ -146,7 +150,7 @@ class Received:
 
     channel: int
     data: bytes
-    remote: Peer = Peer("0.0.0.0", 0)
+    remote: Peer = NOBODY
 
 
 @dataclass(frozen=True, slots=True)

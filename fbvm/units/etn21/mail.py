@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from fbvm.processor.contract import Contract, Packer, Rows
+from fbvm.processor.contract import Contract, Packer, Rows, Unpacker
 from fbvm.units.addresses import host_of, words_of
 from fbvm.units.contract import KEEP, MOVE_FIELDS, AreaMemory, Processor
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.codes import code_of
 from fbvm.units.etn21.data import fetch, store
 from fbvm.wire.link import (
+    NOBODY,
     Bind,
     Broken,
     Close,
@@ -59,7 +60,7 @@ EVENTS: Mapping[type, EventRow] = {
     Opened: EventRow("opened", ("local_port", "host[0]", "host[1]", "port"), _opened),
     Failed: EventRow("failed", ("error",), lambda event: (code_of(event.error),)),
     Sent: EventRow("sent", ("size",)),
-    Received: EventRow("received", ("host[0]", "host[1]", "port", "size", "place")),
+    Received: EventRow("received", ("host[0]", "host[1]", "port", "size", "place")),  # of a connection without the first three
     PeerClosed: EventRow("peer_closed"),
     Broken: EventRow("broken", ("error",), lambda event: (code_of(event.error),)),
     Closed: EventRow("closed"),
@@ -71,7 +72,9 @@ EVERY_EVENT = ("kind", "channel")
 """Fields that each event fills; those that it does not name are 0."""
 REQUEST_FIELDS = ("kind", "channel", "option", "local_port", "host[0]", "host[1]", "port", "data_address[0]", "data_address[1]",
                   "size")  # fmt: skip
-"""Of a row of ETN21_Requests, in the order in which `Mail.collect` takes them."""
+"""Of a row of ETN21_Requests, for what is asked for rarely."""
+SEND_FIELDS = ("kind", "channel", "data_address[0]", "data_address[1]", "size")
+"""Those of them that exchanges consist of, in the order in which `Mail.collect` takes them."""
 Row = Mapping[str, int]
 RARE_REQUESTS: Mapping[str, Callable[[Row, AreaMemory], Request]] = {
     "connect": lambda row, memory: Connect(row["channel"], _remote(row), row["local_port"], bool(row["option"])),
@@ -102,8 +105,15 @@ class Agreed:
     event_bytes: int
     most_events: int
     events: Mapping[type, tuple[Packer, int, Values]]
+    pack_sent: Packer
+    sent: int
+    pack_received: Packer
+    """Of bytes of a connection."""
+    received: int
     request_bytes: int
-    requests: Rows
+    request: Unpacker
+    """What `SEND_FIELDS` names."""
+    rare_request: Unpacker
     send: int
     grant: int
     rare: Mapping[int, Callable[[Row, AreaMemory], Request]]
@@ -132,8 +142,13 @@ def agreed(contract: Contract) -> Agreed:
         event_bytes=event.size,
         most_events=contract.array("ETN21_Events")[1],
         events={type_: (event.packer(*EVERY_EVENT, *row.fields), told[row.kind], row.values) for type_, row in EVENTS.items()},
+        pack_sent=event.packer(*EVERY_EVENT, "size"),
+        sent=told[EVENTS[Sent].kind],
+        pack_received=event.packer(*EVERY_EVENT, "size", "place"),
+        received=told[EVENTS[Received].kind],
         request_bytes=request.size,
-        requests=request.rows(*REQUEST_FIELDS),
+        request=request.unpacker(*SEND_FIELDS),
+        rare_request=request.unpacker(*REQUEST_FIELDS),
         send=asked[SEND],
         grant=asked[GRANT],
         rare={asked[name]: make for name, make in RARE_REQUESTS.items()},
@@ -158,7 +173,9 @@ class Mail:
         self._requests = processor.view("ETN21_Requests")
         self._moved = processor.view("ETN21_Moved")
         self._moves = processor.view("ETN21_Moves")
-        self._rings = processor.view("ETN21_Rings")
+        rings, ring_bytes = processor.view("ETN21_Rings"), self._agreed.ring_bytes
+        self._rings = [rings[first : first + ring_bytes] for first in range(0, len(rings), ring_bytes)]
+        """Of each socket its ring."""
         processor.view("ETN21_Filler")[0] = KEEP if odd_filler is None else odd_filler
         self._later: list[Event] = []
         """Events for which there is no room now."""
@@ -204,37 +221,38 @@ class Mail:
             channel = event.channel
             if channel not in at.SOCKETS:
                 continue
-            pack, kind, values = agreed.events[type(event)]
             row = agreed.event_bytes * posted
             if isinstance(event, Sent):
-                pack(rows, row, kind, channel, event.size)
+                agreed.pack_sent(rows, row, agreed.sent, channel, event.size)
             elif not isinstance(event, Received):
+                pack, kind, values = agreed.events[type(event)]
                 pack(rows, row, kind, channel, *values(event))
-            elif (place := self._keep(channel, event.data)) is not None:
-                high, low = words_of(event.remote.host)
-                pack(rows, row, kind, channel, high, low, event.remote.port, len(event.data), place)
-            else:
+            elif (place := self._keep(channel, event.data)) is None:
                 continue
+            elif (remote := event.remote) is NOBODY:
+                agreed.pack_received(rows, row, agreed.received, channel, len(event.data), place)
+            else:
+                pack, kind, _ = agreed.events[Received]
+                pack(rows, row, kind, channel, *words_of(remote.host), remote.port, len(event.data), place)
             posted += 1
         self._posted[0] = posted
 
     def _keep(self, channel: int, data: bytes) -> int | None:
         """Puts bytes into the ring of a socket.  Returns the place behind them, or None: there were more than the socket would
         keep, and they are lost."""
-        fresh, size, agreed = self._fresh.get(channel, 0), len(data), self._agreed
-        if fresh + size > agreed.fresh_bytes:
+        agreed, size = self._agreed, len(data)
+        fresh = self._fresh.get(channel, 0) + size
+        if fresh > agreed.fresh_bytes:
             return None
-        self._fresh[channel] = fresh + size
-        ring_bytes = agreed.ring_bytes
-        place, ring = self._ends[channel - 1] + fresh, ring_bytes * (channel - 1)
-        begin = place & ring_bytes - 1
+        self._fresh[channel] = fresh
+        ring, ring_bytes, place = self._rings[channel - 1], agreed.ring_bytes, self._ends[channel - 1] + fresh
+        begin = place - size & ring_bytes - 1
         if begin + size <= ring_bytes:
-            self._rings[ring + begin : ring + begin + size] = data
+            ring[begin : begin + size] = data
         else:
-            first, rest = data[: ring_bytes - begin], data[ring_bytes - begin :]
-            self._rings[ring + begin : ring + ring_bytes] = first
-            self._rings[ring : ring + len(rest)] = rest
-        return place + size & COUNTER
+            first = ring_bytes - begin
+            ring[begin:], ring[: size - first] = data[:first], data[first:]
+        return place & COUNTER
 
     def collect(self, memory: AreaMemory) -> list[Request]:
         """After a refresh: what the program asks of the network.  Data to be sent are taken from `memory`, the PLC's."""
@@ -243,26 +261,30 @@ class Mail:
         requests: list[Request] = []
         if count := self._requested[0]:
             self._requested[0] = self._urgent[0] = 0
-            agreed = self._agreed
-            for row in agreed.requests(self._requests[: agreed.request_bytes * count]):
-                kind, channel, _, _, _, _, _, high, low, size = row
+            agreed, rows, part = self._agreed, self._requests, self._agreed.part_bytes
+            for at_byte in range(0, agreed.request_bytes * count, agreed.request_bytes):
+                kind, channel, high, low, size = agreed.request(rows, at_byte)
                 if kind == agreed.send:
-                    data, part = fetch(memory, high, low, size), agreed.part_bytes
-                    requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
+                    data = fetch(memory, high, low, size)
+                    if size <= part:
+                        requests.append(Send(channel, data))
+                    else:
+                        requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
                 elif kind == agreed.grant:
                     requests.append(Grant(channel, size))
                 else:
-                    requests.append(agreed.rare[kind](dict(zip(REQUEST_FIELDS, row, strict=True)), memory))
+                    row = dict(zip(REQUEST_FIELDS, agreed.rare_request(rows, at_byte), strict=True))
+                    requests.append(agreed.rare[kind](row, memory))
         return requests
 
     def move(self, memory: AreaMemory) -> None:
         """Stores what receives were handed in `memory`, the PLC's, if machine code has not done so yet."""
         if not self._moved[0]:
             return
-        agreed, rings = self._agreed, self._rings
-        for ring, place, size, filler, high, low in agreed.moves(self._moves[: agreed.move_bytes * self._moved[0]]):
-            first, begin = agreed.ring_bytes * (ring - 1), place & agreed.ring_bytes - 1
-            data = bytes(rings[first + begin : first + min(begin + size, agreed.ring_bytes)])
-            data += bytes(rings[first : first + size - len(data)])
+        agreed = self._agreed
+        for number, place, size, filler, high, low in agreed.moves(self._moves[: agreed.move_bytes * self._moved[0]]):
+            ring, begin = self._rings[number - 1], place & agreed.ring_bytes - 1
+            data = bytes(ring[begin : begin + size])
+            data += bytes(ring[: size - len(data)])
             store(memory, high, low, data, None if filler == KEEP else filler)
         self._moved[0] = 0

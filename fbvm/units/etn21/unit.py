@@ -339,9 +339,10 @@ class Etn21:
 
     def finish(self) -> list[Request]:
         """The requests that the unit's program has left for the network since the last call, in order."""
-        if self._processor is None or self._words is None:
+        inside, words = self._processor, self._words
+        if inside is None or words is None:
             return []
-        requests = self._processor.mail.collect(self._words.memory)
+        requests = inside.mail.collect(words.memory)
         if self._fins:
             self._fins.count(requests)
         return requests

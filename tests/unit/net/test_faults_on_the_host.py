@@ -192,6 +192,22 @@ def test_a_send_that_waits_when_a_fault_comes_is_answered(host: Host) -> None:
     assert told == [Sent(1, 16 << 20)]
 
 
+def test_sends_of_one_size_are_answered_on_both_sides_of_a_fault(host: Host) -> None:
+    """The window of the relay opens again for each, so that more goes through than it holds at a time."""
+    device, block, got = host.open(), bytes(16_384), 0
+    for number in range(12):
+        if number == 2:
+            host.network.faults.append(fault("slow", latency_ns=1))
+        host.scan(Send(1, block))
+        assert host.until(Sent) == [Sent(1, len(block))]
+        for _ in range(100):
+            host.scan()
+            got += len(arrived(device))
+            if got == (number + 1) * len(block):
+                break
+        assert got == (number + 1) * len(block)
+
+
 def test_latency_is_each_way(host: Host) -> None:
     host.network.faults.append(fault("slow", latency_ns=50 * MS))
     host.scan(Connect(1, SERVER), Grant(1, 4096))
