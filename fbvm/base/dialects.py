@@ -77,6 +77,7 @@ class Dialect:
     fixed_counters: bool = False
     names_of_edition_2: bool = False
     constants_wrap: bool = False
+    signs_are_lost: bool = False
     short_circuits: bool = False
     joined_words: bool = False
     spaced_durations: bool = False
@@ -220,6 +221,8 @@ QUESTIONS = {
     "fixed_counters": ("FOR i := 1 TO 9 DO i := i + 1; END_FOR", "taken, with a warning (S0590)", "an error (S0504)"),
     "names_of_edition_2": ("LTIME, LDT, LTOD, LDATE, CHAR, WCHAR as names", "an error", "taken, with a warning (S0193)"),
     "constants_wrap": ("x : INT := 40000; UDINT_TO_LINT(-1)", "an error", "-25536, cut to the width, with a warning (S0791)"),
+    "signs_are_lost": ("x : UINT := -1, b : BYTE := -128: a negative constant where an unsigned type of its width is needed",
+                       "an error", "65535, 128: its bits, with a warning (S0791)"),
     "short_circuits": ("a AND f(x), a OR f(x) of BOOL", "both sides are worked out",
                        "as AND_THEN and OR_ELSE: the right side only if the left one leaves the result open"),
     "joined_words": ("FUNCTIONBLOCK, END_FUNCTIONBLOCK", "an error", "FUNCTION_BLOCK, END_FUNCTION_BLOCK"),
@@ -315,7 +318,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
                    conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
                    bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True,
-                   assignments_are_values=True,
+                   assignments_are_values=True, signs_are_lost=True,
                    short_addresses=True,
                    dates_take_durations=True)
 _ROWS = (
@@ -368,9 +371,9 @@ def dialect(name: str) -> Dialect:
     return DIALECTS[name.lower()]
 
 
-def takers(switch: str, value: bool = True) -> str:
-    """The option for a dialect with a switch set, or not set, for hints: `--dialect codesys, twincat or rusty`."""
-    return option(row for row in DIALECTS.values() if bool(getattr(row, switch)) is value)
+def takers(switch: str, value: bool = True, other: str = "") -> str:
+    """The option for a dialect with a switch, or the other one, set, or not set: `--dialect codesys, twincat or rusty`."""
+    return option(row for row in DIALECTS.values() if bool(getattr(row, switch) or other and getattr(row, other)) is value)
 
 
 def option(rows: Iterable[Dialect]) -> str:

@@ -6,7 +6,7 @@ from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, Elementary, EnumType, RefType, StringType, StructType, Type, base, fold
 from fbvm.check.calls import generics, methods, standard
 from fbvm.check.calls.binding import bind, bind_of_action
-from fbvm.check.expressions import names, objects, qualified
+from fbvm.check.expressions import objects, qualified
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Pou, PouCall, Variable
@@ -66,7 +66,7 @@ def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -
     pou = scope.project.pou(name, scope.source) if not (unwritten and standard.is_known(fold(name))) else None
     if pou is not None and pou.is_function:
         return _function(scope, call, pou, want)
-    if isinstance(callee, tree.NameRef) and names.program(scope, callee):
+    if isinstance(callee, tree.NameRef) and objects.program(scope, callee):
         return _instance(scope, call, as_value)
     if pou is not None:
         scope.error("S0401", callee, f"{pou.name} is a {pou.kind}: what is called is an instance of it",

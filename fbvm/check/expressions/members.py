@@ -47,7 +47,7 @@ def member(scope: Scope, expr: tree.Member, want: Type | None) -> Type | None:
             _report_unlisted(scope, qualified.last_name(of), expr.name)
             return None
         if isinstance(of, tree.NameRef):
-            names.program(scope, of)
+            objects.program(scope, of)
     if isinstance(of, tree.NameRef):
         scope.qualifiers.add(of)
     is_property, kind = objects.value_of_property(scope, expr)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.areas import FLAG_AREAS, AddressError
-from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, EnumType, Type, fold
+from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, EnumType, Type, fold
 from fbvm.check.expressions import objects, unknown_names
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Variable
@@ -21,6 +21,10 @@ def name(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
         if is_property:
             return kind
     found = found or scope.variable(expr.text)
+    if found is not None and _is_member_there(scope, expr, found, want):
+        scope.error("S0193", expr, f"{expr.text} is a member of {want}, not the result of {found.name}, which is {found.type}",
+                    "give the member or the method another name")
+        return _enumerated(scope, expr, want)
     if found is not None:
         return variable(scope, expr, found)
     if objects.is_self(scope, expr):
@@ -28,12 +32,19 @@ def name(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
     return _enumerated(scope, expr, want)
 
 
+def _is_member_there(scope: Scope, expr: tree.NameRef, found: Variable, want: Type | None) -> bool:
+    """True for the name of a result where a dialect takes a member of the enumeration that is needed, as `state := EXECUTE` in
+    a METHOD Execute : BOOL."""
+    return found.kind == "RESULT" and isinstance(want, EnumType) and fold(expr.text) in want.members and \
+        scope.dialect.numbers_of_enumerations and found.type == BOOL
+
+
 def _enumerated(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
     """The type of a name that is a member of an enumeration, else a diagnostic."""
     seen = _members(scope, expr, want)
     free = [m for m in seen if "qualified_only" not in m[0].attributes]
     near = [m for m in free if m[2] == scope.source.library]
-    wanted = [m for m in free if m[0] == want] or near or free
+    wanted = [m for m in free if m[0] == want] or _of_own_variables(scope, free) or near or free
     if len({kind.name for kind, _, _ in wanted}) == 1:
         scope.facts.constants[expr] = wanted[0][1]
         return wanted[0][0]
@@ -55,6 +66,28 @@ def _members(scope: Scope, expr: tree.NameRef, want: Type | None) -> list[tuple[
             if (m[2] or not own) and (m[0] == want or _is_seen(scope, m[0]))]
 
 
+def _of_own_variables(scope: Scope, members: list[tuple[EnumType, int, str]]) -> list[tuple[EnumType, int, str]]:
+    """Those members whose enumeration is written out at a variable of the POU, or else of its block, or of a base of that."""
+    pou = scope.pou
+    if pou is None or len(members) < 2:
+        return []
+    levels = [pou, *(pou.own_block.lineage() if pou.own_block is not None and pou.own_block is not pou else ())]
+    for level in levels:
+        inherited = level.base.variables if level.base is not None else {}
+        written = {_innermost(each.type).name for name, each in level.variables.items() if name not in inherited}
+        found = [m for m in members if m[0].name.startswith("(") and m[0].name in written]
+        if found:
+            return found
+    return []
+
+
+def _innermost(kind: Type) -> Type:
+    """The type of the elements of an array, of those of an array of arrays; any other type as it is."""
+    while isinstance(kind, ArrayType):
+        kind = kind.element
+    return kind
+
+
 def _is_seen(scope: Scope, kind: EnumType) -> bool:
     """True if an enumeration can be named without its namespace, so that its members can be named by themselves."""
     return "." not in kind.name or scope.named_type(kind.name.rpartition(".")[2]) == kind
@@ -68,18 +101,6 @@ def variable(scope: Scope, expr: tree.Expr, meant: Variable) -> Type | None:
     if meant.constant and meant.value is not None:
         scope.facts.constants[expr] = meant.value
     return meant.type
-
-
-def program(scope: Scope, expr: tree.NameRef) -> bool:
-    """True for the name of a program that stands for its one instance, which has its type and variable from then on."""
-    if expr in scope.facts.types or expr in scope.facts.wrong:
-        return False
-    pou = scope.project.pou(expr.text, scope.source) if scope.variable(expr.text) is None else None
-    instance = scope.context.program_instance(pou, expr) if pou is not None and pou.kind == "PROGRAM" else None
-    if instance is None:
-        return False
-    scope.facts.types[expr], scope.facts.variables[expr] = instance.type, instance
-    return True
 
 
 def address(scope: Scope, expr: tree.Direct, want: Type | None) -> Type | None:

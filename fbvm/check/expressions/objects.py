@@ -50,6 +50,8 @@ def instance_of(scope: Scope, expr: tree.Expr) -> StructType | None:
         if found is not None:
             scope.facts.types[expr] = found
         return found
+    if isinstance(expr, tree.NameRef):
+        program(scope, expr)
     whole = scope.infer(expr)
     if isinstance(whole, RefType) and whole.interface:
         whole = whole.target
@@ -122,18 +124,29 @@ def _may_be_instance(scope: Scope, expr: tree.Expr) -> bool:
     """False for a name in front of a point that is no value: of a library, of a list, of an enumeration."""
     if isinstance(expr, tree.NameRef):
         return expr in scope.facts.types or is_self(scope, expr) or scope.variable(expr.text) is not None or \
-            find(scope, expr, ("GET {}",)) is not None
+            find(scope, expr, ("GET {}",)) is not None or program(scope, expr)
     if isinstance(expr, tree.Member) and qualified.is_space(scope, expr.of):
         return isinstance(qualified.member(scope, expr), Variable)
     return not (isinstance(expr, tree.Member) and isinstance(expr.of, tree.NameRef) and not _may_be_instance(scope, expr.of)
                 and not _is_program(scope, expr.of))
 
 
+def program(scope: Scope, expr: tree.NameRef) -> bool:
+    """True for the name of a program that stands for its one instance, which has its type and variable from then on."""
+    if expr in scope.facts.types or expr in scope.facts.wrong:
+        return False
+    pou = scope.project.pou(expr.text, scope.source) if scope.variable(expr.text) is None else None
+    instance = scope.context.program_instance(pou, expr) if pou is not None and pou.kind == "PROGRAM" else None
+    if instance is None:
+        return False
+    scope.facts.types[expr], scope.facts.variables[expr] = instance.type, instance
+    return True
+
+
 def _is_program(scope: Scope, name: tree.NameRef) -> bool:
     """True for the name of a program, which stands for its one instance."""
     pou = scope.project.pou(name.text, scope.source)
     return pou is not None and pou.kind == "PROGRAM"
-
 
 
 def is_dynamic(scope: Scope, method: Pou, instance: tree.Expr | None) -> bool:

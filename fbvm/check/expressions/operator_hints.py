@@ -5,10 +5,13 @@ from __future__ import annotations
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, DATE, Elementary, EnumType, StringType, StructType, Type, common
 from fbvm.check.expressions.assignability import UNSIGNED, conversion_hint, convertible, is_untyped
+from fbvm.check.expressions.constants import limits
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT
 from fbvm.syntax import tree
+
+COMPARISONS = ("=", "<>", "<", ">", "<=", ">=")
 
 
 def report_undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
@@ -22,6 +25,17 @@ def report_undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, w
     if switch and "--dialect" not in hint:
         hint += f", or take {takers(switch)}" if hint else f"take {takers(switch)}"
     scope.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
+
+
+def report_larger(scope: Scope, op: str, literal: tree.Expr, kind: Type) -> bool:
+    """Report an integer that is compared with a type that does not hold it, which is smaller; True if it did."""
+    value, span = scope.facts.constants.get(literal), limits(kind)
+    if op not in COMPARISONS or not isinstance(value, int) or span is None or value <= span[1]:
+        return False
+    numbers = kind != BOOL and is_any(kind, "ANY_INT", "ANY_BIT")
+    scope.error("S0702", literal, f"{value} does not fit {kind}, which holds {span[0]} to {span[1]}",
+                f"convert the other side to a larger type, or take {takers('integers_and_bits')}" if numbers else "")
+    return True
 
 
 def _switch(op: str, left: Type, right: Type) -> str:

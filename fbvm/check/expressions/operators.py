@@ -32,13 +32,12 @@ from fbvm.base.types import (
 from fbvm.check.expressions import constants
 from fbvm.check.expressions.assignability import ADDRESSES, UNSIGNED, as_number, is_untyped
 from fbvm.check.expressions.literals import as_character
-from fbvm.check.expressions.operator_hints import bit_hint, report_undefined
+from fbvm.check.expressions.operator_hints import COMPARISONS, bit_hint, report_larger, report_undefined
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Value
 from fbvm.syntax import tree
 
-COMPARISONS = ("=", "<>", "<", ">", "<=", ">=")
 _FAMILY = {
     "+": ("ANY_NUM",), "-": ("ANY_NUM",), "*": ("ANY_NUM",), "/": ("ANY_NUM",), "MOD": ("ANY_INT",),
     "AND": ("ANY_BIT",), "OR": ("ANY_BIT",), "XOR": ("ANY_BIT",),
@@ -149,7 +148,7 @@ def _meant(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
     kind = _widened(scope, expr.op, kind)
     if not is_untyped(kind):
         for side, side_kind in ((expr.left, left), (expr.right, right)):
-            if is_untyped(side_kind) and scope.adopt(side, kind) is None:
+            if is_untyped(side_kind) and (report_larger(scope, expr.op, side, kind) or scope.adopt(side, kind) is None):
                 return None
     return _folded(scope, expr, kind, BOOL if expr.op in COMPARISONS else kind)
 
@@ -322,13 +321,15 @@ def _operand_type(scope: Scope, expr: tree.Binary, left: Type, right: Type, want
 
 
 def _meet_integer(scope: Scope, op: str, literal: tree.Expr, other: Type) -> Type:
-    """The type in which an untyped integer meets `other`: that, or where it computes and does not hold it a larger one."""
-    value, span = scope.facts.constants.get(literal), constants.limits(other)
-    if op in COMPARISONS or not isinstance(value, int) or span is None or not is_any(other, "ANY_INT"):
+    """The type in which an untyped integer meets `other`: that, or if it does not hold it a larger one, in which is computed,
+    and in dialects that compare numbers of different types compared."""
+    value, span, compares = scope.facts.constants.get(literal), constants.limits(other), op in COMPARISONS
+    number = as_number(base(other), scope.dialect) if compares else other
+    if not isinstance(value, int) or span is None or not is_any(number, "ANY_INT") or span[0] <= value <= span[1]:
         return other
-    if span[0] <= value <= span[1]:
+    if compares and (not scope.dialect.integers_and_bits or value < span[0]):
         return other
-    larger = (ELEMENTARY[name] for name in IMPLICIT[base(other).name] if is_any(ELEMENTARY[name], "ANY_INT"))
+    larger = (ELEMENTARY[name] for name in IMPLICIT[base(number).name] if is_any(ELEMENTARY[name], "ANY_INT"))
     return next((kind for kind in larger if kind.low <= value <= kind.high), other)
 
 

@@ -23,6 +23,7 @@ from fbvm.base.types import (
     SubrangeType,
     Type,
     base,
+    converts,
     fold,
 )
 from fbvm.check.expressions import any_parameters, powers
@@ -126,7 +127,7 @@ class Scope:
                 self.refer_to(expr, kind)
             value = self.facts.constants.get(expr)
             return value is None or self._in_range(expr, value, target, code)
-        if converted_by_dialect(kind, target, self.dialect):
+        if self._is_converted(expr, kind, target):
             if isinstance(target, StructType) and target.block:
                 self.context.refuse_copy(self.context.block_of(target), self.source, expr)
             if expr in self.facts.constants:
@@ -140,6 +141,16 @@ class Scope:
                    hidden_hint(expr, target) or self.power_hint(expr, target) or
                    (literal_hint(value, base(target)) if constant else mismatch_hint(expr, kind, target)))
         return False
+
+    def _is_converted(self, expr: tree.Expr, kind: Type, target: Type) -> bool:
+        """True if the dialect converts a value implicitly.
+
+        An enumeration with the attribute strict takes constants alone, of other enumerations too, that are values of members."""
+        if converted_by_dialect(kind, target, self.dialect):
+            return True
+        number = kind.base if isinstance(kind, EnumType) else kind
+        return self.dialect.numbers_of_enumerations and isinstance(target, EnumType) and isinstance(number, Elementary) and \
+            self.facts.constants.get(expr) in target.shown and converts(number, target.base)
 
     def refer_to(self, expr: tree.Expr, kind: StructType) -> None:
         """Record that an interface refers to an instance of this type."""
@@ -228,8 +239,10 @@ class Scope:
         if span is None or span[0] <= value <= span[1]:
             return value
         cuts = not isinstance(target, SubrangeType) and kind != BOOL
-        if not cuts or not self.dialect.constants_wrap:
-            others = f"take {takers('constants_wrap')}, where it is cut to the width of {target}" if cuts else ""
+        if not cuts or not self.dialect.constants_wrap and \
+                not (self.dialect.signs_are_lost and _is_signed_bits(value, kind)):
+            switch = "signs_are_lost" if cuts and _is_signed_bits(value, kind) else "constants_wrap"
+            others = f"take {takers('constants_wrap', other=switch)}, where it is cut to the width of {target}" if cuts else ""
             self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}",
                        literal_hint(value, kind) if kind == BOOL else others)
             return None
@@ -297,3 +310,9 @@ class Scope:
             return any_parameters.is_array(expr)
         return expr not in self.facts.rewritten and self.is_in_memory(expr) and \
             (type(expr) in _PLACES or expr in self.facts.followed)
+
+
+def _is_signed_bits(value: int | float, kind: Type) -> bool:
+    """True for a negative integer that a signed type as wide as the unsigned type `kind` holds."""
+    return isinstance(kind, Elementary) and is_any(kind, "ANY_UNSIGNED", "ANY_BIT") and isinstance(value, int) and \
+        -(1 << kind.bits - 1) <= value < 0

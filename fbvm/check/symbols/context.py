@@ -215,9 +215,14 @@ class Context:
         return self._attributes[pou]
 
     def refuse_copy(self, block: Pou, source: Source, node: tree.Node) -> None:
-        """Report a copy of an instance if an attribute of its block, or of one that it extends, forbids it or warns of it."""
+        """Report a copy of an instance if an attribute of its block forbids it, or one of a block that it extends warns of it.
+
+        TwinCAT copies instances of a block that extends one with no_assign, as published programs do."""
         for level in block.lineage():
-            if "no_assign" in self.attributes(level):
+            if level is not block and "no_assign" in self.attributes(level):
+                self.report.add("S0194", source, node, f"an instance of {block.name} is copied: {level.name}, which it extends, "
+                                "has no_assign", "pointers in the copy still point into the source")
+            elif "no_assign" in self.attributes(level):
                 self.report.add("S1012", source, node, f"instances of {level.name} are not copied: it has no_assign",
                                 "use a pointer, a reference or an in-out")
             elif "no_assign_warning" in self.attributes(level):
