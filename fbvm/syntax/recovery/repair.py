@@ -18,9 +18,7 @@ class Repair:
     hint: str = ""
     opener: Token | None = None
     """The word or bracket to which the message refers."""
-    """The word or bracket to which the message refers."""
     cut: bool = False
-    """Whether what has been read of the statement or declaration is given up first."""
     """Whether what has been read of the statement or declaration is given up first."""
     code: str = "S0101"
     lossless: bool | None = None

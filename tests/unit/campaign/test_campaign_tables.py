@@ -115,6 +115,15 @@ def test_the_present_rate_is_that_of_the_last_ten_seconds() -> None:
     assert made._samples[-2:] == [(25.0, 65), (25.4, 67)], "what comes within half a second is one sample"
 
 
+def test_the_first_results_are_one_sample_if_they_come_within_half_a_second() -> None:
+    clock = Clock()
+    made = Progress(1000, clock)
+    for tenth, samples in ((1, 2), (2, 2), (4, 2), (5, 3), (6, 3), (9, 4), (10, 4)):
+        clock.now_s = tenth / 10
+        made.add([Result(0)])
+        assert len(made._samples) == samples and made._samples[-1] == (tenth / 10, made.done), tenth
+
+
 def test_the_page_says_all_figures() -> None:
     made = progress()
     page = progress_page(made, "A & B", {0: "2.fbtrace"})
