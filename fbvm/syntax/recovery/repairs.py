@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fbvm.syntax.recovery.chart_mistakes import chart_mistake
-from fbvm.syntax.recovery.frames import OPENERS, UNITS, anchor, frames
+from fbvm.syntax.recovery.frames import HEADS, OPENERS, UNITS, anchor, frames, open_head
 from fbvm.syntax.recovery.mistakes import known_mistake, open_bracket
 from fbvm.syntax.recovery.repair import Repair
 from fbvm.syntax.recovery.wording import found, hint, quoted, sign, unlike
@@ -108,6 +108,9 @@ def _replacements(automaton: Automaton, following: list[Token]) -> Iterator[Tria
 def _removal(automaton: Automaton, following: list[Token]) -> Iterator[Trial]:
     token = following[0]
     if token.type in OPENERS or token.type in UNITS or token.type in ("VAR", "ACTION", *ELEMENTS):
+        return
+    head = open_head(automaton.states, automaton.values)
+    if head and token.type == HEADS[head.word.type]:  # what stands behind it is no head, even where an assignment is a condition
         return
     rest = following[1:]
     score = _score(automaton, automaton.states, rest)

@@ -21,7 +21,7 @@ GROUPS = (
         "MINUS", "NOT", "DIRECT"}),
     ("a type", {"NAME", "ARRAY"}, {
         "NAME", "ARRAY", "STRING", "WSTRING", "STRUCT", "UNION", "REF_TO", "POINTER", "REFERENCE", "LPAR"}),
-    ("a name", {"NAME"}, {"NAME", "POU_MODIFIER", "QUALIFIER", "AT"}),
+    ("a name", {"NAME"}, {"NAME", "POU_MODIFIER", "QUALIFIER", "AT", "TYPED_LITERAL"}),
     ("an address such as D100, CIO 1519.03 or %MW10", {"LOCATION"}, {"LOCATION"}),
 )
 """The name of a group of terminals, the terminals that must all be expected for the name to be used, and the group."""
@@ -93,6 +93,8 @@ def wanted(kinds: set[str]) -> str:
     rest = set(kinds) - UNSAID
     if {"NAME", "SEMICOLON"} <= rest and rest & {"END_VAR", "END_TYPE", "END_STRUCT", "END_UNION"}:
         rest -= {"SEMICOLON"}  # one too many is taken, and seldom meant
+    if {"THEN", "DO", "END_REPEAT"} & rest:
+        rest -= {"ASSIGN"}  # an assignment is a condition for some compilers, and seldom meant as one
     if {"SEMICOLON", "ASSIGN"} <= rest:
         rest -= LABEL_SIGNS
     elif rest - CONTINUATIONS - {"LPAR"}:

@@ -33,7 +33,6 @@ ONE_ERROR = [
     ("IF a x := 1; END_IF y := 1;", "`THEN` expected before `x`", 2),
     ("WHILE a x := 1; END_WHILE y := 1;", "`DO` expected before `x`", 2),
     ("CASE a 1: x := 1; END_CASE y := 1;", "`OF` expected before `1`", 2),
-    ("IF a := 1 THEN x := 1; END_IF y := 1;", "`=` expected, but `:=` found", 2),
     ("IF a + THEN x := 1; END_IF y := 1;", "an expression expected, but `THEN` found", 2),
     ("IF THEN x := 1; END_IF y := 1;", "an expression expected, but `THEN` found", 2),
     ("FOR i = 1 TO 2 DO x := 1; END_FOR y := 1;", "`:=` expected, but `TO` found", 2),
