@@ -15,7 +15,6 @@ import pytest
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import dialect as named_dialect
 from fbvm.code.compiler import compile_sources
-from fbvm.code.image import Site
 from fbvm.interchange.formats.given import sources_by_name
 from fbvm.interchange.twincat import PROJECT_SUFFIX
 from fbvm.interchange.twincat.project import read_project
@@ -162,15 +161,14 @@ class SuiteItem(pytest.Item):
         lines = []
         for failure in error.failures:
             when = f"scan {failure.scan} ({show_time(failure.now_ns)[2:]})"
-            if failure.site is None and (at := self.test.line_of(failure.text)) is not None:
-                failure.site = Site(self.test.file, "", at, 1)
-            if failure.site is None:
+            site = failure.site
+            file, number = (site.file, site.line) if site else (self.test.file, self.test.line_of(failure.text))
+            if number is None:
                 lines += [f"{head}, {when}", f"E   {failure.text}"]
                 continue
             subject = self.parent.subject
-            line = subject.line(failure.site.file, failure.site.line) if subject is not None else ""
-            lines += [f"{failure.site.file}:{failure.site.line}: in {error.suite}, test {error.name}, {when}", f">   {line}",
-                      f"E   {failure.text}"]  # fmt: skip
+            line = subject.line(file, number) if subject is not None else ""
+            lines += [f"{file}:{number}: in {error.suite}, test {error.name}, {when}", f">   {line}", f"E   {failure.text}"]
         return "\n".join(lines)
 
     def reportinfo(self) -> tuple[Path, int | None, str]:

@@ -144,7 +144,8 @@ def _flags(plc: Plc, suites: Sequence[str]) -> dict[tuple[str, int], int]:
     """Where in the memory it stands whether a test has failed, by the path of its suite and its number."""
     found = {}
     for suite in suites:
-        for number in range(1, MOST_TESTS + 1):
+        for before in range(MOST_TESTS):
+            number = before + 1
             try:
                 place = find(plc.image.symbols, plc.memory.areas, f"{suite}.Tests[{number}].TestIsFailed")
             except UnknownPlace:

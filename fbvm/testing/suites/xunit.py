@@ -26,7 +26,7 @@ def _lines(runs: Sequence[SuiteRun]) -> Iterator[str]:
     suites = [(run, suite) for run in runs for suite in dict.fromkeys(suite for suite, _ in run.results)]
     for number, (run, suite) in enumerate(suites):
         own = {name: result for (path, name), result in run.results.items() if path == suite}
-        time = max((result.duration_s for result in own.values()), default=0.0)
+        time = max(result.duration_s for result in own.values())
         yield (f'<testsuite id="{number}" name={quoteattr(suite)} tests="{len(own)}" '
                f'failures="{sum(result.failed for result in own.values())}" time="{time}">')
         for name, result in own.items():
