@@ -207,3 +207,13 @@ def test_what_is_no_instance_is_said_so() -> None:
             pass
     place = plc.find("Main")
     assert isinstance(place, Place)
+
+
+@pytest.mark.slow
+def test_an_instance_without_rungs_has_no_elements() -> None:
+    image = compile_text(RUNGS.replace("n : INT;", "t : TON;").replace("LADDER\n", "t();\nLADDER\n", 1)).image
+    assert image is not None
+    plc = Plc(image)
+    with powering(plc) as power:
+        plc.scan()
+        assert power.elements("Main.t") == {} and len(power.elements("Main")) == 5
