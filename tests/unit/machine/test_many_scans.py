@@ -163,6 +163,29 @@ def test_who_wants_every_scan_gets_it_with_breakpoints_too(disturb: Any) -> None
     assert not plc.scan_many(5) and plc.scans == 6
 
 
+@pytest.mark.slow
+def test_a_recorder_is_told_in_front_of_many_scans_with_breakpoints_and_behind_them() -> None:
+    told: list[tuple[Any, ...]] = []
+
+    class Recorder:
+        wants_plain_scans = False
+
+        def __getattr__(self, name: str) -> Any:
+            return lambda *given: told.append((name, *given))
+
+    plc = Plc(IMAGE, engine="native")
+    plc.scan()
+    plc.record_inputs(Recorder())  # type: ignore[arg-type]
+    plc.breakpoints.line("Other", when="P.n = 9999")
+    told.clear()
+    cycle_ns = plc.cycle_ns
+    assert plc.scan_many(5)
+    assert told == [("before", cycle_ns), ("after", 5, cycle_ns, cycle_ns)]
+    told.clear()
+    assert plc.run(scans=3) == "scans"
+    assert told == [("run_begins",), ("before", 6 * cycle_ns), ("after", 3, 6 * cycle_ns, cycle_ns), ("run_ends",)]
+
+
 def test_after_a_restart_the_first_scan_is_one_again() -> None:
     many, one = Plc(IMAGE, engine="native"), single(Plc(IMAGE, engine="native"))
     for plc in (many, one):

@@ -109,3 +109,13 @@ def test_a_share_and_a_sum_behind_a_burst() -> None:
     lateness.missed, more.missed = 2, 3
     lateness.add(more)
     assert lateness.missed == 5
+
+
+def test_of_scans_that_took_equally_long_the_first_is_the_longest() -> None:
+    one, other = ScanTimes(100), ScanTimes(100)
+    for scan, time_ns in enumerate((50, 70, 70)):
+        one.note(scan, time_ns)
+        other.note(scan + 10, time_ns)
+    one.note_burst(3, [0, 70], 140)
+    one.add(other, 1000)
+    assert (one.longest_ns, one.longest_scan, one.count) == (70, 1, 8)
