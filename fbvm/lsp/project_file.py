@@ -27,7 +27,7 @@ def diagnostics(path: Path, text: str | None) -> list[Diagnostic]:
 
 
 def keys_at(text: str, offset: int) -> Keys:
-    """The keys of the table in which a place lies."""
+    """The keys of the table in which a place lies; {} where it has none, such as in `[plc]` without a name."""
     header = None
     for header in _HEADER.finditer(text, 0, offset):  # noqa: B007
         pass
@@ -41,7 +41,7 @@ def keys_at(text: str, offset: int) -> Keys:
         if key is None or isinstance(key.kind, Kind):
             return {}
         keys, named = key.kind, key.named
-    return keys
+    return {} if named else keys
 
 
 def completions(text: str, offset: int) -> Iterator[tuple[str, str, str]]:
@@ -63,10 +63,10 @@ def _values(keys: Keys, line: str) -> Iterator[tuple[str, str, str]]:
     """The values of a key that has only some."""
     name = _KEY.match(line)
     key = keys.get(name[1]) if name is not None else None
-    if key is None or not isinstance(key.kind, Kind):
+    if name is None or key is None or not isinstance(key.kind, Kind):
         return
     words: Sequence[str] = ("true", "false") if key.kind.called == "true or false" else re.findall(r'"([^"]+)"', key.kind.called)
-    if name is not None and name[1] == "dialect":
+    if name[1] == "dialect":
         words = tuple(DIALECTS)
     quoted = '"' if words != ("true", "false") and line.count('"') % 2 == 0 else ""
     yield from ((word, key.meaning, f"{quoted}{word}{quoted}") for word in words)
@@ -89,8 +89,8 @@ def meaning_at(text: str, offset: int) -> str:
     line = text[start:(text.find("\n", offset) + len(text) + 1) % (len(text) + 1)]
     name = _KEY.match(line)
     key: Key | None = keys_at(text, start).get(name[1]) if name is not None else None
-    if key is None:
+    if name is None or key is None:
         return ""
     kind = f"\n\n{key.kind.called}" if isinstance(key.kind, Kind) else ""
-    default = f"\n\nWithout it: {key.default}" if isinstance(key.default, str | int | bool) else ""
-    return f"**{name[1] if name else ''}**: {key.meaning}{kind}{default}"
+    default = f"\n\nWithout it: {key.usual}" if key.usual else ""
+    return f"**{name[1]}**: {key.meaning}{kind}{default}"

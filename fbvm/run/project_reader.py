@@ -12,8 +12,9 @@ from typing import Any
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.digits import whole_number
 from fbvm.base.toml import TomlError, load_toml
+from fbvm.net.faults import FOREVER
 from fbvm.run.toml_keys import Path, span
-from fbvm.watch.values import parse_time_ns
+from fbvm.watch.values import parse_time_ns, show_time
 from fbvm.wire.link import Peer
 
 REQUIRED = object()
@@ -40,6 +41,16 @@ class Key:
     default: Any = REQUIRED
     many: bool = False
     named: bool = False
+
+    @property
+    def usual(self) -> str:
+        """The default as people write it; "" for a key that has none, or none that can be written."""
+        if not isinstance(self.default, str | int) or self.default == FOREVER:
+            return ""
+        if isinstance(self.default, bool):
+            return str(self.default).lower()
+        is_time = isinstance(self.kind, Kind) and "time" in self.kind.called and isinstance(self.default, int)
+        return show_time(self.default).removeprefix("T#") if is_time else str(self.default)
 
 
 Keys = Mapping[str, Key]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.machine.backplane import UNITS
-from fbvm.net.faults import FOREVER, NAMED
+from fbvm.net.faults import NAMED
 from fbvm.run import project
 from fbvm.run.fault_rows import key_of, settings
 from fbvm.run.project_reader import REQUIRED, Key, Keys, Kind
@@ -59,12 +59,7 @@ def _table(name: str, key: Key, path: str) -> list[str]:
 
 
 def _default(key: Key) -> str:
-    if key.default is REQUIRED:
-        return "**needed**"
-    if key.default is None or key.default == () or key.default == FOREVER:
-        return ""
-    is_time = "time" in (key.kind.called if isinstance(key.kind, Kind) else "")
-    return code(show_time(key.default).removeprefix("T#") if is_time else key.default)
+    return "**needed**" if key.default is REQUIRED else code(key.usual) if key.usual else ""
 
 
 def _units() -> Iterator[str]:

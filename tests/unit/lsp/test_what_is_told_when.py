@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from pathlib import Path
 
 import pytest
 from in_process import PUMP, Desk, span, talk
+from pygls.exceptions import JsonRpcInvalidParams
+from pygls.protocol import JsonRPCProtocol
 
 from fbvm.lsp import server as server_module
 from fbvm.lsp.projects import Settings
+from fbvm.lsp.server import Server
 
 pytestmark = pytest.mark.slow  # pygls and the protocol take their time to be imported
 
@@ -108,3 +112,12 @@ def test_settings_that_change_begin_everything_anew(folder: Path) -> None:
         assert after.program.checked is not None and desk.told == {}
 
     talk(folder, about, "main.st")
+
+
+def test_a_refusal_is_no_fault_that_is_logged(monkeypatch: pytest.MonkeyPatch) -> None:
+    logger = logging.getLogger(JsonRPCProtocol.__module__)
+    monkeypatch.setattr(logger, "filters", [])
+    Server("1")
+    for error, is_logged in ((JsonRpcInvalidParams("no"), False), (ValueError("a fault"), True), (None, True)):
+        record = logging.LogRecord("x", logging.ERROR, "x", 1, "said", None, (type(error), error, None) if error else None)  # type: ignore[arg-type]
+        assert bool(logger.filter(record)) is is_logged, error
