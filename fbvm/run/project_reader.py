@@ -49,8 +49,9 @@ class Key:
             return ""
         if isinstance(self.default, bool):
             return str(self.default).lower()
-        is_time = isinstance(self.kind, Kind) and "time" in self.kind.called and isinstance(self.default, int)
-        return show_time(self.default).removeprefix("T#") if is_time else str(self.default)
+        if isinstance(self.kind, Kind) and "time" in self.kind.called and isinstance(self.default, int):
+            return show_time(self.default).removeprefix("T#")
+        return str(self.default)
 
 
 Keys = Mapping[str, Key]
