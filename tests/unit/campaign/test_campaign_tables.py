@@ -143,6 +143,7 @@ def test_the_page_says_all_figures() -> None:
         later = progress_page(made, "A", {})
         assert ("refresh" in later) is refreshes and "and will for" not in later
     assert "<title>0 % of A</title>" in progress_page(Progress(0, Clock()), "A", {})
+    assert "<title>100 % of A</title>" in progress_page(Progress(1, Clock(), [Result(0)]), "A", {})
 
 
 def test_times_are_told_in_two_units() -> None:

@@ -102,7 +102,8 @@ def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
     main = bodies.lines(pou.body) if pou.body else []
     actions = [(name, [with_new_names(line, bodies.renamed) for line in bodies.lines(body)]) for name, body in pou.actions]
     if pou.transitions and (pou.body is None or pou.body.language != "SFC"):
-        reading.report("X0203", pou.element, f"{len(pou.transitions)} transitions without a chart are not taken over")
+        names = ", ".join(name for name, _ in pou.transitions)
+        reading.report("X0203", pou.element, f"without a chart transitions are not taken over: {names}")
     made = [VarList(section, (), tuple(Variable(name, kind) for name in names))
             for (section, kind), names in bodies.scope.made.items()]
     lines = [f"// {pou.note}"] if pou.note else []
