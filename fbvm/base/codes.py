@@ -171,5 +171,7 @@ CODES: dict[str, Code] = {
         "R0120": "the program has stopped itself",
         "R0121": "calls nested too deep",
         "R0122": "the program has raised an exception",
+        "R0123": "__DELETE of what __NEW has not made",
+        "R0124": "__DELETE of what has been deleted already",
     }),
 }

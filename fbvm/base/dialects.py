@@ -118,6 +118,8 @@ class Dialect:
     functions_have_inputs: bool = False
     plain_names: bool = False
     locals_hide_results: bool = False
+    dynamic_memory: str = ""
+    """Whether there are __NEW and __DELETE: "marked" if they want an attribute at what is made, "free" if they do not."""
     offered: bool = True
     """Whether hints for sources of any tool name it."""
 
@@ -291,6 +293,9 @@ QUESTIONS = {
                     "Init is the variable, Init.X and Init.T are the flags of the step, with a warning (S0193)"),
     "locals_hide_results": ("FUNCTION Test with VAR Test: a local variable named as the function", "an error",
                             "the variable, and the function returns the first value of its type, with a warning (S0193)"),
+    "dynamic_memory": ("p := __NEW(Motor); __DELETE(p);", "an error (S0903)",
+                       "make and end variables while the program runs: with {attribute 'enable_dynamic_creation'} at blocks "
+                       "and types of no library, under strucpp without it"),
     "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts; "
                   "REAL_TO_STRING(100.0), TIME_TO_STRING(T#1s); functions beyond the standard",
                   "as the standard's bodies compute it; '100.0', 'T#1s'; none",
@@ -320,7 +325,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True,
                    assignments_are_values=True, signs_are_lost=True,
                    short_addresses=True,
-                   dates_take_durations=True)
+                   dates_take_durations=True, dynamic_memory="marked")
 _ROWS = (
     STANDARD,
     _CODESYS,
@@ -331,7 +336,7 @@ _ROWS = (
             large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
             libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True,
-            glued_words=True),
+            glued_words=True, dynamic_memory=""),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
@@ -344,7 +349,7 @@ _ROWS = (
             last_of_mux=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, narrowing=True, whole_powers=True, lenient_texts="leading", ties_away=True,
             constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True,
-            sizes_apart=True, short_references=True, doubled_quotes=True),
+            sizes_apart=True, short_references=True, doubled_quotes=True, dynamic_memory="free"),
     Dialect("rusty", "programs for RuSTy", ("rusty",), reals_of_other_widths=True, loop_ends_each_pass=True,
             integers_are_conditions=True,
             loop_counters_wrap=True,

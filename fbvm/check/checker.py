@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from fbvm.check.calls import calls, generics
-from fbvm.check.declarations import construction, globals, inheritance, interfaces, specs, variables
+from fbvm.check.calls import calls, dynamic_memory, generics
+from fbvm.check.declarations import construction, first_cycle, globals, inheritance, interfaces, specs, variables
 from fbvm.check.declarations.configurations import Configurations
 from fbvm.check.declarations.var_config import VarConfig
 from fbvm.check.expressions import references, rules
@@ -28,6 +28,9 @@ RULES = Rules(
     later_constant=variables.later_constant,
     body=check_body,
     members=inheritance.check_members,
+    type_of=specs.resolve,
+    construction=construction.of_value,
+    destruction=construction.endings_of_value,
 )
 
 
@@ -65,7 +68,8 @@ class Checker(Context):
         configurations.resolve(program)
         globals.declare(self)
         configurations.begin_tasks()
-        construction.construct_at_start(self)
+        first_cycle.construct_at_start(self)
+        dynamic_memory.find_exits(self)
         yield from self._bodies()
         globals.declare(self)
         self.check_usings()

@@ -14,8 +14,10 @@ from typing import Any
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SIZED_AREAS, SLOTS_OFFSET, Area, Mailbox, e_bank, with_sizes_apart
 from fbvm.base.types import Field, Type
-from fbvm.code.operations import Block
+from fbvm.code.operations import HEAP, LEASED, Block
 
+USUAL_HEAP, LARGEST_HEAP = 1 << 20, 1 << 30
+"""Bytes of a heap for which nothing else is said, and of the largest."""
 SAME_FOR_EQUAL = 2
 """The version of `marshal` in which equal data are equal bytes, whether or not parts of them are one object."""
 
@@ -82,6 +84,8 @@ class Layout:
     e_banks: tuple[str, ...] = ()
     mailboxes: tuple[Mailbox, ...] = ()
     sized: tuple[str, ...] | None = None
+    heap_bytes: int = 0
+    """Bytes of the heap, from which __NEW takes; it comes behind everything else."""
 
     @cached_property
     def areas(self) -> dict[str, Area]:
@@ -95,9 +99,14 @@ class Layout:
         return areas
 
     @cached_property
+    def heap_at(self) -> int:
+        """Where the heap begins."""
+        return _page_up(max(SLOTS_OFFSET + self.slots_size, *(a.offset + a.size_bytes for a in self.areas.values())))
+
+    @cached_property
     def size(self) -> int:
         """Bytes of the whole buffer, in whole pages."""
-        return _page_up(max(SLOTS_OFFSET + self.slots_size, *(a.offset + a.size_bytes for a in self.areas.values())))
+        return self.heap_at + _page_up(self.heap_bytes)
 
 
 def _page_up(size: int) -> int:
@@ -122,16 +131,26 @@ class Objects:
 
     `leases` is the number of rows in the buffer, from `leases_at` on (see LEASE_BYTES), for what ends while pointers to it are
     kept.  The object of a lease is LEASED + (row << `held_bits`) + the number under which it is held, which is another one
-    each time: so a pointer of an earlier lease of the same row is found out."""
+    each time: so a pointer of an earlier lease of the same row is found out.
+
+    The last `heap_rows` of them are for what __NEW makes, from the one with the number `heap_row` on; `heap_at` is where the
+    words lie that __NEW and __DELETE work with (see operations.HEAP)."""
 
     extents: tuple[tuple[int, int], ...] = ()
     leases: int = 0
     leases_at: int = 0
+    heap_rows: int = 0
+    heap_row: int = 0
+    heap_at: int = 0
 
     @property
     def held_bits(self) -> int:
         """Bits for the number under which a lease is held."""
         return 23 - max(self.leases - 1, 0).bit_length()
+
+    def is_made(self, number: int) -> bool:
+        """True for the number of an object that __NEW has made."""
+        return self.heap_rows > 0 and number >= LEASED + (self.heap_row << self.held_bits)
 
 
 @dataclass(frozen=True)
@@ -215,7 +234,25 @@ class Image:
     def with_e_banks(self, banks: Iterable[str]) -> Image:
         """The image for a PLC that has these banks of the E area, too.  They follow its own, so no other offset changes."""
         missing = tuple(name for name in banks if name not in self.layout.e_banks)
-        return replace(self, layout=replace(self.layout, e_banks=(*self.layout.e_banks, *missing))) if missing else self
+        return self._laid_out(replace(self.layout, e_banks=(*self.layout.e_banks, *missing))) if missing else self
+
+    def with_heap(self, size: int | None) -> Image:
+        """The image for a PLC whose heap has so many bytes: as much as __NEW can take at the same time.
+
+        The same image for None, and if the program has no __NEW.  Raises ValueError for a size that no heap has."""
+        if size is None or not self.objects.heap_rows:
+            return self
+        if not 0 <= size <= LARGEST_HEAP:
+            raise ValueError(f"a heap has 0 to {LARGEST_HEAP} bytes, not {size}")
+        return self._laid_out(replace(self.layout, heap_bytes=size // 8 * 8))
+
+    def _laid_out(self, layout: Layout) -> Image:
+        """The image with another layout; the program finds its heap by the words that say where that is."""
+        if not self.objects.heap_rows:
+            return replace(self, layout=layout)
+        at = self.objects.heap_at + HEAP["start"]
+        bounds = b"".join(edge.to_bytes(4, "little") for edge in (layout.heap_at, layout.heap_at + layout.heap_bytes))
+        return replace(self, layout=layout, initial=(*(row for row in self.initial if row[0] != at), (at, bounds)))
 
 
 def _plain_bytes(data: Any) -> bytes:

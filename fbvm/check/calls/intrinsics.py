@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from fbvm.base.areas import PORTABLE_AREAS
 from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, RefType, StructType, Type, string
+from fbvm.check.calls import dynamic_memory
 from fbvm.check.calls.arguments import Arguments
 from fbvm.check.expressions import qualified
 from fbvm.check.expressions.scope import Scope
@@ -17,10 +18,7 @@ from fbvm.syntax import tree
 _PARAMETERS = {"SIZEOF": ["IN"], "XSIZEOF": ["IN"], "LOWER_BOUND": ["ARR", "DIM"], "UPPER_BOUND": ["ARR", "DIM"],
                "__ISVALIDREF": ["REF"], "__POUNAME": [], "__POSITION": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"],
                "__QUERYINTERFACE": ["ITFOBJECT", "ITFDST"], "__QUERYPOINTER": ["ITFOBJECT", "PDST"]}
-_NO_HEAP = "makes and ends variables while the program runs, and here each has its place before that"
 REFUSED = {
-    "__NEW": ("S0901", _NO_HEAP, "declare the variables, or an ARRAY of them, and point at one with ADR"),
-    "__DELETE": ("S0901", _NO_HEAP, "declare the variables, or an ARRAY of them, and point at one with ADR"),
     "INDEXOF": ("S0901", "gives the number of a POU in the runtime system of CODESYS", "no program here needs it"),
     "ADRINST": ("S0901", "gives the place of the own instance", "pass the instance as VAR_IN_OUT"),
     "INI": ("S0901", "gives RETAIN variables of an instance their first values again", "assign these in the program"),
@@ -28,13 +26,17 @@ REFUSED = {
     "__CURRENTTASK": ("S0901", "asks for a task of the runtime system of CODESYS", "declare a program for each task"),
 }
 """Operators of CODESYS that are refused: the code, what each does, and what to do here."""
-NAMES = frozenset(_PARAMETERS) | frozenset(REFUSED)
+NAMES = frozenset(_PARAMETERS) | frozenset(REFUSED) | {dynamic_memory.NEW, dynamic_memory.DELETE}
 _SEGMENTS = {"M": 0x40000000, "I": 0x80000000, "Q": 0xC0000000}
 """What BITADR adds to the number of the bit, by area (CODESYS online help, BITADR)."""
 
 
-def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | None:
-    """The type of a call of the intrinsic `name`, folded; None after a diagnostic."""
+def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | str | None:
+    """The type of a call of the intrinsic `name`, folded, "" if it has no result; None after a diagnostic."""
+    if name == dynamic_memory.NEW:
+        return dynamic_memory.new(scope, call)
+    if name == dynamic_memory.DELETE:
+        return dynamic_memory.delete(scope, call)
     if name in REFUSED:
         code, what, hint = REFUSED[name]
         scope.error(code, call.callee, f"{name} {what}: it is understood but not executed", hint)
@@ -162,7 +164,12 @@ def _bound(scope: Scope, call: tree.Call, name: str, value: tree.Expr, dimension
 def _size(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
     """SIZEOF(x) of a variable or a type: bytes, as a literal would be written but for ANY."""
     kind: Type | None = None
-    if (name := qualified.bare(scope, value)) is not None:
+    if isinstance(value, tree.TypeOperand):
+        resolved = scope.context.rules.type_of(scope, value.spec)
+        if resolved is None:
+            return None
+        kind = resolved[0]
+    elif (name := qualified.bare(scope, value)) is not None:
         kind = scope.named_type(name)
         pou = scope.project.pou(name, scope.source) if kind is None else None
         if pou is not None and pou.kind == "FUNCTION_BLOCK" and scope.context.interface(pou, scope.source, value):

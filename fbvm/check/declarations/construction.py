@@ -14,16 +14,13 @@ Source: Beckhoff Information System and CODESYS online help, Methods FB_init, FB
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from fbvm.base.diagnostics import Source
-from fbvm.base.hidden import ENDING
 from fbvm.base.types import BOOL, ArrayType, StructType, Type, fold
-from fbvm.check.symbols.config_facts import Run
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import PROGRAM_SLOT, Pou, Variable, holds_block
+from fbvm.check.symbols.facts import Pou, Variable, holds_block
 from fbvm.syntax import tree
-from fbvm.syntax.st.pragmas import init_slot
 from fbvm.syntax.tree.node import changed
 
 INIT, AFTER, EXIT = "FB_init", "call_after_init", "FB_exit"
@@ -35,7 +32,7 @@ INIT_KEY = fold(INIT)
 FLAGS = {INIT: ("bInitRetains", "bInCopyCode"), EXIT: ("bInCopyCode",)}
 """The inputs with which methods begin that the runtime system calls, and which it gives."""
 _FLAGS = len(FLAGS[INIT])
-_KEPT, _DONE = "retained values are kept", "__FB_init_done"
+KEPT, DONE = "retained values are kept", "__FB_init_done"
 """Hidden variables: TRUE while FB_init is called at a start that keeps RETAIN variables; TRUE and kept behind the first start."""
 
 
@@ -107,10 +104,11 @@ class Statements:
         node, declared = variable.node, variable.declared
         place = tree.NameRef(node.start, node.end, name)
         given = arguments(declared.spec) if declared is not None and phase == INIT else ()
-        yield from self._value(place, variable.type, given, declared, phase)
+        yield from self.value(place, variable.type, given, declared, phase)
 
-    def _value(self, place: tree.Expr, kind: Type, given: tuple[tree.Argument, ...], declared: tree.VarDecl | None,
-               phase: str) -> Iterator[tree.Statement]:
+    def value(self, place: tree.Expr, kind: Type, given: tuple[tree.Argument, ...], declared: tree.VarDecl | None,
+              phase: str) -> Iterator[tree.Statement]:
+        """The statements that do a phase for a value that `place` names; `given` are arguments of FB_init."""
         if not constructs(self.context, kind, phase):
             return
         if isinstance(kind, ArrayType):
@@ -122,7 +120,7 @@ class Statements:
         elif isinstance(kind, StructType):
             for field in kind.fields.values():
                 part = tree.Member(place.start, place.end, place, tree.Name(place.start, place.end, field.name))
-                yield from self._value(part, field.type, (), None, phase)
+                yield from self.value(part, field.type, (), None, phase)
 
     def _elements(self, place: tree.Expr, kind: ArrayType, given: tuple[tree.Argument, ...], declared: tree.VarDecl | None,
                   phase: str) -> Iterator[tree.Statement]:
@@ -131,14 +129,14 @@ class Statements:
         if own is not None and len(kind.bounds) == 1:
             for index, each in zip(range(kind.bounds[0][0], kind.bounds[0][1] + 1), own, strict=False):
                 element = tree.Index(place.start, place.end, place, (_integer(place, index),))
-                yield from self._value(element, kind.element, each, None, phase)
+                yield from self.value(element, kind.element, each, None, phase)
             return
         counters = []
         for _ in kind.bounds:
             counters.append(tree.NameRef(place.start, place.end, _counter(self.counters)))
             self.counters += 1
         element = tree.Index(place.start, place.end, place, tuple(counters))
-        body = tuple(self._value(element, kind.element, given, None, phase))
+        body = tuple(self.value(element, kind.element, given, None, phase))
         for counter, (low, high) in reversed(list(zip(counters, kind.bounds, strict=True))):
             body = (tree.For(place.start, place.end, counter, _integer(place, low), _integer(place, high), None, body),)
         yield from body
@@ -147,7 +145,7 @@ class Statements:
         lineage = [*block.lineage()]
         levels = [level for level in (lineage if phase == EXIT else lineage[::-1]) if _has_own(self.context, level, phase)]
         nearest = next((level.methods[INIT_KEY] for level in block.lineage() if INIT_KEY in level.methods), None)
-        named = self._named(place, given, nearest) if phase == INIT else {}
+        named = self._named(place, given, nearest, block.name) if phase == INIT else {}
         for level in levels:
             method = level_method(self.context, level, phase)
             own = [name for name, _ in _inputs(level.methods.get(INIT_KEY))] if phase == INIT else []
@@ -157,7 +155,7 @@ class Statements:
             end = given[-1].end if given else place.end
             yield tree.CallStatement(place.start, end, tree.Call(place.start, end, member, passed))
 
-    def _named(self, place: tree.Expr, given: Sequence[tree.Argument], init: Pou | None) -> dict[str, tree.Argument]:
+    def _named(self, place: tree.Expr, given: Sequence[tree.Argument], init: Pou | None, block: str) -> dict[str, tree.Argument]:
         """The arguments of a declaration by the folded names of inputs of FB_init; what is missing or too much is reported."""
         inputs = _inputs(init)
         names = {fold(name.text): name for name, _ in inputs}
@@ -178,7 +176,8 @@ class Statements:
                              f"FB_init takes {len(inputs)} arguments", f"it takes {takes}" if takes else "it takes none")
         for name, value in inputs:
             if value is None and fold(name.text) not in named:
-                self._report(place, f"the argument {name.text} of FB_init is missing",
+                self._report(place, f"the argument {name.text} of FB_init is missing", f"write __NEW({block}({name.text} := ...))"
+                             if isinstance(place, tree.Deref) else
                              f"write {self.source.text[place.start:place.end]} : TYPE({name.text} := ...)")
         return named
 
@@ -223,6 +222,29 @@ def _inputs(init: Pou | None) -> list[tuple[tree.Name, tree.Initial | None]]:
             for declared in section.variables for name in declared.names][_FLAGS:]
 
 
+# --- what __NEW makes ---------------------------------------------------------------------------------------------------
+
+
+def of_value(context: Context, source: Source, place: tree.Expr, kind: Type,
+             given: tuple[tree.Argument, ...]) -> list[tree.Statement]:
+    """The statements that construct a value that __NEW has made.
+
+    place: an expression that names the value.
+    given: the arguments of FB_init, if it is an instance."""
+    made_of = Statements(context, source)
+    return [statement for phase in PHASES for statement in made_of.value(place, kind, given, None, phase)]
+
+
+def endings_of_value(context: Context, source: Source, place: tree.Expr, kind: Type, known: Type) -> list[tree.Statement]:
+    """The statements that end an instance of type `kind`, in front of a __DELETE of a pointer to the type `known`.
+
+    None if that type has nothing to end: what is only in a derived type is not called then (EcoStruxure Machine Expert,
+    __DELETE)."""
+    if not constructs(context, known, EXIT):
+        return []
+    return list(Statements(context, source).value(place, kind, (), None, EXIT))
+
+
 # --- methods ----------------------------------------------------------------------------------------------------------
 
 
@@ -258,19 +280,19 @@ def level_method(context: Context, level: Pou, phase: str) -> Pou:
     made = Pou(f"{level.name}.{phase}", "METHOD", level.source, written, as_written=False, block=level,
                modifiers=frozenset({"FINAL"}))
     if phase == INIT and calls:
-        made.variables[fold(_KEPT)] = _kept_values(context)
+        made.variables[fold(KEPT)] = _kept_values(context)
     return _added(context, level, made)
 
 
 def _kept_values(context: Context) -> Variable:
     """The variable that says whether FB_init is called at a start that keeps RETAIN variables."""
     if context.kept_values is None:
-        context.kept_values = _flag(_KEPT)
+        context.kept_values = flag(KEPT)
         context.global_order.append(context.kept_values)
     return context.kept_values
 
 
-def _flag(name: str, retain: bool = False) -> Variable:
+def flag(name: str, retain: bool = False) -> Variable:
     """A hidden global variable of type BOOL."""
     source = Source(INIT, "{attribute 'hide'}\n" + name)
     node = tree.Name(source.text.index(name), len(source.text), name)
@@ -313,8 +335,8 @@ def _parameters(context: Context, method: Pou, phase: str,
         how = "begins with two inputs" if phase == INIT else "has one input"
         context.report.add("S1011", method.source, method.tree.name, f"{phase} {how}",
                            f"write VAR_INPUT {', '.join(wanted)} : BOOL; END_VAR")
-    values = {"bInitRetains": tree.Unary(*at, "NOT", tree.NameRef(*at, _KEPT)),
-              "bInCopyCode": _bool(at, False)}
+    values = {"bInitRetains": tree.Unary(*at, "NOT", tree.NameRef(*at, KEPT)),
+              "bInCopyCode": truth(at, False)}
     flags = [tree.Argument(*at, ":=", name, values[flag]) for flag, (name, _, _) in zip(wanted, declared, strict=False)]
     given = declared[len(wanted):] if phase == INIT else []
     variables = tuple(changed(each, names=(name,)) for name, each, _ in given)
@@ -333,108 +355,5 @@ def with_construction(context: Context, pou: Pou) -> tree.Pou:
     return changed(pou.tree, sections=(*pou.tree.sections, *made_of.sections()), body=(*body, *pou.tree.body))
 
 
-# --- in front of the first cycle ----------------------------------------------------------------------------------------
-
-
-def construct_at_start(context: Context) -> None:
-    """Let the task that runs first construct all instances that live as long as the program, where there is something to do, and
-    make the body that ends them."""
-    if not context.tasks:
-        return
-    source = Source(INIT, "{attribute 'hide'}\nFB_init of all instances")
-    at = source.text.index("\n") + 1, len(source.text)
-    if ending := _of_sources(context, (EXIT,)):
-        _check(context, ending, [_hidden("FUNCTION", ENDING, source, at, _calls(at, [each.name for each in ending]))])
-    made, last = _of_sources(context, PHASES), _called_afterwards(context)
-    if not made and not last:
-        return
-    over = _flag("FB_init is over")
-    flags, begins, ends = [over], [_set(at, over.name, _bool(at, True))], []
-    if context.kept_values is not None:
-        done = context.project.globals["", fold(_DONE)] = _flag(_DONE, retain=True)
-        flags += [context.kept_values, done]
-        begins.append(_set(at, _KEPT, tree.NameRef(*at, _DONE)))
-        ends = [_set(at, _KEPT, _bool(at, False)), _set(at, _DONE, _bool(at, True))]
-        context.global_order.append(done)
-    context.global_order.append(over)
-    names = [*(each.name for each in made), *last]
-    is_first = tree.Unary(*at, "NOT", tree.NameRef(*at, over.name))
-    statement = tree.If(*at, ((is_first, (*begins, *_calls(at, names), *ends)),), None)
-    begun = [_hidden("PROGRAM", INIT, source, at, [statement]) for _ in context.tasks]
-    for pou, task in zip(begun, context.tasks, strict=True):
-        pou.variables.update({fold(flag.name): flag for flag in flags})
-        task.runs.insert(0, Run(task.runs[0].instance, pou))
-    _check(context, made, begun)
-
-
-def _of_sources(context: Context, phases: tuple[str, ...]) -> list[Pou]:
-    """The functions that do some phases for all instances that live as long as the program."""
-    made = []
-    for phase in phases:
-        groups: dict[tuple[int, Source], list[Variable]] = {}
-        for slot, each in sorted(((_slot(context, each), each) for each in context.global_order), key=lambda row: row[0]):
-            if constructs(context, each.type, phase):
-                groups.setdefault((slot, each.source), []).append(each)
-        made += [_of_source(context, number, group, phase) for number, group in enumerate(groups.values())]
-    return made[::-1] if phases == (EXIT,) else made
-
-
-def _slot(context: Context, variable: Variable) -> int:
-    """The place of a global variable or program in the order of initialisation."""
-    if variable.kind != "PROGRAM" or not isinstance(variable.type, StructType):
-        return variable.init_slot
-    return init_slot(context.attributes(context.block_of(variable.type)), PROGRAM_SLOT)
-
-
-def _called_afterwards(context: Context) -> list[str]:
-    """The names of the user's functions that are called once behind all initialisation, in the order of their attributes."""
-    slots = [(init_slot(context.attributes(pou), -1, LAST), pou.name) for pou in context.project.pous.values()
-             if pou.is_function and not pou.source.library]
-    return [name for slot, name in sorted(row for row in slots if row[0] >= 0)]
-
-
-def _check(context: Context, called: list[Pou], callers: list[Pou]) -> None:
-    """Check bodies that call hidden functions, and these; afterwards no name means them."""
-    names = {("", fold(each.name)): each for each in called}
-    context.project.pous |= names
-    for pou in callers:
-        context.check_body(pou)
-    for key, each in names.items():
-        context.check_body(each)
-        del context.project.pous[key]
-
-
-def _hidden(kind: str, name: str, source: Source, at: tuple[int, int], body: Iterable[tree.Statement]) -> Pou:
-    return Pou(name, kind, source, tree.Pou(*at, kind, tree.Name(*at, name), None, (), tuple(body)), as_written=False)
-
-
-def _calls(at: tuple[int, int], functions: list[str]) -> Iterator[tree.Statement]:
-    for name in functions:
-        yield tree.CallStatement(*at, tree.Call(*at, tree.NameRef(*at, name), ()))
-
-
-def _set(at: tuple[int, int], name: str, value: tree.Expr) -> tree.Statement:
-    return tree.Assign(*at, (tree.NameRef(*at, name),), ":=", value)
-
-
-def _bool(at: tuple[int, int], value: bool) -> tree.Literal:
+def truth(at: tuple[int, int], value: bool) -> tree.Literal:
     return tree.Literal(*at, "bool", value, None, "TRUE" if value else "FALSE")
-
-
-def _of_source(context: Context, number_of_source: int, variables: list[Variable], phase: str) -> Pou:
-    """The function that constructs the variables of one source.  It is named by a number, since the sources of a program that is
-    being edited are parts of files, several with the name of one file."""
-    source = variables[0].source
-    made_of = Statements(context, source)
-    at = variables[0].node.start, variables[0].node.end
-    body: list[tree.Statement] = []
-    aliases: dict[str, Variable] = {}
-    for number, variable in enumerate(variables[::-1] if phase == EXIT else variables):
-        name = f"{variable.name} {number}"
-        aliases[fold(name)] = variable
-        body += made_of.of(variable, name, phase)
-    name = f"{phase} of source {number_of_source}"
-    written = tree.Pou(*at, "FUNCTION", tree.Name(*at, name), None, made_of.sections(), tuple(body))
-    made = Pou(name, "FUNCTION", source, written, as_written=False)
-    made.variables.update(aliases)
-    return made

@@ -55,6 +55,12 @@ class Rules:
     """Checks the statements of a POU."""
     members: Callable[[Context, Pou], None]
     """Checks the methods of a POU against those that it inherits and implements."""
+    type_of: Callable[..., Resolved | None]
+    """`rule(scope, spec)` resolves a type that is written where a value stands; None after a diagnostic."""
+    construction: Callable[..., list[tree.Statement]]
+    """`rule(context, source, place, kind, arguments)`: the statements that construct a value of a type, which __NEW has made."""
+    destruction: Callable[..., list[tree.Statement]]
+    """`rule(context, source, place, kind, known)`: those that end it, as a pointer to the type `known` has them."""
 
 
 class Context:
@@ -96,6 +102,8 @@ class Context:
         """Of a program with FB_init the hidden variable that says whether a start keeps RETAIN variables."""
         self.texts: dict[Value, Variable] = {}
         """Constant texts whose address the program takes, and the hidden variables that they lie in."""
+        self.deletions: list[tuple[tree.Call, Source, Pou]] = []
+        """Calls of __DELETE, with the POUs that they stand in."""
         self._attributes: dict[Pou, dict[str, str]] = {}
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}

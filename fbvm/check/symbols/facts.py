@@ -9,6 +9,7 @@ from typing import TypeGuard, get_args
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, Elementary, Field, RefType, StructType, Type, fold
+from fbvm.check.symbols.dynamic_facts import Ended, Made
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
@@ -413,6 +414,8 @@ class Facts:
     holders: dict[tree.Expr, Holder] = field(default_factory=dict)
     """For each target of a reference the object within which the reference can be moved."""
     leases: dict[Variable, int] = field(default_factory=dict)
+    made: dict[tree.Call, Made] = field(default_factory=dict)
+    ended: dict[tree.Call, Ended] = field(default_factory=dict)
     referred: list[Variable] = field(default_factory=list)
     """Variables with one place that something refers to."""
     losses: list[tuple[Source, tree.Expr, str, str]] = field(default_factory=list)

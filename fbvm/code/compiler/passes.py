@@ -24,10 +24,10 @@ from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.code.builder.evaluation import evaluate
 from fbvm.code.compiler.compilation import LONG, Progress
 from fbvm.code.compiler.follow_on_errors import FollowOnErrors
-from fbvm.code.image import Image, ProgramRun, TaskRow
+from fbvm.code.compiler.initial_references import InitialReferences
+from fbvm.code.image import USUAL_HEAP, Image, ProgramRun, TaskRow
 from fbvm.code.layout.instance_paths import InstancePaths
 from fbvm.code.layout.layout import lay_out
-from fbvm.code.lowering.initial_references import InitialReferences
 from fbvm.code.lowering.program import Program
 from fbvm.code.store.object_code import ObjectLibrary, library_for
 from fbvm.syntax import tree
@@ -130,7 +130,7 @@ def _image(checker: Checker, library: ObjectLibrary, progress: Progress, drawn: 
     initial = (*placement.initial, *references.in_slots(), *InstancePaths(checker).rows())
     return Image(placement.layout, (*bodies, *program.parts), tuple(tasks), placement.symbols, initial,
                  tuple(placement.retained), tuple(program.sites), types, program.objects, tuple(program.rungs),
-                 tuple(program.charts), frames=placement.frames)
+                 tuple(program.charts), frames=placement.frames).with_heap(USUAL_HEAP)
 
 
 def _reported(pous: Sequence[Pou], progress: Callable[[int, int], None]) -> Iterator[Pou]:

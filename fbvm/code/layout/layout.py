@@ -14,9 +14,10 @@ from fbvm.check.recursion import stack_bytes
 from fbvm.check.symbols.config_facts import Completed, Spot
 from fbvm.check.symbols.containment import Containment
 from fbvm.check.symbols.facts import Pou, Variable, holds_block
+from fbvm.code.builder.heap import ROWS
 from fbvm.code.image import Layout, Objects, Retained
 from fbvm.code.layout.objects import Numbering
-from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
+from fbvm.code.operations import BUFFER_OBJECT, HEAP_BYTES, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
 
 _CHUNK = 64
 """Initial bytes are kept in runs of whole chunks of so many bytes that are not all zero."""
@@ -98,16 +99,22 @@ def _frames_and_leases(checker: Checker, end: int) -> Placement:
         pou.frame_offset = SLOTS_OFFSET + end
         end += 8 if pou.stack_bytes else pou.frame_size
     end += -end % 8
-    leases, leases_at = len(checker.project.facts.leases), SLOTS_OFFSET + end
-    end += leases * LEASE_BYTES
+    facts, leases_at = checker.project.facts, SLOTS_OFFSET + end
     largest, stack = max((pou.stack_bytes for pou in checker.bodies), default=0), None
+    stack_row, heap_row = len(facts.leases), len(facts.leases) + bool(largest)
+    heap_rows = ROWS if facts.made or facts.ended else 0
+    end += (heap_row + heap_rows) * LEASE_BYTES
     if largest:
-        start = SLOTS_OFFSET + end + LEASE_BYTES
-        stack = FrameStack(start, start + stack_bytes(largest), leases, SLOTS_OFFSET + end)
-        leases, end = leases + 1, stack.end - SLOTS_OFFSET
+        start = SLOTS_OFFSET + end
+        stack = FrameStack(start, start + stack_bytes(largest), stack_row, leases_at + stack_row * LEASE_BYTES)
+        end = stack.end - SLOTS_OFFSET
+    objects = Objects((), heap_row, leases_at)
+    if heap_rows:
+        objects = Objects((), heap_row + heap_rows, leases_at, heap_rows, heap_row, SLOTS_OFFSET + end)
+        end += HEAP_BYTES
     placement = Placement(Layout(end, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values()),
                                  tuple(sorted(checker.sized)) if checker.project.dialect.sizes_apart else None),
-                          objects=Objects((), leases, leases_at), stack=stack)
+                          objects=objects, stack=stack)
     if stack is not None:
         placement.initial.append((stack.row_at, b"".join(n.to_bytes(4, "little") for n in (stack.start, stack.start, 1, 1))))
     return placement

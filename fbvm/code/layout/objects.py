@@ -23,7 +23,7 @@ HEADER_BYTES = 8
 def runs(kind: Type) -> Iterator[tuple[int, int]]:
     """Offset and number of the bytes that a copy of a value takes along: all but those with which instances in it begin."""
     at = 0
-    for header in _headers(kind, 0):
+    for header in headers(kind, 0):
         if header > at:
             yield at, header - at
         at = header + HEADER_BYTES
@@ -31,19 +31,19 @@ def runs(kind: Type) -> Iterator[tuple[int, int]]:
         yield at, kind.size - at
 
 
-def _headers(kind: Type, at: int) -> Iterator[int]:
+def headers(kind: Type, at: int) -> Iterator[int]:
     """Where the instances in a value at an offset begin, from low to high."""
     if not holds_block(kind):
         return
     if isinstance(kind, ArrayType):
         for index in range(kind.count):
-            yield from _headers(kind.element, at + index * kind.element.size)
+            yield from headers(kind.element, at + index * kind.element.size)
     elif isinstance(kind, StructType):
         if kind.block:
             yield at
         for member in sorted(kind.fields.values(), key=lambda each: each.offset):
             if not (member.reference or member.absolute):
-                yield from _headers(member.type, at + member.offset)
+                yield from headers(member.type, at + member.offset)
 
 
 class Numbering:

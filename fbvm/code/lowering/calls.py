@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from fbvm.base.types import ANY_SIZE, BOOL, NULL, Type, machine
+from fbvm.check.calls.dynamic_memory import DELETE, NEW
 from fbvm.check.symbols.facts import Guard, PouCall, StandardCall
 from fbvm.code.builder.constants import TRUE, zero
 from fbvm.code.builder.functions import FUNCTIONS
 from fbvm.code.builder.places import Place, is_aggregate
-from fbvm.code.lowering import any_parameters, arrays, dispatch, plc_addresses, pointers, pou_calls
+from fbvm.code.lowering import any_parameters, arrays, dispatch, dynamic_memory, plc_addresses, pointers, pou_calls
 from fbvm.code.lowering.context import BodyContext, PlaceRules, StatementRules, ValueRules
 from fbvm.code.lowering.variables import loaded
 from fbvm.code.operations import Node
@@ -28,6 +29,8 @@ def _statement(body: BodyContext, node: tree.CallStatement, site: int) -> None:
     called = body.facts.calls.get(call)
     if isinstance(called, PouCall):
         pou_calls.run(body, call, called)
+    elif isinstance(called, StandardCall) and called.key == DELETE:
+        dynamic_memory.delete(body, call)
     elif called is not None and call not in body.facts.types:
         _standard(body, called, call)
     else:
@@ -110,6 +113,8 @@ def _standard(body: BodyContext, called: StandardCall, call: tree.Call) -> Node:
     intrinsic = _INTRINSICS.get(called.key)
     if intrinsic is not None:
         return intrinsic(body, called)
+    if called.key == NEW:
+        return dynamic_memory.new(body, call)
     arguments, site = body.operands(*called.arguments), body.site(call)
     if called.key == "__PLC_WORDS":
         return plc_addresses.words_from(body, arguments[0])

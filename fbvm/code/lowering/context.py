@@ -70,9 +70,9 @@ class BodyContext(Emitter):
         self.contacts: dict[tree.Expr, list[Mark]] = {}
         """The contacts of such rungs that show an expression."""
 
-    def part(self, ways_out: Mapping[tree.Statement, str]) -> BodyContext:
-        """The context of a part of the POU that has a body of its own."""
-        made = BodyContext(self.program, self.checker, self.pou, self._rules)
+    def part(self, ways_out: Mapping[tree.Statement, str], pou: Pou | None = None) -> BodyContext:
+        """The context of a part of the POU, or of another one, that has a body of its own."""
+        made = BodyContext(self.program, self.checker, pou or self.pou, self._rules)
         made.ways_out = ways_out
         return made
 
@@ -201,7 +201,7 @@ class BodyContext(Emitter):
         assert variable.object is not None
         place = self.reusable(place)
         first = ("convert", "u64", "u32", place.moved(OBJECTS_AT, UDINT).load())
-        number: Node = ("add", "u64", first, ("const", "u64", variable.object))
+        number = self.program.object_of(first, variable.object)
         moved = ("mul", "u64", number, ("const", "u64", 1 << OBJECT_SHIFT))
         position = ("and", "u64", ("bits", "u64", "ref", place.reference()), ("const", "u64", (1 << OBJECT_SHIFT) - 1))
         return ("bits", "ref", "u64", ("or", "u64", moved, position))

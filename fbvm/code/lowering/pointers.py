@@ -123,7 +123,7 @@ def _object(body: BodyContext, holder: Holder) -> Node:
         return _word(variable.object)
     instance = body.place(expr.of) if isinstance(expr, tree.Member) else Place(("self", 0, ()), UDINT)
     first = instance.moved(OBJECTS_AT, UDINT).load()
-    return ("add", "u64", ("convert", "u64", "u32", first), _word(variable.object))
+    return body.program.object_of(("convert", "u64", "u32", first), variable.object)
 
 
 # --- leases -----------------------------------------------------------------------------------------------------------

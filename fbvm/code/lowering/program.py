@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from fbvm.base.areas import Area
@@ -11,8 +11,8 @@ from fbvm.check.checker import Checker
 from fbvm.check.symbols.facts import Pou, Start, Variable
 from fbvm.code.image import Body, Objects, RungPicture, SfcPicture, Site
 from fbvm.code.layout.layout import Placement
-from fbvm.code.layout.reference_marks import references_in
-from fbvm.code.operations import FIRST_OBJECT
+from fbvm.code.layout.reference_marks import Marked, references_in
+from fbvm.code.operations import FIRST_OBJECT, LEASED, Node
 from fbvm.syntax import tree
 
 Origin = tuple[str, int]
@@ -38,6 +38,8 @@ class Program:
         self.parts: list[Body] = []
         """Bodies of parts of POUs, which are numbered behind those of all POUs."""
         self._objects = placement.objects
+        self.has_heap = placement.objects.heap_rows > 0
+        self._shared: dict[object, int] = {}
         self._area_objects: dict[str, tuple[int, int]] = {}
         self._numbers: dict[tuple[str, str, int], int] = {}
 
@@ -70,6 +72,22 @@ class Program:
     def objects(self) -> Objects:
         """All objects, those of `area_object` included."""
         return replace(self._objects, extents=(*self._objects.extents, *self._area_objects.values()))
+
+    def object_of(self, first: Node, number: int) -> Node:
+        """The object of a variable in an instance, as u64.
+
+        first: what the head of the instance says: the number of its first object, or the object that __NEW has made.
+        number: that of the variable among the objects of an instance."""
+        following: Node = ("add", "u64", first, ("const", "u64", number))
+        if not self.has_heap or not number:
+            return following if number or not self.has_heap else first
+        return ("select", "u64", ("ge", "b", "u64", first, ("const", "u64", LEASED)), following, first)
+
+    def shared_part(self, key: object, make: Callable[[], Body]) -> int:
+        """The number of a body that several POUs call: `make` makes it at the first call with a key."""
+        if key not in self._shared:
+            self._shared[key] = self.add_part(make())
+        return self._shared[key]
 
     def add_part(self, body: Body) -> int:
         """Adds the body of a part of a POU, whose name gets a number behind it.  Returns the number of the body."""
@@ -111,3 +129,7 @@ class Program:
         """The references in the bytes of a value that a body makes, each with its offset; all are to global variables."""
         for at, start, _ in references_in(self.checker, kind, content):
             yield at, start
+
+    def instances_in(self, kind: Type, content: bytes) -> Iterator[Marked]:
+        """As `references_in`, with the instances in the value that each reference lies in, by their offsets."""
+        return references_in(self.checker, kind, content)

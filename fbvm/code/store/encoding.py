@@ -42,7 +42,7 @@ def encode(image: Image) -> bytes:
     document = {
         "fingerprint": image.fingerprint,
         "layout": [image.layout.slots_size, image.layout.e_banks, [astuple(box) for box in image.layout.mailboxes],
-                   image.layout.sized],
+                   image.layout.sized, image.layout.heap_bytes],
         "bodies": [[body.name, body.kind, body.instance_size, _dump(body.code), body.is_part] for body in image.bodies],
         "tasks": [[task.name, task.priority, task.interval_ns, task.single, [astuple(run) for run in task.programs]]
                   for task in image.tasks],
@@ -63,9 +63,10 @@ def decode(content: bytes) -> Image:
     """The image that `encode` made these bytes of.  Raises ValueError, LookupError or TypeError for other bytes."""
     stored = json.loads(content.decode("utf-8", "surrogatepass"), object_hook=_bytes)
     types = _Reader(stored["types"])
-    slots_size, e_banks, mailboxes, sized = stored["layout"]
+    slots_size, e_banks, mailboxes, sized, heap_bytes = stored["layout"]
     image = Image(
-        Layout(slots_size, tuple(e_banks), tuple(Mailbox(*row) for row in mailboxes), None if sized is None else tuple(sized)),
+        Layout(slots_size, tuple(e_banks), tuple(Mailbox(*row) for row in mailboxes), None if sized is None else tuple(sized),
+               heap_bytes),
         tuple(_StoredBody.of(*row) for row in stored["bodies"]),
         tuple(TaskRow(name, priority, interval_ns, single, tuple(ProgramRun(*run) for run in runs))
               for name, priority, interval_ns, single, runs in stored["tasks"]),

@@ -152,6 +152,9 @@ class ExpressionLayout:
     def argument_positional(self, value: Phrase) -> Phrase:
         return value
 
+    def argument_type(self, spec: Phrase) -> Phrase:
+        return spec
+
     def argument_named(self, token: Token, sign: Token, value: Phrase | None) -> Phrase:
         phrase = Phrase(token.start, self.leaf(token), " ", self.leaf(sign))
         if value:

@@ -18,7 +18,7 @@ GROUPS = (
         "NOT", "DIRECT", "LADDER", "INSTRUCTION_LIST"}),
     ("an expression", {"NAME", "NUMBER", "LPAR"}, {
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS",
-        "MINUS", "NOT", "DIRECT"}),
+        "MINUS", "NOT", "DIRECT", "REF_TO", "POINTER", "REFERENCE"}),
     ("a type", {"NAME", "ARRAY"}, {
         "NAME", "ARRAY", "STRING", "WSTRING", "STRUCT", "UNION", "REF_TO", "POINTER", "REFERENCE", "LPAR"}),
     ("a name", {"NAME"}, {"NAME", "POU_MODIFIER", "QUALIFIER", "AT", "TYPED_LITERAL"}),

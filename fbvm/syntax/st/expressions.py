@@ -26,6 +26,8 @@ from fbvm.syntax.tree import (
     NullLiteral,
     Part,
     StructInit,
+    TypeOperand,
+    TypeSpec,
     Unary,
 )
 
@@ -155,6 +157,9 @@ class Expressions(Builder):
 
     def argument_positional(self, value: Expr) -> Argument:
         return Argument(value.start, value.end, "", None, value)
+
+    def argument_type(self, spec: TypeSpec) -> Argument:
+        return Argument(spec.start, spec.end, "", None, TypeOperand(spec.start, spec.end, spec))
 
     def argument_named(self, token: Token, sign: Token, value: Expr | None) -> Argument:
         return Argument(token.start, value.end if value else sign.end, sign.text, self.name(token), value)

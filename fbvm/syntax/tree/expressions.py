@@ -109,6 +109,13 @@ class Deref(Expr):
 
 
 @_node
+class TypeOperand(Expr):
+    """A type that is written out where a value stands, as in `SIZEOF(POINTER TO INT)`."""
+
+    spec: Node
+
+
+@_node
 class Unary(Expr):
     """`op` is "-", "+" or "NOT"."""
 
