@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from fbvm.base.types import fold
+from fbvm.base.types import ELEMENTARY, LREAL, TIME, Type, fold, string
 from fbvm.dap.session import Arguments, Body, DebugSession, Refusal
 from fbvm.dap.variables import property_row, text_of, variable
 from fbvm.step.commands import COMMANDS_BY_WORD, CommandError, completed
@@ -19,6 +19,8 @@ from fbvm.watch.values import Value, show
 
 _WORD = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[[^\]]*\])*")
 _SILENT = re.compile(r"\(\*.*?\*\)|//.*|'[^']*'|\"[^\"]*\"")
+_KINDS: dict[str, Type] = {"number": LREAL, "time": TIME, "text": string()}
+"""As what the value of literals alone is shown, by their class."""
 KEPT_BACK = {"quit", "break", "unbreak"}
 """Commands that an editor has of its own."""
 
@@ -92,8 +94,8 @@ def _value(debug: DebugSession, scope: Scope, plc: str | None, text: str, is_bar
         value = term.value(names.read)
     except (ArithmeticError, TypeError) as error:
         raise ConditionError(f"{text} cannot be computed: {error}") from None
-    shown = show(term.type, value) if term.type else str(value).upper() if isinstance(value, bool) else str(value)
-    return {"result": shown, "type": term.described, "variablesReference": 0}
+    kind = term.type or ELEMENTARY.get(term.sort) or _KINDS[term.sort]
+    return {"result": show(kind, value), "type": term.described, "variablesReference": 0}
 
 
 def _command(debug: DebugSession, plc: str | None, text: str) -> Body:

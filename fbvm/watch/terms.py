@@ -61,9 +61,20 @@ def literal_term(text: str) -> Term:
 
 
 def _quotient(a: int | float, b: int | float) -> int | float:
+    _refuse_zero(b)
     if isinstance(a, int) and isinstance(b, int):
         return quotient(a, b)
     return a / b
+
+
+def _remainder(a: int, b: int) -> int:
+    _refuse_zero(b)
+    return remainder(a, b)
+
+
+def _refuse_zero(divisor: float) -> None:
+    if not divisor:
+        raise ZeroDivisionError("division by zero")
 
 
 LEVELS: tuple[dict[str, Callable[..., Value]], ...] = (
@@ -73,7 +84,7 @@ LEVELS: tuple[dict[str, Callable[..., Value]], ...] = (
     {"=": operator.eq, "<>": operator.ne},
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
     {"+": operator.add, "-": operator.sub},
-    {"*": operator.mul, "/": _quotient, "MOD": remainder},
+    {"*": operator.mul, "/": _quotient, "MOD": _remainder},
 )
 LEVEL_OF = {sign: number for number, signs in enumerate(LEVELS) for sign in signs}
 _LOGIC = frozenset(("OR", "XOR", "AND", "&"))
