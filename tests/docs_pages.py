@@ -9,7 +9,8 @@ The blocks of a page are run from top to bottom in one empty folder.
   free one, there and wherever the page names that port.
 - ```python: executed, all blocks of a page in one namespace; a ```text block behind "It prints:" is what it prints.  One that
   begins with `>>> ` is a doctest.
-- ```iecst: compiled.  What begins without a POU gets one, with the variables of the block before if it declares none.
+- ```iecst: compiled, in the dialect with which the page runs the file.  What begins without a POU gets one, with the variables of
+  the block before if it declares none.
 - ```toml and ```yaml: read.
 - ```sh: installs.  The extras of fbvm that are named exist.
 - A block whose first line is `# not run by the tests: REASON` is not run; the options of its commands exist.
@@ -215,14 +216,16 @@ class Reader:
             assert "fbvm test" in self.shown, "tests in ST are run by fbvm test"
             return
         text = block.text
-        bare = re.sub(r"^\s*(//.*\n|\(\*.*?\*\)\s*)*", "", text)
+        bare = re.sub(r"^\s*(//.*\n|\(\*.*?\*\)\s*|\{.*?\}\s*)*", "", text)
         if not re.match(r"(PROGRAM|FUNCTION(_BLOCK)?|TYPE|CONFIGURATION|VAR_GLOBAL|CLASS|INTERFACE|NAMESPACE|USING)\b", bare):
             text = f"PROGRAM Main\n{'' if bare.startswith('VAR') else self.declared}{text}\nEND_PROGRAM\n"
         self.declared = "".join(re.findall(r"^VAR\b.*?^END_VAR\n", text, re.M | re.S))
         beside = [Source(str(path), other) for path in Path().rglob("*.st") if not path.is_relative_to("examples")
                   if "PROGRAM" not in (other := path.read_text(encoding="utf-8"))]  # fmt: skip
         alone = block.file is None or "PROGRAM" not in text
-        found = compile_sources([Source(block.file or "block", text), *([] if alone else beside)])
+        chosen = re.search(rf"{re.escape(block.file)} --dialect (\w+)", self.shown) if block.file is not None else None
+        found = compile_sources([Source(block.file or "block", text), *([] if alone else beside)],
+                                dialect=chosen[1] if chosen else "standard")
         assert found.errors == [], "\n".join(each.render() for each in found.errors)
 
     def _python(self, block: Block) -> None:
