@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
 
 from fbvm.base.diagnostics import Source
-from fbvm.campaign import runs
+from fbvm.campaign import axes, runs
 from fbvm.campaign.axes import axis_from_text
 from fbvm.campaign.execution import Result
+from fbvm.campaign.fleet.shard import Figures
 from fbvm.campaign.items.execution import conditions_of
 from fbvm.campaign.judge import CRASHED, NEVER, Failure
 from fbvm.campaign.plan import EXACT, REAL, Axis, FaultRule, Moments, Plan, PowerRule
@@ -198,3 +199,18 @@ def test_what_is_drawn_lies_within_its_bounds_and_reaches_them() -> None:
     empty = FaultRule(Moments((S, S), (0, 0)), (("slow", SLOW.fault),))
     [named] = draw(Plan(PROJECT, runs=1, faults=(empty,)), 0).faults
     assert named.fault.until_ns == S + 1, "a fault lasts for a moment at least"
+
+
+def test_a_range_has_so_many_values_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(axes, "MOST_VALUES", 5)
+    for written in ("n=1..5", "n=0.0..0.4/0.1", "n=T#0ms..T#9ms/2ms"):
+        assert len(axis_from_text(written).values) == 5
+    for written in ("n=1..6", "n=T#0ms..T#10ms/2ms"):
+        with pytest.raises(ValueError, match="a range has 5 values at most"):
+            axis_from_text(written)
+
+
+def test_a_part_of_a_fleet_begins_with_nothing() -> None:
+    assert asdict(Figures(3)) == {
+        "number": 3, "state": "building", "plcs": 0, "scans": 0, "missed": 0, "traps": 0, "connections": 0, "elapsed_s": 0.0,
+        "ended": {}, "doors": {}, "scan_time": {}, "lateness": {}, "message": ""}
