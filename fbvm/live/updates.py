@@ -261,7 +261,7 @@ def plant_rows(bench: Workbench) -> dict[str, Any]:
     links: dict[str, list[Any]] = {}
     for live in bench.plcs.values():
         for ends, passed in live.traffic.items():
-            if len(links) < MOST_LINKS and (ends not in links or passed.frames > links[ends][2]):  # both ends may have a PLC
+            if passed.frames > links[ends][2] if ends in links else len(links) < MOST_LINKS:  # both ends may have a PLC
                 links[ends] = [passed.one, passed.other, passed.frames, passed.info]
     doors = [[str(endpoint), str(real)] for network in bench.networks
              for endpoint, real in getattr(network, "doors", {}).items()]  # fmt: skip
