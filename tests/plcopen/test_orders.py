@@ -297,3 +297,16 @@ def test_a_variable_that_is_read_and_written_at_one_place_in_the_order_of_number
             + result(2, "1", "m", 'executionOrderId="1"') + value(3, "INT#2") + block(4, "ADD", "IN1=3 IN2=1", "OUT"))
     made = import_xml(document(pou(body, variable("n", "INT") + variable("m", "INT"), language="FBD")), order="ids")
     assert states(made, "n m", ["", "", ""]) == ["2 0", "4 2", "6 4"]
+
+
+def test_a_wire_that_comes_from_nothing_is_left_out_by_the_generators() -> None:
+    drawn = (value(2, "n") + block(3, "Add", "x=2 y=9", "sum", "s") + result(4, "3.sum", "m") + result(5, "9", "n")
+             + RAIL + contact(6, "1", "a") + coil(7, "6 9", "b"))
+    add = pou("<p>sum := x + y;</p>", f"<inputVars>{variable('x', 'INT')}{variable('y', 'INT', '5')}</inputVars>"
+              f"<outputVars>{variable('sum', 'INT')}</outputVars>", kind="functionBlock", name="Add", language="ST")
+    declared = variable("a") + variable("b") + variable("n", "INT", "1") + variable("m", "INT") + variable("s", "Add")
+    made = import_xml(document(pou(drawn, f"<localVars>{declared}</localVars>"), add), order="document")
+    assert [each.code for each in made.diagnostics if "there is not" in each.message] == ["X0292"] * 3 and not made.errors
+    assert states(made, "m b n", ["a=0", "a=1"]) == ["6 0 1", "6 1 1"]
+    alone = pou(RAIL + contact(2, "9", "a") + coil(3, "2", "b"), "a b")
+    assert [each.code for each in import_xml(document(alone), order="document").errors] == ["X0201"]

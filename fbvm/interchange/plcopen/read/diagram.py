@@ -121,6 +121,7 @@ class _DiagramReader:
                 self._add(element, place)
         for item in self.objects:
             for pin in item.pins:
+                self._leave_out_loose(item, pin)
                 for number, name, at in pin.raw:
                     item.broken |= not self._connect(pin, number, name, at)
         used = {wire.source for item in self.objects for pin in item.pins for wire in pin.wires}
@@ -162,6 +163,16 @@ class _DiagramReader:
             if other is not made:
                 made.broken = other.broken = True
                 self.reading.report("X0202", made.element, f"there are two connectors {made.text}")
+
+    def _leave_out_loose(self, item: Object, pin: Pin) -> None:
+        """Leave out wires that come from nothing, where the generator does: it refuses only a contact without another wire."""
+        loose = [row for row in pin.raw if row[0] not in self.known]
+        if not loose or not self.reading.producer.generates or item.kind == "contact" and len(loose) == len(pin.raw):
+            return
+        for number, _, at in loose:
+            self.reading.report("X0292", at, f"a wire comes from element {number!r}, which there is not: Beremiz and OpenPLC "
+                                "Editor leave it out", "draw the wire once more")
+        pin.raw = [row for row in pin.raw if row[0] in self.known]
 
     def _connect(self, pin: Pin, number: str, name: str, at: Element) -> bool:
         """Add the wire from output `name` of element `number` to a pin; whether there is such an output."""
