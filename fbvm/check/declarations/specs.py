@@ -367,8 +367,11 @@ def _structure(scope: Scope, spec: tree.StructSpec | tree.UnionSpec, name: str,
                 scope.error("S0604", declared.location or member, wrong, RELATIVE)
     if not complete or not limits.reserve(made.size, "the structure takes", scope.source, spec):
         return None
-    name = name or f"STRUCT {scope.context.new_anonymous_number()}"
-    return made.structure(name)
+    if name:
+        return made.structure(name)
+    kind, content = made.structure(f"STRUCT {scope.context.new_anonymous_number()}")
+    scope.project.nameless[kind] = content
+    return kind, content
 
 
 def _extend(scope: Scope, spec: tree.StructSpec, made: Members) -> bool:

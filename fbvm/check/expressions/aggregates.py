@@ -166,8 +166,8 @@ def first_bytes(project: SymbolTable, kind: Type) -> bytes:
     """The bytes of a variable of a type that is declared without an initial value."""
     if isinstance(kind, ArrayType):
         return first_bytes(project, kind.element) * kind.count
-    known = next((entry.resolved[1] for entry in project.types.values()
-                  if entry.resolved is not None and entry.resolved[0] is kind), None)
+    known = project.nameless.get(kind) or next((entry.resolved[1] for entry in project.types.values()
+                                                if entry.resolved is not None and entry.resolved[0] is kind), None)
     if known is not None or not isinstance(kind, StructType):
         return default(kind) if known is None else known
     content = bytearray(kind.size)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from fbvm.base.types import BOOL, ELEMENTARY, LINT, Elementary, EnumType, SubrangeType, Type, base, fold, string
-from fbvm.check.expressions.constants import convert, limits
+from fbvm.base.types import ELEMENTARY, LINT, EnumType, Type, base, fold, string
+from fbvm.check.expressions.constants import convert
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL
 from fbvm.syntax import tree
 from fbvm.syntax.st.literals import WRONG
+
+_KINDS = {"bool": "BOOL", "time": "TIME"}
+"""The types of literals without one, by their kinds."""
 
 
 def literal(scope: Scope, expr: tree.Literal, want: Type | None) -> Type | None:
@@ -21,26 +24,12 @@ def literal(scope: Scope, expr: tree.Literal, want: Type | None) -> Type | None:
     value = constants[expr] = expr.value
     if expr.type_name is None and expr.kind in ("int", "real"):
         return UNTYPED_INT if expr.kind == "int" else UNTYPED_REAL
-    name = expr.type_name or {"bool": "BOOL", "time": "TIME"}.get(expr.kind, "")
-    kind = ELEMENTARY.get(name)
-    if kind is None:
-        declared = scope.named_type(name)
-        if not isinstance(declared, Elementary | SubrangeType):
-            scope.error("S0204", expr, f"there is no elementary type {name}")
-            return None
-        scope.facts.types[expr] = UNTYPED_REAL if expr.kind == "real" else UNTYPED_INT
-        return scope.adopt(expr, declared)
+    kind = ELEMENTARY[expr.type_name or _KINDS[expr.kind]]
     if is_any(kind, "ANY_REAL"):
         assert isinstance(value, int | float)
         constants[expr] = convert(value, kind)
     if expr.kind == "time" and isinstance(value, int) and value > LINT.high:
         return _unsigned(scope, expr, value, kind)
-    span = limits(kind)
-    if span and isinstance(value, int) and not span[0] <= value <= span[1]:
-        scope.error("S0108", expr, f"{expr.text} is outside {kind}, which holds {span[0]} to {span[1]}")
-        return None
-    if expr.kind == "int" and kind == BOOL:
-        constants[expr] = bool(value)
     return kind
 
 

@@ -42,6 +42,7 @@ from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
+from fbvm.syntax.tree.node import written
 
 _BEHIND_REFERENCE = frozenset((tree.Deref, tree.Index, ladder.Memory, ladder.Words, ladder.Contents))
 """Expressions that name a place in memory without a variable."""
@@ -78,7 +79,7 @@ class Scope:
 
     def text(self, node: tree.Node) -> str:
         """A piece of the program as it is written, for messages."""
-        return " ".join(self.source.text[node.start:node.end].split())
+        return written(self.source.text, node)
 
     # --- entry points -----------------------------------------------------------------------------------------------
 

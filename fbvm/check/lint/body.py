@@ -12,6 +12,7 @@ from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
 from fbvm.syntax.tree import il, ladder, sfc
+from fbvm.syntax.tree.node import written
 
 Nodes = tuple[tree.Node | None, ...]
 
@@ -33,7 +34,7 @@ class Body:
 
     def text(self, node: tree.Node) -> str:
         """A piece of the program as it is written, on one line."""
-        return " ".join(self.pou.source.text[node.start:node.end].split())
+        return written(self.pou.source.text, node)
 
     def below(self, node: tree.Node) -> Nodes:
         """The nodes directly below one; of a call that means an operator, those of the operator."""

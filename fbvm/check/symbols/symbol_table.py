@@ -118,6 +118,8 @@ class SymbolTable:
         """By operator and elementary types of its operands, if none is constant: the types of the operation and the result."""
         self.instantiated: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
         """Functions that were instantiated of generic ones, by the types that the generic types stand for."""
+        self.nameless: dict[Type, bytes] = {}
+        """The initial bytes of structures that are declared where variables are."""
         self.new_pous: deque[Pou] = deque()
         """POUs that have been named but not checked yet."""
 

@@ -232,8 +232,6 @@ def binary(body: BodyContext, expr: tree.Binary) -> Node:
 
 
 def _position(reference: Node) -> Node:
-    if reference[0] == "const":
-        return _word(reference[2] & _POSITION)
     return ("and", "u64", _bits(reference), _word(_POSITION))
 
 

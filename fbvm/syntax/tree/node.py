@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar, cast, dataclass_transform
 
 _T = TypeVar("_T")
 _defaults: dict[type, dict[str, Any]] = {}
 """Of each class the parts that need not be given."""
+_PARENTHESES = re.compile(r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*"|\(\*.*?\*\)|//[^\n]*|([()])""", re.S)
+"""Parentheses, and what is passed over because they mean nothing there: texts and comments."""
 
 
 @dataclass_transform(eq_default=False)
@@ -51,6 +54,20 @@ class Node:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names_of(self))})"
+
+
+def written(text: str, part: Node) -> str:
+    """A node as a text has it, in one line.  It gets the parentheses around its first and its last part that are not its own.
+
+    >>> written("n := 2 * (a + b);", Node(5, 15))
+    '2 * (a + b)'
+    """
+    inside = text[part.start:part.end]
+    depth = lowest = 0
+    for match in _PARENTHESES.finditer(inside):
+        depth += {"(": 1, ")": -1}.get(match[1] or "", 0)
+        lowest = min(lowest, depth)
+    return "(" * -lowest + " ".join(inside.split()) + ")" * (depth - lowest)
 
 
 def names_of(part: Node) -> tuple[str, ...]:

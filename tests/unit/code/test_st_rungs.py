@@ -74,6 +74,7 @@ def test_what_is_no_rung_is_named_with_its_line_and_the_rest_is_drawn(body: str)
 
 
 LISTS = {
+    "LD n\nST m\nST n": ["in line 3 is not drawn: an assignment that is not of BOOL"],
     "LD b\nOR( c\nAND d\n)\nORN e\nST a": ["LD b; LD c; AND d; ORLD; ORNOT e; OUT a"],
     "LD b\nANDN c\nS a\nST d\nSTN e\nR f": ["LD b; ANDNOT c; SET a; OUT d; OUTNOT e; RSET f"],
     "LD n\nGT 5\nAND( m\nEQ 1\n)\nST a\nLD b\nST c": ["LD> n 5; AND= m 1; OUT a", "LD b; OUT c"],
