@@ -102,7 +102,7 @@ def _named(declaration: bytes) -> str:
     words = _BEFORE.sub(b"", declaration, count=1).split()
     if len(words) < 2 or words[0].startswith(b"VAR_"):
         return "Globals"
-    return words[1].rstrip(b":;").decode("cp1252", "replace")
+    return re.split(rb"[:;(]", words[1])[0].decode("cp1252", "replace")
 
 
 def _decoded(data: bytes) -> str:
