@@ -5,6 +5,7 @@ The pages are Markdown files beside this module, so that they travel with the pa
 
 from __future__ import annotations
 
+import re
 from difflib import get_close_matches
 from importlib.resources import files
 
@@ -15,12 +16,12 @@ _SHOWN = 4
 
 
 class UnknownCode(LookupError):
-    """There is no diagnostic of that code; `near` are the rows that may have been meant."""
+    """There is no diagnostic of that `code`; `near` are the rows that may have been meant."""
 
     def __init__(self, code: str, near: list[Code]) -> None:
         meant = "".join(f"\n  {row.code}  {row.title}" for row in near)
         super().__init__(f"there is no diagnostic {code}" + (f"; near it are{meant}" if near else ""))
-        self.near = near
+        self.code, self.near = code, near
 
 
 def page(code: str) -> str:
@@ -32,7 +33,7 @@ def page(code: str) -> str:
 
 
 def near(text: str) -> list[Code]:
-    """Rows whose code is like `text`, the likest first; if none is, those whose title contains it.
+    """Rows whose code is like `text`, the likest first; if none is, those whose title has that word.
 
     A code of a range that there is, such as S02, is near to others of that range only."""
     wanted = text.strip()
@@ -40,4 +41,5 @@ def near(text: str) -> list[Code]:
     codes = get_close_matches(wanted.upper(), same_range or CODES, n=_SHOWN)
     if codes or not wanted:
         return [CODES[code] for code in codes]
-    return [row for row in CODES.values() if wanted.casefold() in row.title.casefold()][:_SHOWN]
+    word = re.compile(rf"\b{re.escape(wanted)}s?\b", re.I)
+    return [row for row in CODES.values() if word.search(row.title)][:_SHOWN]

@@ -22,6 +22,11 @@ def _files() -> dict[str, Path]:
     return found
 
 
+def names() -> list[str]:
+    """The names of all files of the libraries, in capitals and small letters as they are declared."""
+    return [path.stem for path in _files().values()]
+
+
 def page(name: str) -> str | None:
     """The page of that name in any case; None if there is none."""
     path = _files().get(fold(name.strip()))

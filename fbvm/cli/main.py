@@ -48,7 +48,7 @@ VERB_GROUPS = {
         "prove": "Prove a property for all inputs and scans, or show the shortest run that breaks it.",
         "fmt": "Rewrite a program in canonical Structured Text.",
         "list": "Print the compiled program, readable.",
-        "explain": "Print the page of a diagnostic.",
+        "explain": "Print the page of a message, an instruction, a block or a function.",
         "ladder": "Draw the rungs of a program.",
         "sfc": "Draw the sequential function charts of a program.",
         "import": "Make sources of a project in PLCopen XML or of CX-Programmer.",

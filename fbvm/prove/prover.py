@@ -215,8 +215,8 @@ class Prover:
     def _with_unreached(self, verdict: Verdict) -> Verdict:
         """A proof with the scans and the statements of which it says nothing."""
         if self.question.assumptions and (most := self.search.longest_run(DEPTHS[-1])) is not None:
-            ends = f"no run keeps the assumptions, or does not trap, for longer than {_scans(most)}"
-            verdict = replace(verdict, notes=(*verdict.notes, f"{ends}: nothing is said of later ones"))
+            ends = f"{self._why_runs_end()} {_scans(most)}: nothing is said of later ones"
+            verdict = replace(verdict, notes=(*verdict.notes, ends))
         self.tell("looking for statements that no run reaches")
         sites = unreached(self.summary, self.goal, self.clock, DEPTHS[-1], self.limits.expired)
         if not sites:
@@ -224,6 +224,12 @@ class Prover:
         lines = dict.fromkeys(f"{self.image.sites[site].file}:{self.image.sites[site].line}" for site in sites)
         some = ", ".join([*lines][:MOST_LINES]) + (f" and {len(lines) - MOST_LINES} more" if len(lines) > MOST_LINES else "")
         return replace(verdict, notes=(*verdict.notes, f"no run of {DEPTHS[-1]} scans executes {some}"))
+
+    def _why_runs_end(self) -> str:
+        """The beginning of a sentence that ends with the number of scans after which no run is left."""
+        if self.question.assumptions:
+            return "no run keeps the assumptions, or does not trap, for longer than"
+        return "each run ends in a trap (--no-trap shows one) within"
 
     def _undecided(self) -> Verdict:
         cleared = self.search.cleared
@@ -287,8 +293,7 @@ class Prover:
         if inputs is not None:
             return self._met(inputs, self.search.is_shortest)
         if self.search.cleared and self.search.all_runs_end():
-            raise Refused("no run keeps the assumptions, or does not trap, for longer than "
-                          f"{self.search.cleared} scans: there is nothing to prove")
+            raise Refused(f"{self._why_runs_end()} {_scans(self.search.cleared)}: there is nothing to prove")
         return None
 
     def _met(self, inputs: Inputs, is_shortest: bool) -> Verdict:

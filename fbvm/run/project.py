@@ -254,7 +254,7 @@ def read_project(path: Path, *, allow_outside: bool = False, text: str | None = 
     if reading.diagnostics:
         return reading.diagnostics
     table = reading.table(written, PROJECT)
-    if table["plc"] == {}:
+    if table["plc"] == {} and not errors(reading.diagnostics):
         reading.report("P0104", ("plc",), "there is no PLC", "begin one with [plc.NAME] and its sources")
     if not errors(reading.diagnostics):
         _check_units(reading, table["plc"])

@@ -113,9 +113,20 @@ class Reading:
                 self.report("P0103", path, f"{_called(path)} is no list of tables", f"write [[{_called(path)}]]")
                 return key.default
             return [self.table(row, key.kind, (*path, number)) for number, row in enumerate(written)]
-        if key.named and isinstance(written, dict):
-            return {name: self.table(row, key.kind, (*path, name)) for name, row in written.items()}
+        if key.named:
+            return self._named_tables(written, key.kind, path)
         return self.table(written, key.kind, path)
+
+    def _named_tables(self, written: Any, keys: Keys, path: Path) -> dict[str, Any]:
+        """Tables to which the user gives names, such as [plc.NAME]."""
+        hint = f"write [{_called(path)}.NAME], with a name of your choice, and its keys below"
+        if not isinstance(written, dict):
+            self.report("P0103", path, f"{_called(path)} is no table", hint)
+            return {}
+        nameless = [name for name, row in written.items() if name in keys and not isinstance(row, dict)]
+        if nameless:
+            self.report("P0103", path, f"{', '.join(nameless)}: of which {_called(path)}?", hint)
+        return {name: self.table(row, keys, (*path, name)) for name, row in written.items() if name not in nameless}
 
 
 def _called(path: Path) -> str:

@@ -65,8 +65,11 @@ def test_explain(name: str, part: str) -> None:
 
 def test_explain_offers_what_may_be_meant() -> None:
     said = CliRunner().invoke(main, ["explain", "movw"]).output
-    assert "there is no diagnostic movw" in said and "Or the instruction MOV" in said
-    assert "instruction" not in CliRunner().invoke(main, ["explain", "zzzz"]).output
+    assert "there is no diagnostic, instruction, block or function movw; did you mean MOV" in said
+    assert "did you mean" not in CliRunner().invoke(main, ["explain", "zzzz"]).output
+    assert "did you mean TON or" in CliRunner().invoke(main, ["explain", "TONN"]).output
+    assert "did you mean LIMIT?" in CliRunner().invoke(main, ["explain", "limits"]).output
+    assert "interface" not in CliRunner().invoke(main, ["explain", "INT"]).output
 
 
 def test_what_other_tools_call_an_instruction_leads_to_one_that_there_is() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.dialects import takers
@@ -19,6 +21,9 @@ _USES = {
     "PROGRAM": "a task runs it; what others need of it belongs in a VAR_GLOBAL",
 }
 """What to do with a POU of each kind that is named where a value is needed."""
+
+_WITH_BIT = re.compile(r"\w+(\.\d+)*")
+"""A name, and the number of a bit behind it, which is a part of the address."""
 
 
 def is_reported(scope: Scope, expr: tree.Expr) -> bool:
@@ -53,16 +58,26 @@ def report_internal(scope: Scope, name: tree.Name, member: Field, block: StructT
 
 def _hint(scope: Scope, expr: tree.NameRef) -> str:
     name, project = expr.text, scope.project
-    try:
-        address = parse_address(name, scope.context.areas)
-        return f"for the address write %{name}, or declare a variable AT {address}"
-    except AddressError:
-        known = [v.name for v in scope.pou.order] if scope.pou else []
+    if address := _address_hint(scope, expr):
+        return address
+    known = [v.name for v in scope.pou.order] if scope.pou else []
     hint = (vendor_names.VALUES.get(fold(name)) or vendor_names.duration(name) or vendor_names.library_of(name)
             or project.nearest_global(name, [*known, *_members(scope)]))  # fmt: skip
     if not hint and expr in scope.qualifiers:
         return "if it is a library, an enumeration or a file of global variables, give its source with the files"
     return hint
+
+
+def _address_hint(scope: Scope, expr: tree.NameRef) -> str:
+    """What to write for an address without its %, such as W0.00, Q0.1 or MW10; "" if the name is none."""
+    written = _WITH_BIT.match(scope.source.text, expr.start)
+    if written is None:  # a name that the repair of a syntax error has put here
+        return ""
+    for spelling in (written[0], f"%{written[0]}"):
+        with suppress(AddressError):
+            address = parse_address(spelling, scope.context.areas)
+            return f"for the address write %{written[0]}, or declare a variable AT {address}"
+    return ""
 
 
 def _members(scope: Scope) -> Iterator[str]:

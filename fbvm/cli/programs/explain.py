@@ -2,20 +2,40 @@
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
+
 import click
 
 from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
 from fbvm.check import block_pages, function_pages, instructions
+from fbvm.check.calls.functions import SIGNATURES
 from fbvm.cli.shared.terminal import say
 from fbvm.syntax.ladder.instructions.instruction_set import meant, spelling
 
 
+_CODE = re.compile(r"[A-Z]?\d+", re.I)
+
+
+def _unknown(error: UnknownCode) -> str:
+    """That there is no such page, and of which names there are some; a name that looks like a code may be a code only."""
+    if _CODE.fullmatch(error.code.strip()):
+        return str(error)
+    instruction_names = [found.mnemonic for name in meant(spelling(error.code)) if (found := instructions.find(name))]
+    others = get_close_matches(error.code.strip().upper(), [*block_pages.names(), *SIGNATURES], 2, 0.8)
+    names = " or ".join(dict.fromkeys([*others, *instruction_names]))
+    rows = "".join(f"\n  {row.code}  {row.title}" for row in error.near)
+    said = f"there is no diagnostic, instruction, block or function {error.code}"
+    return said + (f"; did you mean {names}?" if names else "") + (f"\nDiagnostics near it are{rows}" if rows else "")
+
+
 @click.command("explain")
-@click.argument("code", metavar="CODE", required=False)
+@click.argument("code", metavar="CODE|NAME", required=False)
 def command(code: str | None) -> None:
-    """Print the page of a diagnostic: a wrong program, the reason, the repair.  Without CODE: the list of all codes.
+    """Print the page of a diagnostic: a wrong program, the reason, the repair.  Without an
+    argument: the list of all codes.
 
     `fbvm explain MOV` says what an instruction of ladder does, with its operands and flags; `fbvm explain TON` what a block
     or function of the libraries does, with its pins, and `fbvm explain LIMIT` what a standard function does.
@@ -48,9 +68,7 @@ def command(code: str | None) -> None:
     try:
         say(page(code))
     except UnknownCode as error:
-        named = [found.mnemonic for name in meant(spelling(code)) if (found := instructions.find(name))]
-        said = f"\nOr the instruction {' or '.join(named)}?" if named else ""
-        raise click.UsageError(f"{error}{said}\n`fbvm explain` alone lists all.") from None
+        raise click.UsageError(f"{_unknown(error)}\n`fbvm explain` alone lists all codes.") from None
     code = code.strip().upper()
     if CODES[code].severity == "warning":
         say(f"\nSwitch it off in a text with {{warning disable {code}}} .. {{warning restore {code}}}, or for a whole "

@@ -117,6 +117,11 @@ def test_decimal_digits_that_make_too_large_a_number_trap(kind: str, greatest: i
     assert asked(digits, NO_TRAP, "", f"Main.w = {few}").word == "proved"
 
 
+def test_a_program_that_always_traps_is_told_so() -> None:
+    with pytest.raises(Refused, match=r"each run ends in a trap .* within 4 scans: there is nothing to prove"):
+        asked(program("n := n + 1; n := n + 10 / (3 - n) * 0;", "n : INT;"), NEVER, "Main.n > 5")
+
+
 def test_assumptions_that_no_run_keeps_for_long_are_told() -> None:
     counts = program("n := n + 1;", "n : INT;")
     verdict = asked(counts, NEVER, "Main.n > 9", "Main.n < 10")

@@ -125,6 +125,8 @@ def test_the_least_that_must_be_said(folder: Path) -> None:
     ("a = [1", [("P0101", 1, "unclosed array")]),
     ("[plc.a]\nsources = ['counter.st']\nsource = 1", [("P0102", 3, "plc.a.source is no key of a project")]),
     ("plc = 3", [("P0103", 1, "plc is no table")]),
+    ("[[plc]]\nname = 'a'", [("P0103", 1, "plc is no table")]),
+    ("[plc]\nsources = ['counter.st']\ncycle = '10ms'", [("P0103", 1, "sources, cycle: of which plc?")]),
     ("[plc.a]\nsources = []", [("P0103", 2, 'plc.a.sources: [] is no list of texts; write ["one", "other"]')]),
     ("[plc.a]\nsources = ['c.st']\ncount = true", [
         ("P0103", 3, "plc.a.count: True is no whole number from 1 to 100000")]),
