@@ -24,7 +24,7 @@ class SessionEvents:
         self.names: Names = session.names
         self.sites = session.facts.image.sites
         image = session.facts.image
-        self.outer, self.results = outer_statements(image), results_of(image)
+        self.outer, self.results, self.rungs = outer_statements(image), results_of(image), image.rungs
         self.bodies = [(body.name, body.kind) for body in image.bodies]
 
     @property

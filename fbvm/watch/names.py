@@ -40,6 +40,8 @@ class Names:
         self._located = [place for place in symbols_places if not self._in_slots(place)]
         for place in self._slots:
             self._located += _located_in(place)
+        whole = {(area.offset, area.size_bytes) for area in areas.values()}  # arrays with which libraries compute addresses
+        self._located = [place for place in self._located if (place.offset, place.type.size) not in whole]
         self._known: dict[tuple[int, int | None], Place | None] = {}
         self._instances: dict[int, Place] = {}
         self._reference_names: dict[tuple[int, str], str] = {}

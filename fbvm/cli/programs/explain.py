@@ -15,7 +15,6 @@ from fbvm.check.calls.functions import SIGNATURES
 from fbvm.cli.shared.terminal import say
 from fbvm.syntax.ladder.instructions.instruction_set import meant, spelling
 
-
 _CODE = re.compile(r"[A-Z]?\d+", re.I)
 
 

@@ -291,7 +291,7 @@ def _check_usage(
         raise click.UsageError(f"--debug looks into scans itself: leave out {', '.join(both)}")
     ends = sum(bound is not None for bound in (scans, for_ns, until))
     if ends > 1 or not (ends or doors or live or debug_port is not None):
-        raise click.UsageError(f"say when to end by one of --scans, --for and --until; {ends or 'none'} given{'' if ends else ', try --for 1s'}")
+        raise click.UsageError(f"say when to end by one of --scans, --for and --until; {ends or 'none'} given (such as --for 1s)")
     if max_ns is not None and until is None:
         raise click.UsageError("--max bounds --until, which is not given")
     if pace == EVENT and net == "loop":

@@ -14,7 +14,7 @@ from typing import Protocol
 
 from fbvm.base.memory import Memory, Snapshot, compare
 from fbvm.base.types import fold
-from fbvm.code.image import Site
+from fbvm.code.image import RungPicture, Site
 from fbvm.machine.plc import Phase
 from fbvm.record.trace.events import Cut, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.format import xor
@@ -33,6 +33,8 @@ ORDER_BITS = 32
 """The number of an event is that of its window's first scan, shifted by so many bits, and its number in the window."""
 MOST_FACTS = 32
 """Operands that are kept of a value without a name, and of a condition around a statement."""
+PRESENT_VALUES = ("T", "C")
+"""The areas that hold how far timers and counters are."""
 LARGEST_BYTES = 4096
 """A larger write is kept whole and compressed, not byte by byte."""
 
@@ -73,6 +75,8 @@ class EventSource(Protocol):
     def sites(self) -> Sequence[Site]: ...
     @property
     def outer(self) -> Sequence[int]: ...
+    @property
+    def rungs(self) -> Sequence[RungPicture]: ...
     @property
     def bodies(self) -> Sequence[tuple[str, str]]: ...
     @property
@@ -149,6 +153,7 @@ class _Changes:
         self._known: Snapshot | None = None
         self._cut = False
         """Whether the scan has executed statements that are not recorded."""
+        self._steps = {site for rung in trace.rungs if not rung.is_text for site, *_ in rung.steps}
         self.order = scans.start << ORDER_BITS
         self._first = scans.start
         trace.follow(self, range(max(trace.scans.start, scans.start - 1), scans.stop))
@@ -174,18 +179,11 @@ class _Changes:
             return
         self.order += 1
         if isinstance(event, Statement):
-            self._reads[event.frame, event.site] = {}
-            self._guards, self._pending = self._pending, []
+            if self._shown(event.frame, event.site)[0] is event.frame:
+                self._reads[event.frame, event.site] = {}
+                self._guards, self._pending = self._pending, []
         elif isinstance(event, Read):
-            place = self._trace.names.at(event.offset, event.bit if event.bit < 8 else None)
-            facts = self._reads.setdefault((event.frame, event.site), {})
-            if place is None:
-                self._pending = list(self._nameless.get(event.offset, ()))
-                facts.update((id(fact.place), fact) for fact in self._pending)
-            else:
-                facts.pop(id(place), None)  # the last read stands last
-                text = Signal(place, place.name).text(self._trace.names.read(moment.read, place))
-                facts[id(place)] = Fact(place, text, self.order)
+            self._read(moment, event)
         elif isinstance(event, Write):
             self._written(moment, event)
             self._pending = []
@@ -194,14 +192,40 @@ class _Changes:
         elif isinstance(event, Cut):
             self._known, self._cut = moment.memory.snapshot(), True
 
+    def _shown(self, frame: Frame, site: int) -> tuple[Frame, int]:
+        """The execution and the statement to which something counts: what an instruction of a rung does inside, in a function or
+        a block without a name such as `Main.$TIM0`, counts to the rung."""
+        outer = frame
+        while outer.caller is not None:
+            is_inside = "$" in self._trace.names.instance(outer.base) or (
+                outer.site in self._steps and self._trace.bodies[outer.body][1] == "FUNCTION")
+            if is_inside:
+                frame, site = outer.caller, outer.site
+            outer = outer.caller
+        return frame, site
+
+    def _read(self, moment: Instant, event: Read) -> None:
+        place = self._trace.names.at(event.offset, event.bit if event.bit < 8 else None)
+        shown = self._shown(event.frame, event.site)
+        facts = self._reads.setdefault(shown, {})
+        if place is None:
+            operands = self._nameless.get(event.offset, ())
+            facts.update((id(fact.place), fact) for fact in operands)
+            if shown[0] is event.frame:
+                self._pending = list(operands)
+        elif shown[0] is event.frame or _is_operand(place):
+            facts.pop(id(place), None)  # the last read stands last
+            text = Signal(place, place.name).text(self._trace.names.read(moment.read, place))
+            facts[id(place)] = Fact(place, text, self.order)
+
     def _written(self, moment: Instant, event: Write) -> None:
         if self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
-            self._nameless[event.offset] = tuple(_once(self._facts(event.frame, event.site)))[:MOST_FACTS]
+            self._nameless[event.offset] = tuple(_once(self._facts(*self._shown(event.frame, event.site))))[:MOST_FACTS]
             if event.frame.body in self._trace.results:
                 change = self._change(moment, event, self._nameless[event.offset])
                 self._returned.setdefault(event.frame, {})[event.offset] = change
         elif event.old != event.value:
-            change = self._change(moment, event, tuple(self._facts(event.frame, event.site)))
+            change = self._change(moment, event, tuple(self._facts(*self._shown(event.frame, event.site))))
             if len(event.value) > LARGEST_BYTES:
                 offsets = range(event.offset, event.offset + len(event.value))
                 self._large.append((offsets, zlib.compress(xor(event.old, event.value), 1), change))
@@ -212,8 +236,9 @@ class _Changes:
                     self._changes.setdefault(at, []).append((bits, change))
 
     def _change(self, moment: Instant, event: Write, facts: tuple[Fact, ...]) -> Change:
-        site = self._trace.sites[event.site] if event.site >= 0 else None
-        return Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(event.frame.base), facts)
+        frame, number = self._shown(event.frame, event.site)
+        site = self._trace.sites[number] if number >= 0 else None
+        return Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(frame.base), facts)
 
     def _return(self, moment: Instant, frame: Frame) -> None:
         """Counts what a body returns as read by the statement that has called it: of a method or property the result, of a
@@ -225,7 +250,7 @@ class _Changes:
             return
         name, kind = self._trace.bodies[frame.body]
         path = self._trace.names.instance(frame.base) if kind in ("METHOD", "GET") else ""
-        facts = self._reads.setdefault((frame.caller, frame.site), {})
+        facts = self._reads.setdefault(self._shown(frame.caller, frame.site), {})
         for number, place in enumerate(self._results(frame.body)):
             offsets = range(place.offset, place.offset + max(1, place.type.size))
             changes = [change for offset, change in written.items() if offset in offsets or place.hops]
@@ -308,6 +333,13 @@ def _dereferenced(names: Names, memory: Memory, place: Place) -> Place:
         return place
     owner = names.at(found.offset, found.bit) if is_single(found) else None
     return replace(found, name=f"{place.name} ({owner.name})") if owner else found
+
+
+def _is_operand(place: Place) -> bool:
+    """Whether a place that an instruction reads inside may be an operand of it: no variable or flag of its own.
+
+    A timer or counter reads its present value to count on."""
+    return place.area not in ("", *PRESENT_VALUES) or "." in place.name and not place.is_generated
 
 
 class _Search:

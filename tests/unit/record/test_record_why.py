@@ -150,6 +150,19 @@ def test_contacts_of_a_rung_are_what_its_coil_read() -> None:
 
 
 @pytest.mark.slow
+def test_what_an_instruction_does_inside_counts_to_its_rung() -> None:
+    rungs = "LD Start\nTIM 0001 #0002\nLD T0001\n@++ D200\nLD P_On\nMOV T1 D201"
+    text = f"PROGRAM Main VAR Start : BOOL; END_VAR\nLADDER\n{rungs}\nEND_LADDER END_PROGRAM"
+    trace = _recorded(text, 30, "Main.Start")
+    assert cause_text(trace, ask(trace, "D200", 29)).splitlines() == [
+        "D200 = 1 since scan 21 (210ms), by pump.st:6 in Main",
+        "└ T0001 = TRUE since scan 21 (210ms), by pump.st:4 in Main",
+        "  └ Main.Start = TRUE since scan 1 (10ms), from outside the program",
+    ]
+    assert [(cause.place.name, cause.value) for cause in ask(trace, "D201", 29, 1).causes][1:] == [("T1", "0")]
+
+
+@pytest.mark.slow
 def test_what_a_function_was_given_is_what_its_result_is_made_of() -> None:
     text = """FUNCTION Scaled : INT
         VAR_INPUT raw, low : INT; END_VAR
