@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 from collections.abc import Callable
 
 import pytest
 
 from fbvm.dap.framing import encode
-from fbvm.dap.server import DebugDoor, serve_until_ended
+from fbvm.dap.server import DebugDoor, pass_on, serve_until_ended
 from fbvm.dap.target import LaunchError, Target
 
 
@@ -78,3 +79,15 @@ def test_a_door_serves_one_caller_after_another_until_nobody_can_call_any_more(e
     assert came.wait(10) and door.is_called
     assert [door.serve(refuse), door.serve(refuse)] == [ends, ends] and closed == [1, 2]
     assert not door.is_called and door.serve(refuse) is False
+
+
+def test_a_bridge_passes_on_what_comes_from_both_sides_up_to_the_end() -> None:
+    answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    said, heard, written = iter([b"one", b"two", b""]), list[bytes](), bytearray()
+
+    def send(data: bytes) -> None:
+        heard.append(data)
+        answers.put(b"re: " + data + b";")
+
+    pass_on(lambda: next(said), written.extend, lambda: answers.get(timeout=10), send, lambda: answers.put(b""))
+    assert (heard, bytes(written)) == ([b"one", b"two"], b"re: one;re: two;")
