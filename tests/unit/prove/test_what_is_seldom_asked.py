@@ -1,0 +1,244 @@
+"""Programs and questions that are seldom: tasks of events, inputs that are bits, what is refused or taken for any value, and what
+limits an answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from random import Random
+from typing import Any
+
+import pytest
+from rows import each_of
+from test_prover import image_of
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.machine.plc import STEP_BUDGET
+from fbvm.prove import prover as prover_module
+from fbvm.prove.bounded import BoundedSearch, Inputs
+from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.invariants import Invariants
+from fbvm.prove.prover import Limits, Prover, SpuriousRun, prove
+from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Names, Question, Verdict
+from fbvm.prove.ready import handshake
+from fbvm.prove.report import headline
+from fbvm.prove.runs import Judge, Machine, inputs_of, replayed, sampled
+from fbvm.prove.shortening import shortened
+from fbvm.prove.solver import UNKNOWN, Solver
+from fbvm.watch.paths import UnknownPlace
+
+MS = 1_000_000
+FEW = {"scans": 12, "simulated_scans": 20}
+EVENT = """PROGRAM Main VAR n : INT; END_VAR IF n < 3 THEN n := n + 1; END_IF END_PROGRAM
+CONFIGURATION C VAR_GLOBAL Go AT %IX0.0 : BOOL; END_VAR RESOURCE R ON PLC
+TASK T(SINGLE := Go, PRIORITY := 1); PROGRAM p WITH T : Main; END_RESOURCE END_CONFIGURATION"""
+BITS = """PROGRAM Main
+VAR_INPUT a AT CIO 0.01 : BOOL; b AT CIO 1.00 : ARRAY[0..3] OF BOOL; c : BOOL; END_VAR VAR n : INT; END_VAR
+    n := BOOL_TO_INT(a) + BOOL_TO_INT(b[2]) + BOOL_TO_INT(c);
+END_PROGRAM"""
+OVERWRITTEN = "PROGRAM Main VAR_INPUT a : INT; END_VAR VAR n : INT; END_VAR a := a MOD 3; n := a; END_PROGRAM"
+
+
+def asked(text: str, question: Question, dialect: str = "standard", **limits: Any) -> Verdict:
+    image = compile_text(text, dialect=dialect, lint=False).image
+    assert image is not None
+    return prove(image, question, Limits(**{**FEW, **limits}))
+
+
+def shown(verdict: Verdict) -> tuple[str, list[dict[str, object]]]:
+    """The sentence behind the colon, and what is written before each scan."""
+    writes = verdict.run.writes if verdict.run else ()
+    return headline(verdict).partition(": ")[2], [{place.name: value for place, value in now.items()} for now in writes]
+
+
+@pytest.mark.slow
+@each_of(("text", "question", "said", "writes"), [
+    (EVENT, Question(REACH, "p.n = 1"), "REACHED after 1 scan, by the shortest run", [{"Go": True}]),
+    (EVENT, Question(REACH, "p.n = 2"), "REACHED after 3 scans, by the shortest run",
+     [{"Go": True}, {"Go": False}, {"Go": True}]),
+    (EVENT, Question(NEVER, "p.n > 3"), "PROVED by induction over 1 scan", []),
+    (BITS, Question(REACH, "Main.n = 3"), "REACHED after 1 scan, by the shortest run",
+     [{"Main.a": True, "CIO 1.02": True, "Main.c": True}]),
+    (OVERWRITTEN, Question(NEVER, "Main.n > 2"), "PROVED by induction over 1 scan", []),
+    (OVERWRITTEN, Question(REACH, "Main.n = 2 AND Main.a = 2"), "REACHED after 1 scan, by the shortest run", [{"Main.a": 2}]),
+])  # fmt: skip
+def test_tasks_of_events_and_inputs_of_every_kind(
+    text: str, question: Question, said: str, writes: list[dict[str, object]]
+) -> None:
+    for limits in ({}, {"longest_ns": 30 * MS})[: 2 if text == EVENT else 1]:
+        found, wrote = shown(asked(text, question, **limits))
+        assert found == said and [*map(set, wrote)] == [*map(set, writes)], (limits, wrote)
+
+
+NOTHING = "a run of 1 scans may get there, but does not on the engine: it depends on values of which the solver knows nothing"
+
+
+@pytest.mark.slow
+@each_of(("text", "dialect", "unknown"), [
+    ("PROGRAM Main VAR_INPUT b : BYTE; END_VAR VAR s : STRING[4] := 'abc'; n : INT; END_VAR s[0] := b; n := LEN(s); END_PROGRAM",
+     "codesys", ["text of STRING", "length of STRING"]),
+    ("PROGRAM Main VAR_INPUT b : INT; END_VAR VAR n : INT; END_VAR n := REAL_TO_INT(INT_TO_REAL(b) / 3.0); END_PROGRAM",
+     "standard", ["convert of REAL", "div of REAL", "nearest of REAL"]),
+])
+def test_what_is_taken_for_any_value_is_said(text: str, dialect: str, unknown: list[str]) -> None:
+    verdict = asked(text, Question(NEVER, "Main.n > 4"), dialect)
+    assert shown(verdict)[0] == f"UNDECIDED {NOTHING}"
+    [note] = verdict.notes
+    head, _, rows = note.partition(": ")
+    assert head == "taken for any value" and [row.partition(" (")[0] for row in rows.split("), ")] == unknown
+
+
+REALS = "PROGRAM Main VAR_INPUT i : INT; END_VAR VAR r : REAL; s : STRING; n : INT; END_VAR n := i; END_PROGRAM"
+PLACES = """PROGRAM Main VAR_INPUT i, j, k : INT(0..40); END_VAR VAR a : ARRAY[0..40, 0..40, 0..40] OF INT; n : INT; END_VAR
+    a[i, j, k] := 1; END_PROGRAM"""
+FEW_PLACES = """PROGRAM Main VAR_INPUT i : DINT(0..3); END_VAR VAR a : ARRAY[0..3] OF INT; p : POINTER TO INT; n : INT; END_VAR
+    p := ADR(a) + i; n := p^; END_PROGRAM"""
+NO_WHOLE = "cannot be followed: compare whole numbers with a whole number"
+
+
+@pytest.mark.slow
+@each_of(("text", "condition", "dialect", "said"), [
+    (REALS, "Main.r + 1.0 > 2.0", "standard", f"Main.r + 1.0 > 2.0 {NO_WHOLE}"),
+    (REALS, "Main.n > Main.r + 1", "standard", f"Main.n > Main.r + 1 {NO_WHOLE}"),
+    (REALS, "Main.n > 1.5", "standard", f"Main.n > 1.5 {NO_WHOLE}"),
+    (REALS, "Main.s = 'a'", "standard", "Main.s is STRING[80], and texts cannot be followed"),
+    (REALS, "Main.n + 1.5 > 2", "standard", "1.5 is no whole number, and only whole numbers can be followed"),
+    (REALS, "Main.r = Main.n", "standard", "Main.n cannot be followed: compare a REAL with one of its type, or with a number"),
+    (PLACES, "Main.n > 4", "standard", "an index chooses from more than 4096 places"),
+    ("PROGRAM Main VAR_INPUT i : INT; END_VAR VAR a : ARRAY[0..30000] OF INT; n : INT; END_VAR a[i] := 1; END_PROGRAM",
+     "Main.n > 4", "standard", "an index has no bounds that could be followed"),
+    (FEW_PLACES, "Main.n > 4", "codesys", "a pointer may point to too many places"),
+    ("FUNCTION F : INT VAR_INPUT a : INT; END_VAR WHILE TRUE DO F := a; END_WHILE END_FUNCTION "
+     "PROGRAM Main VAR_INPUT i : INT; END_VAR VAR n : INT; END_VAR n := F(i); END_PROGRAM", "Main.n > 4", "standard",
+     "no run keeps the assumptions, or does not trap, for longer than 4 scans: there is nothing to prove"),
+])  # fmt: skip
+def test_what_cannot_be_followed_is_refused_in_words(text: str, condition: str, dialect: str, said: str) -> None:
+    with pytest.raises(Refused) as refused:
+        asked(text, Question(NEVER, condition), dialect)
+    assert str(refused.value).partition(" (")[0] == said
+
+
+COUNTER = """PROGRAM Main VAR In AT %IX0.0 : BOOL; n, m, d : DINT; END_VAR
+    IF In THEN n := n + 1; m := m + 2; END_IF
+    IF n > 1000 THEN n := 0; m := 0; END_IF
+    d := 100 / (n - 9);
+END_PROGRAM"""
+
+
+def prover_of(question: Question, **limits: Any) -> Prover:
+    return Prover(image_of(COUNTER), question, Limits(**{**FEW, **limits}), lambda said: None)
+
+
+@pytest.mark.slow
+def test_a_lemma_is_proved_together_with_assumptions_about_the_state() -> None:
+    double = "Main.m = 2 * Main.n AND Main.n >= 0 AND Main.n <= 1000"
+    question = Question(NEVER, "Main.m > 2001", ("Main.d < 1000", "NOT Main.In OR Main.n <> 9"), lemmas=(double,))
+    prover = prover_of(question)
+    assert sorted(prover.lemmas.values()) == ["", "", double], "the assumption about the state, the property, the lemma"
+
+
+@pytest.mark.slow
+@each_of(("asks", "how"), [
+    (0, "the time is over, and no scan has been searched to its end"), (60, "the time is over: no run of 4 scans gets there")])
+def test_how_far_it_came_is_said_when_the_time_is_over(asks: int, how: str) -> None:
+    left = [asks]
+
+    def expired() -> bool:
+        left[0] -= 1
+        return left[0] < 0
+
+    verdict = prove(image_of(COUNTER), Question(NEVER, "Main.m > 2001"), Limits(**FEW, expired=expired))
+    assert (verdict.word, verdict.how) == ("undecided", how)
+
+
+@pytest.mark.slow
+def test_an_answer_that_the_solver_does_not_give_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    prover = prover_of(Question(NEVER, "Main.n > 2"))
+    monkeypatch.setattr(Solver, "ask", lambda self, *some: UNKNOWN)
+    search = BoundedSearch(prover.summary, prover.goal, prover.clock, lambda: False)
+    assert search.until(10) is None and search.cleared == 0
+    state = list(prover.summary.cells)
+    invariants = Invariants(prover.summary, state, prover.goal.stop, prover.goal.given, prover.clock, lambda: False)
+    assert invariants.kept([]) is None
+
+
+@pytest.mark.slow
+def test_a_run_of_the_solver_that_the_engine_does_not_do_is_a_defect_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prover_module, "replayed", lambda *run: None)
+    with pytest.raises(SpuriousRun, match=r"the solver's run of 3 scans does not do on the engine what the solver says"):
+        prove(image_of(COUNTER), Question(REACH, "Main.n = 3"), Limits(scans=12, simulated_scans=0))
+
+
+def run_of(*ins: bool) -> tuple[Machine, Callable[[Question], Judge], Inputs]:
+    """A run of the counter with these inputs."""
+    image: Image = image_of(COUNTER)
+    machine = Machine(image, 10 * MS, 10 * MS, STEP_BUDGET)
+    prover = prover_of(Question(NEVER, "Main.n > 2"))
+    [cell] = [cell for cell in prover.inputs if cell.offset == machine.plc().find("%IX0.0").offset]  # type: ignore[union-attr]
+    return machine, lambda question: Judge.of(image, question), Inputs(
+        [{cell: int(value)} for value in ins], [10 * MS * number for number in range(len(ins))])  # fmt: skip
+
+
+@pytest.mark.slow
+@each_of(("question", "ins", "scans"), [
+    (Question(REACH, "Main.n = 2"), (True, False, True), 3), (Question(REACH, "Main.n = 2"), (True, True, True), 0),
+    (Question(REACH, "Main.n = 3"), (True, False, True), 0), (Question(NO_TRAP), (True,) * 9, 9),
+    (Question(REACH, "Main.n = 20"), (True,) * 12, 0), (Question(ALWAYS, "Main.n < 2"), (True, True), 2),
+    (Question(REACH, "Main.n = 2", ("NOT Main.In OR Main.n <> 1",)), (True, False, True), 0),
+    (Question(REACH, "Main.n = 2", ("Main.n < 3",)), (True, False, True), 3),
+])  # fmt: skip
+def test_a_run_is_replayed_to_its_goal_and_no_further(question: Question, ins: tuple[bool, ...], scans: int) -> None:
+    machine, judge, inputs = run_of(*ins)
+    run = replayed(machine, judge(question), inputs, True)
+    assert (run.scans if run else 0) == scans
+    if run:
+        assert run.times_ns == tuple(inputs.times_ns)
+        again = inputs_of(machine, run)
+        pressed = [before or after for before, after in zip((False, *ins), ins, strict=False) if before != after]
+        assert [*map(len, again.values)] == [int(before != after) for before, after in zip((False, *ins), ins, strict=False)]
+        assert len(pressed) == sum(map(len, run.writes))
+
+
+@pytest.mark.slow
+@each_of(("question", "ins", "wanted"), [
+    (Question(REACH, "Main.n = 2"), (False, True, False, False, True, False), 2),
+    (Question(REACH, "Main.n = 2"), (False,) * 4, 4),
+    (Question(NO_TRAP), (False, True) * 12, 9), (Question(REACH, "Main.n = 20"), (True,) * 12, 12),
+    (Question(REACH, "Main.n = 2", ("NOT Main.In OR Main.n <> 1",)), (False, True, True), 3),
+])  # fmt: skip
+def test_a_run_is_made_shorter_as_long_as_it_gets_there(question: Question, ins: tuple[bool, ...], wanted: int) -> None:
+    machine, judge, inputs = run_of(*ins)
+    assert len(shortened(machine, judge(question), inputs, lambda: False)) == wanted
+
+
+@pytest.mark.slow
+@each_of(("assumed", "least", "most"), [((), 120, 120), (("Main.n < 5",), 6, 119), (("Main.n = 77",), 0, 0)])
+def test_states_are_sampled_as_long_as_runs_do_not_trap_and_keep_the_assumptions(
+    assumed: tuple[str, ...], least: int, most: int
+) -> None:
+    image = image_of(COUNTER.replace("100 / (n - 9)", "100"))
+    machine, judge = Machine(image, 10 * MS, 10 * MS, STEP_BUDGET), Judge.of(image, Question(NEVER, "Main.n > 2000", assumed))
+    prover = Prover(image, Question(NEVER, "Main.n > 2000", assumed), Limits(**FEW), lambda said: None)
+    found = sampled(machine, judge, prover.inputs, dict(prover.summary.cells), 20, 1)
+    assert least <= len(found) <= most
+    assert all(sample.now_ns % (10 * MS) == 0 for sample in found)
+
+
+def test_random_times_lie_between_the_bounds() -> None:
+    image = image_of(COUNTER)
+    times = Machine(image, 10 * MS, 30 * MS, STEP_BUDGET).random_times(Random(1), 2)
+    found = [next(times) for _ in range(400)]
+    passed = {later - earlier for earlier, later in pairwise(found)}
+    assert found[0] == 0 and {10 * MS, 30 * MS} < passed and min(passed) == 10 * MS and max(passed) == 30 * MS
+    fixed = Machine(image, 10 * MS, 10 * MS, STEP_BUDGET).random_times(Random(1), 2)
+    assert [next(fixed) for _ in range(3)] == [0, 10 * MS, 20 * MS]
+
+
+def test_a_handshake_is_asked_of_an_instance() -> None:
+    block = "FUNCTION_BLOCK B VAR_OUTPUT Done, Busy : BOOL; END_VAR END_FUNCTION_BLOCK "
+    names = Names(image_of(f"{block} PROGRAM Main VAR b : B; n : INT; END_VAR b(); END_PROGRAM"))
+    assert handshake(names, "Main.b").text == "(Main.b.Done) AND (Main.b.Busy)"
+    for path in ("Main.n", "D0..D1"):
+        with pytest.raises(UnknownPlace, match=f"{path} is no instance of a function block"):
+            handshake(names, path)
