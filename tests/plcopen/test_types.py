@@ -36,6 +36,7 @@ def test_intervals_in_all_their_spellings(written: str, meant: str) -> None:
      "ARRAY[0..N, 1..2] OF REAL"),
     ('<enum><values><value name="A"/><value name="B" value="4"/></values></enum>', "(A, B := 4)"),
     ('<subrangeUnsigned><range lower="1" upper="9"/><baseType><UINT/></baseType></subrangeUnsigned>', "UINT (1..9)"),
+    ('<subrange lower="0" upper="100"><baseType><int/></baseType></subrange>', "INT (0..100)"),
 ])
 def test_types(element: str, text: str) -> None:
     made = import_xml(document(pou("", f'<variable name="v"><type>{element}</type></variable>', language="ST")))

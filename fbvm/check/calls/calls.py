@@ -132,7 +132,7 @@ def _arguments_alone(scope: Scope, call: tree.Call) -> None:
 
 def _warn_of_copy(scope: Scope, call: tree.Call, called: Variable | None) -> None:
     """Warn of the call of an input that is an instance: a block has a copy of the argument where dialects let it be called."""
-    if called is not None and called.kind == "VAR_INPUT" and not scope.source.library:
+    if called is not None and called.kind == "VAR_INPUT" and not isinstance(called.type, RefType) and not scope.source.library:
         scope.error("S0193", call, f"{called.name} is an input, a copy of the argument: this call leaves the argument as it is",
                     "make it a VAR_IN_OUT to call the instance that is passed")
 

@@ -100,6 +100,10 @@ def _refuse_by_dialect(scope: Scope, spec: tree.TypeSpec, name: str = "") -> Non
 def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:
     """REF_TO, POINTER TO and REFERENCE TO.  The target may be the type that is being resolved: a node of a list names itself."""
     target = spec.target
+    if isinstance(target, tree.ConstructedSpec) and target.arguments and spec.kind == "REFERENCE TO":
+        scope.error("S0193", target, f"a reference constructs nothing: what stands behind {target.base.text} is not used",
+                    f"write REFERENCE TO {target.base.text}")
+        target = target.base
     if isinstance(target, tree.NamedType):
         entry = scope.project.type_entry(target.text, scope.source)
         pou = scope.project.pou(target.text, scope.source) if entry is None else None

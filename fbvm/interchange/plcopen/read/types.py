@@ -79,7 +79,7 @@ def _pointer(reading: Reading, element: Element) -> str:
 
 
 _WRITERS = {"array": _array, "derived": _derived, "enum": _enum, "struct": _struct, "subrangeSigned": _subrange,
-            "subrangeUnsigned": _subrange, "pointer": _pointer}
+            "subrangeUnsigned": _subrange, "subrange": _subrange, "pointer": _pointer}
 
 
 def value_text(holder: Element | None, kind: str = "", family: str = "") -> str:
