@@ -90,8 +90,9 @@ class Scope:
         if not match:
             return name.upper()
         word = match[0].upper()
-        _, variable = self.own.get(word, ("", None))
-        variable = variable or self.document.globals_by_name.get(word)
+        kind, variable = self.own.get(word, ("", None))
+        if variable is None or kind == "VAR_EXTERNAL":
+            variable = self.document.globals_by_name.get(word, variable)
         return variable.address.upper() if variable and variable.address else word
 
     def keys(self, expression: str) -> frozenset[str]:
