@@ -226,8 +226,6 @@ class Opening:
     def told(self, event: Event, now_ns: int) -> None:
         """Called with the answer of the host."""
         back_ns = now_ns + self._relays.latency_ns(self._relays.fault(self._local, self._remote))
-        if isinstance(event, Opened | Failed):
-            self.is_over = True
         if isinstance(event, Failed):
             self._relays.at(back_ns, partial(self._failed, event.error))
         elif isinstance(event, Opened):
@@ -242,6 +240,7 @@ class Opening:
         self._connection.refused("ETIMEDOUT", now_ns)
 
     def _failed(self, error: str, now_ns: int) -> None:
+        self.is_over = True
         if error == "ECONNREFUSED":
             self._relays.tell_unit(self._local.host, TapKind.RST, self._local, self._remote, False)
         self._connection.refused(error, now_ns)

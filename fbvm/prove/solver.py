@@ -5,7 +5,6 @@ Bitwuzla is a solver for bit-vectors by A. Niemetz and M. Preiner, under the MIT
 from __future__ import annotations
 
 import importlib
-import importlib.util
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -20,11 +19,6 @@ class SolverMissing(Exception):
 
     def __init__(self) -> None:
         super().__init__(HOW_TO_INSTALL)
-
-
-def is_installed() -> bool:
-    """True if the solver can be imported."""
-    return importlib.util.find_spec("bitwuzla") is not None
 
 
 class Solver:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 from fbvm.prove.encoding.clocks import Clock, Later
 from fbvm.prove.encoding.rewriting import cone, leaves, substituted
@@ -63,8 +63,3 @@ def from_anywhere(summary: Summary, wanted: Sequence[Term], clock: Clock) -> tup
     """Scans from any state on, the first scan after power-on left out; and what is known of their times."""
     later = clock.later()
     return Unrolling(summary, wanted, later.signal, {variable: variable for variable in cone(summary.next, wanted)}), later
-
-
-def variables_in(terms: Iterable[Term]) -> set[Term]:
-    """The variables of some terms, those of which nothing is known left out."""
-    return {leaf for leaf in leaves(terms) if leaf.op == "var"}

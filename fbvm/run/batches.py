@@ -154,11 +154,6 @@ class Batches:
         self._again: dict[int, int] = {}
         """By the numbers of runs that could not enter: from which scan on they are asked again."""
 
-    @property
-    def count(self) -> int:
-        """How many runs are in batches."""
-        return sum(len(batch.members) for batch in self._batches)
-
     def enter(self, number: int, run: Running) -> Batch | None:
         """The batch into which the run has been put; None if it has to scan by itself."""
         scans = run.plc.scans

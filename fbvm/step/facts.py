@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fbvm.base.areas import FRAME_LINK, Area
-from fbvm.base.types import Field, StructType, fold
+from fbvm.base.types import Field, fold
 from fbvm.code.image import Image, RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.writer import descriptions, meanings
@@ -70,8 +70,3 @@ class ProgramFacts:
         if not older:
             return found
         return {name: replace(field, frame_at=(*field.frame_at, *[FRAME_LINK] * older)) for name, field in found.items()}
-
-    def block(self, body: int) -> StructType | None:
-        """The type of the instances of a body, None for a function."""
-        found = self.image.types.get(fold(self.body_name(body)))
-        return found if isinstance(found, StructType) else None

@@ -59,9 +59,6 @@ class Summary:
     """Cells that the code reads and nobody writes: they keep their initial value."""
 
 
-IsInput = Callable[[Cell], bool]
-
-
 def summarize(image: Image, budget: int, free: Iterable[tuple[int, int, int | None]] = (),
               expired: Callable[[], bool] = never, seen: Sequence[Place] = (),
               watched: Sequence[range] = ()) -> Summary:  # fmt: skip
