@@ -85,10 +85,8 @@ def _block(block: Block, site: int | None, counters: list[Counter]) -> Block:
         elif node[0] == "case":
             rows = tuple((labels, _branch(inner, site, counters)) for labels, inner in node[3])
             out.append((*node[:3], rows, _branch(node[4], site, counters)))
-        elif node[0] == "loop":
-            out.append(("loop", *(_block(inner, site, counters) for inner in node[1:])))
         else:
-            out.append(node)
+            out.append(("loop", *(_block(inner, site, counters) for inner in node[1:])))
     return tuple(out)
 
 
