@@ -93,6 +93,8 @@ def _objects(image: Image) -> Iterator[str]:
     if image.objects.leases:
         where = _absolute(image.objects.leases_at, areas)
         yield f"leases    {where:12} {image.objects.leases} of what ends while pointers are kept"
+    if image.objects.heap_rows:
+        yield f"heap      {_absolute(image.layout.heap_at, areas):12} {image.layout.heap_bytes} bytes for __NEW"
 
 
 def _absolute(offset: int, areas: dict[str, Area], bit: int | None = None) -> str:

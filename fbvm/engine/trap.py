@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fbvm.base.codes import CODES
-from fbvm.code.image import Image, Site
+from fbvm.base.memory import OBJECT_SHIFT, Memory
+from fbvm.code.image import Image, Objects, Site
+from fbvm.code.operations import LEASE_BYTES, LEASED
 
 NO_INSTANCE = -1
 """In place of the offset of an instance: a function has none."""
@@ -64,10 +66,12 @@ _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} o
 """R0105 by the number of its values: BCD, text and data type, value and limits."""
 
 
-def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), instance: int = NO_INSTANCE) -> Trap:
+def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), instance: int = NO_INSTANCE,
+         memory: Memory | None = None) -> Trap:
     """The trap `code` at the site with number `site` of the image.
 
-    Its message says the values; without values it says the title of the code.  `instance` is that of `Trap`."""
+    Its message says the values; without values it says the title of the code.  `instance` is that of `Trap`, `memory` the one in
+    which the program was stopped."""
     place = image.sites[site]
     values = tuple(int(value) if isinstance(value, bool) else value for value in values)
     if code == "R0105" and values:
@@ -78,9 +82,20 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), insta
         words = f"the program has raised exception 16#{values[0]:X}"
     elif code == "R0104":
         words = f"{CODES[code].title}: {ENDLESS}"
+    elif code == "R0110" and values and memory is not None and image.objects.is_made(values[0] >> OBJECT_SHIFT):
+        words = _of_heap(image.objects, values[0], memory)
     else:
         words = CODES[code].title if code in CODES else code
     return Trap(code, place, values, f"{code} {place}: {words}", instance)
+
+
+def _of_heap(objects: Objects, reference: int, memory: Memory) -> str:
+    """What is wrong with a pointer to what __NEW has made."""
+    row, held = divmod((reference >> OBJECT_SHIFT) - LEASED, 1 << objects.held_bits)
+    start, end, holder, _ = memory.views["u32"][(objects.leases_at + row * LEASE_BYTES) // 4:][:LEASE_BYTES // 4]
+    if held != holder:
+        return "what the pointer points at has been deleted by __DELETE"
+    return f"this leads out of the {end - start} bytes that __NEW has made"
 
 
 def _shown(value: Any) -> Any:

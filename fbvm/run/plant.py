@@ -135,7 +135,7 @@ class Plant:
             return None
         compilation = compile_files(sources, program=row.program, libraries=row.libraries, runnable=True,
                                     resource=row.resource, dialect=row.dialect, no_warn=self._wanted.no_warn,
-                                    warnings_as_errors=self._wanted.as_errors)
+                                    warnings_as_errors=self._wanted.as_errors, heap=row.heap)
         self.diagnostics += compilation.diagnostics
         return compilation.image
 

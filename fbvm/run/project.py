@@ -31,6 +31,7 @@ from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.base.files import SETTINGS_BYTES
 from fbvm.base.host import foreign_path
+from fbvm.code.image import LARGEST_HEAP
 from fbvm.engine.choice.tiers import CHOICES
 from fbvm.interchange.formats.given import usual_dialect
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
@@ -133,6 +134,7 @@ PLC: Keys = {
     "dialect": Key(one_of(tuple(DIALECTS)), "How to answer what compilers disagree about; without it \"twincat\" if a source is "
                                              "TwinCAT's, else \"standard\".", None),
     "libraries": Key(texts, "Folders of blocks that are asked before the shipped ones.", ()),
+    "heap": Key(whole(0, LARGEST_HEAP), "Bytes that __NEW can take at the same time, 1 MiB if nothing is said.", None),
     "cycle": Key(time_ns, "The cycle time.", 10_000_000),
     "watch_cycle": Key(time_between(SHORTEST_NS, LONGEST_NS, "from 10ms to 40s"),
                        "The longest time that a scan may take, where time is real.", USUAL_NS),
@@ -196,6 +198,8 @@ class PlcRow:
     sets: tuple[SetRow, ...]
     first: int = 1
     """With `count`: the number of the first one; others of the project may run elsewhere."""
+    heap: int | None = None
+    """Bytes of the heap; None for as many as usual."""
 
 
 @dataclass(frozen=True)
@@ -384,5 +388,5 @@ def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:
         row["watch_cycle"], row["pace"], row["engine"], row["count"],
         row["until"], row["watch"],
         tuple(UnitRow(unit["type"], unit["address"], _options(unit)) for unit in row["unit"]),
-        tuple(SetRow(one["name"], one["value"], one["at"]) for one in row["set"]),
+        tuple(SetRow(one["name"], one["value"], one["at"]) for one in row["set"]), heap=row["heap"],
     )  # fmt: skip

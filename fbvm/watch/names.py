@@ -28,11 +28,11 @@ class Names:
     """The names of all variables and addresses in the memory of one program; values are not read here.
 
     `symbols` and `areas` are those of the program, `extents` the first and last byte offsets of its objects, by which a
-    pointer that points behind its variable is recognised."""
+    pointer that points behind its variable is recognised, `heap` the bytes from which __NEW takes."""
 
     def __init__(self, symbols: Mapping[str, Field], areas: Mapping[str, Area],
-                 extents: Sequence[tuple[int, int]] = ()) -> None:  # fmt: skip
-        self._symbols, self._areas, self._extents = symbols, areas, extents
+                 extents: Sequence[tuple[int, int]] = (), heap: range = range(0)) -> None:  # fmt: skip
+        self._symbols, self._areas, self._extents, self._heap = symbols, areas, extents, heap
         symbols_places = [Place(field.name, _bound(field.type) if field.reference else field.type, field.offset, field.bit)
                 for field in symbols.values()]
         self._slots = sorted((place for place in symbols_places if self._in_slots(place)), key=lambda place: place.offset)
@@ -49,7 +49,8 @@ class Names:
     @classmethod
     def of(cls, image: Image, areas: Mapping[str, Area]) -> Names:
         """The names in the memory of a program that runs."""
-        return cls(image.symbols, areas, image.objects.extents)
+        layout = image.layout
+        return cls(image.symbols, areas, image.objects.extents, range(layout.heap_at, layout.heap_at + layout.heap_bytes))
 
     def _in_slots(self, place: Place) -> bool:
         return place.offset >= SLOTS_OFFSET and all(area.offset > place.offset or place.offset >= _end(area)
@@ -128,6 +129,8 @@ class Names:
                 return f"outside of {self._whole(start, end)}"
         bit = reference & BIT_MASK
         place = self._fitting(offset, None if bit == WHOLE_BYTES else bit, target)
+        if offset in self._heap and number >= LEASED:
+            return f"-> {target.name if target else 'a variable'} of __NEW (16#{offset:X})"
         if place is None:
             local = number == BUFFER_OBJECT or number >= LEASED
             return "-> a local variable" if local else f"no variable (16#{reference:016X})"

@@ -15,8 +15,12 @@ def _null(scope: Scope, expr: tree.NullLiteral, want: Type | None) -> Type:
     return NULL
 
 
+def _type(scope: Scope, expr: tree.TypeOperand, want: Type | None) -> None:
+    scope.error("S0405", expr, "a type stands here, and a value is needed", "SIZEOF and __NEW take types")
+
+
 RULES: dict[type, Callable[..., Type | None]] = {
-    tree.Literal: literals.literal, tree.EnumLiteral: literals.enum_literal, tree.NullLiteral: _null,
+    tree.Literal: literals.literal, tree.EnumLiteral: literals.enum_literal, tree.NullLiteral: _null, tree.TypeOperand: _type,
     tree.NameRef: names.name, tree.Direct: names.address,
     tree.Member: members.member, tree.Part: members.part, tree.Deref: members.target, tree.Index: subscripts.element,
     tree.ArrayInit: aggregates.aggregate, tree.StructInit: aggregates.aggregate,

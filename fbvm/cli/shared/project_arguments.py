@@ -50,7 +50,7 @@ def check_project_options(context: click.Context, allowed: Mapping[str, str]) ->
 
     `allowed` are the options that can, by the names of their parameters."""
     given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
-    given |= {option for option in ("resource", "dialect") if context.meta.get(f"fbvm.{option}") is not None}
+    given |= {option for option in ("resource", "dialect", "heap") if context.meta.get(f"fbvm.{option}") is not None}
     wrong = [parameter.opts[0] for parameter in context.command.params
              if parameter.name in given - set(allowed) - {"files"}]
     if wrong:

@@ -146,7 +146,8 @@ def record_plant(plant: Plant, add: Callable[[str, Plc, Described], object], opt
     """Has all PLCs of a plant recorded by `add`, each by its name."""
     for kind in plant.kinds:
         row = kind.row
-        text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect)
+        text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect,
+                            heap=row.heap)  # fmt: skip
         for name, run in zip(kind.names, kind.runs, strict=True):
             add(name, run.plc, described(run.plc, text, options, row.sources, row.libraries))
 

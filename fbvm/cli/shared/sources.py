@@ -17,7 +17,7 @@ from fbvm.cli.shared.given_sources import families, inputs, sources_of
 from fbvm.cli.shared.paths import ExistingPath, SourcePath, taken_folders
 from fbvm.cli.shared.terminal import say, say_json
 from fbvm.code.compiler import compile_files
-from fbvm.code.image import Image
+from fbvm.code.image import LARGEST_HEAP, Image
 from fbvm.interchange.dialect_signs import guessed
 from fbvm.interchange.formats.given import usual_dialect
 
@@ -26,7 +26,7 @@ AUTO = "auto"
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
-    """FILE..., --program, --resource, --dialect, --library and --no-cache, which all verbs on programs share."""
+    """FILE..., --program, --resource, --dialect, --heap, --library and --no-cache, which all verbs on programs share."""
     files = click.argument("files", nargs=-1, required=True, metavar="FILE...",
                            type=SourcePath(), callback=taken_folders)  # fmt: skip
     return source_options(files(function))
@@ -38,17 +38,17 @@ def _switch_cache_off(context: click.Context, parameter: click.Parameter, wanted
         context.call_on_close(lambda: cache.switch(True))
 
 
-def _keep_in_context(context: click.Context, parameter: click.Parameter, value: str | bool | None) -> None:
+def _keep_in_context(context: click.Context, parameter: click.Parameter, value: str | bool | int | None) -> None:
     context.meta[f"fbvm.{parameter.name}"] = value
 
 
 def compile_options(files: Sequence[Path]) -> dict[str, Any]:
-    """The options --resource and --dialect of the present command, as keyword arguments of the compiler.
+    """The options --resource, --dialect and --heap of the present command, as keyword arguments of the compiler.
 
     Without --dialect files of TwinCAT, and PLCopen XML whose header names the tool, have that of the tool; `--dialect auto` looks
     at the files, and says on stderr what it chose and why."""
     meta = click.get_current_context().meta
-    given = {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
+    given = {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect", "heap") if meta.get(f"fbvm.{name}") is not None}
     given.setdefault("dialect", usual_dialect(files))
     if given["dialect"] == AUTO:
         chosen = guessed(families(files), sources_of(files))
@@ -58,7 +58,7 @@ def compile_options(files: Sequence[Path]) -> dict[str, Any]:
 
 
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--program, --resource, --memory, --dialect, --library and --no-cache."""
+    """--program, --resource, --memory, --dialect, --heap, --library and --no-cache."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR",
                      type=ExistingPath(file_okay=False),
@@ -67,6 +67,8 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      help="Compile anew, prove anew, and keep nothing of it on disk."),
         click.option("--memory", is_flag=True, expose_value=False, callback=_keep_in_context,
                      help="Take the memory window of a project of CX-Programmer as initial values of D, H, W and E."),
+        click.option("--heap", type=click.IntRange(0, LARGEST_HEAP), metavar="BYTES", expose_value=False,
+                     callback=_keep_in_context, help="How much memory __NEW can take at the same time.  Without it: 1 MiB."),
         click.option("--resource", metavar="NAME", expose_value=False, callback=_keep_in_context,
                      help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
         click.option("--dialect", type=click.Choice([*DIALECTS, AUTO]), expose_value=False, callback=_keep_in_context,

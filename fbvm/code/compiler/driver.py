@@ -21,7 +21,7 @@ def _no_progress(stage: str, done: int, known: int) -> None:
 def compile_files(paths: Sequence[Path | str | Source], program: str | None = None, libraries: Sequence[Path | str] = (),
                   runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
                   lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False, cache: bool = True,
-                  progress: Progress = _no_progress, drawn: bool = False) -> Compilation:
+                  progress: Progress = _no_progress, drawn: bool = False, heap: int | None = None) -> Compilation:
     """Compile source files.
 
     paths: the files, of Structured Text, ladder mnemonics or charts; a `Source` is taken as it is.
@@ -36,6 +36,7 @@ def compile_files(paths: Sequence[Path | str | Source], program: str | None = No
     cache: read the result from the user's cache folder if the same files were compiled before, and keep it there.
     progress: is called as the work goes on.
     drawn: statements of Structured Text get pictures as rungs in the image, where they can be drawn.
+    heap: bytes of the heap from which __NEW takes; None for the usual 1 MiB.
 
     Nothing in the files raises, and none that cannot be read: there are diagnostics.  Raises ValueError for an unknown dialect,
     or for a code in `no_warn` that no warning has."""
@@ -52,7 +53,7 @@ def compile_files(paths: Sequence[Path | str | Source], program: str | None = No
         sources, [Path(folder) for folder in libraries],
         (program, runnable, resource, dialect, lint, unwanted, warnings_as_errors, drawn))
     if entry and (known := image_cache.read(entry, sources)):
-        return Compilation(*known)
+        return Compilation(known[0].with_heap(heap), known[1])
     from fbvm.code.compiler.neighbours import with_neighbours
     from fbvm.code.compiler.passes import deep
 
@@ -62,28 +63,29 @@ def compile_files(paths: Sequence[Path | str | Source], program: str | None = No
         if entry and made.image:
             image_cache.write(entry, sources, made.image, made.diagnostics)
     if made.image and not unreadable:
-        return made
+        return Compilation(made.image.with_heap(heap), made.diagnostics)
     files = [path for path in paths if not isinstance(path, Source)]
     return Compilation(None, unreadable + with_neighbours(made.diagnostics, files))
 
 
 def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,
                  resource: str | None = None, dialect: str = "standard", lint: bool = True, no_warn: Iterable[str] = (),
-                 warnings_as_errors: bool = False, drawn: bool = False) -> Compilation:
+                 warnings_as_errors: bool = False, drawn: bool = False, heap: int | None = None) -> Compilation:
     """Compile one text; diagnostics call it `name`.  All other parameters are those of `compile_files`.
 
     >>> compile_text("PROGRAM Main VAR n : INT; END_VAR n := 1.5; END_PROGRAM").errors[0].code
     'S0301'"""
     return compile_sources([Source(name, text)], program, libraries, resource=resource, dialect=dialect, lint=lint,
-                           no_warn=no_warn, warnings_as_errors=warnings_as_errors, drawn=drawn)
+                           no_warn=no_warn, warnings_as_errors=warnings_as_errors, drawn=drawn, heap=heap)
 
 
 def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
                     runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
                     lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False,
-                    progress: Progress = _no_progress, drawn: bool = False) -> Compilation:
+                    progress: Progress = _no_progress, drawn: bool = False, heap: int | None = None) -> Compilation:
     """Compile texts, each with the name that diagnostics give it.  All other parameters are those of `compile_files`."""
     from fbvm.code.compiler.passes import run_passes
 
-    return Compilation(*run_passes(sources, program, [Path(folder) for folder in libraries], runnable, resource, dialect, lint,
-                                   no_warn, warnings_as_errors, progress, drawn))
+    image, diagnostics = run_passes(sources, program, [Path(folder) for folder in libraries], runnable, resource, dialect, lint,
+                                    no_warn, warnings_as_errors, progress, drawn)
+    return Compilation(image.with_heap(heap) if image is not None else None, diagnostics)

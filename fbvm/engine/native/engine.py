@@ -141,4 +141,5 @@ class NativeEngine:
             self._counts.settle()
         if code == STOPPED:
             return PAUSE
-        return trap(self.image, code, site, tuple(self._context.values(shown)), self._context.instance(shown))
+        return trap(self.image, code, site, tuple(self._context.values(shown)), self._context.instance(shown),
+                    self.memory)

@@ -286,7 +286,7 @@ class PythonEngine:
             instance, known = self._stopped(stop)
             if known is not None:
                 self._system[BUDGET // 8] = known
-            return trap(self.image, stop.code, stop.site, stop.values, instance)
+            return trap(self.image, stop.code, stop.site, stop.values, instance, self.memory)
         finally:
             if self._log:
                 self._log.entries.clear()
@@ -355,7 +355,7 @@ class PythonEngine:
             self.counted[:] = counted
             return (yield from self._told_in_part(log, task_index))
         except Stop as stop:
-            found = trap(self.image, stop.code, stop.site, stop.values, self._stopped(stop)[0])
+            found = trap(self.image, stop.code, stop.site, stop.values, self._stopped(stop)[0], self.memory)
         except Exception as error:
             failure = error
         finally:
@@ -399,7 +399,7 @@ class PythonEngine:
                 yield from bodies[run.body](run.offset)
                 yield Observation("return", NO_SITE, (run.body, run.offset))
         except Stop as stop:
-            return trap(self.image, stop.code, stop.site, stop.values, self._stopped(stop)[0])
+            return trap(self.image, stop.code, stop.site, stop.values, self._stopped(stop)[0], self.memory)
         return None
 
 

@@ -89,6 +89,8 @@ def extent(objects: Objects, size: int, number: int, site: int) -> tuple[int, in
         return objects.extents[row]
     if number == 0:
         return 0, 0
+    if objects.is_made(number):
+        raise Refused("what __NEW has made cannot be followed", site)
     raise Refused("a pointer to a variable that ends with its call cannot be followed", site)
 
 

@@ -34,6 +34,8 @@ class ProgramText:
     drawn: bool = False
     e_banks: tuple[str, ...] = field(default=())
     """Banks of the E area that are added to those that the program names."""
+    heap: int | None = None
+    """Bytes of the heap; None for as many as usual."""
 
     def as_data(self) -> dict[str, Any]:
         """As plain data."""
@@ -46,7 +48,7 @@ class ProgramText:
         return cls(tuple((str(name), str(text)) for name, text in data["sources"]), tuple(map(str, data["libraries"])),
                    tuple(map(LibraryTexts.of, data.get("held", ()))), None if program is None else str(program),
                    None if resource is None else str(resource), str(data["dialect"]), bool(data["drawn"]),
-                   tuple(map(str, data["e_banks"])))  # fmt: skip
+                   tuple(map(str, data["e_banks"])), None if data.get("heap") is None else int(data["heap"]))  # fmt: skip
 
     @property
     def texts(self) -> dict[str, str]:
@@ -73,7 +75,11 @@ class ProgramText:
 
     def _known(self, entry: str, sources: Sequence[Source]) -> Image | None:
         known = image_cache.read(entry, sources)
-        return known[0].with_e_banks(self.e_banks) if known else None
+        return self._fitted(known[0]) if known else None
+
+    def _fitted(self, image: Image) -> Image:
+        """The image for the memory that the PLC had."""
+        return image.with_e_banks(self.e_banks).with_heap(self.heap)
 
     def _compiled_with_held(self, entry: str, sources: Sequence[Source]) -> Image | str:
         try:
@@ -91,4 +97,4 @@ class ProgramText:
         if made.image is None:
             return f"the program does not compile here: {made.errors[0].code} {made.errors[0].message}"
         image_cache.write(entry, sources, made.image, [])
-        return made.image.with_e_banks(self.e_banks)
+        return self._fitted(made.image)

@@ -28,7 +28,8 @@ def describe(source: ScanSource, head: Mapping[str, Any]) -> int:
         extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
         boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
         sized = head.get("sized")
-        layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes, None if sized is None else tuple(sized))
+        layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes, None if sized is None else tuple(sized),
+                        int(head.get("heap", 0)))
         source.areas, size = layout.areas, layout.size
         if not 0 <= layout.slots_size <= LARGEST_BYTES:
             raise ValueError(f"{layout.slots_size} bytes of slots")
@@ -50,7 +51,7 @@ def describe(source: ScanSource, head: Mapping[str, Any]) -> int:
         source.lines = {file: {int(n): str(text) for n, text in rows.items()} for file, rows in head["lines"].items()}
     except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise DescriptionError(str(error)) from None
-    source.names = Names(source.symbols, source.areas, extents)
+    source.names = Names(source.symbols, source.areas, extents, range(layout.heap_at, size) if layout.heap_bytes else range(0))
     return size
 
 

@@ -274,6 +274,7 @@ def description(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[
     return {
         "format": FORMAT, "image": image.fingerprint, "cycle_ns": plc.cycle_ns, "depth": depth.value,
         "selected": list(selected), "slots": image.layout.slots_size, "e_banks": image.layout.e_banks,
+        "heap": image.layout.heap_bytes,
         "mailboxes": [astuple(box) for box in image.layout.mailboxes], "sized": image.layout.sized,
         **symbols.to_data(image.symbols), "objects": image.objects.extents,
         "files": files, "sites": [[files.index(s.file), s.pou, s.line, s.column] for s in image.sites],

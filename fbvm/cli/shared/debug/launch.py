@@ -38,7 +38,8 @@ from fbvm.watch.values import parse_time_ns
 
 LAUNCH: dict[str, tuple[type, ...]] = {
     "program": (str, list), "project": (str,), "plc": (str,), "main": (str,), "resource": (str,), "libraries": (list,),
-    "dialect": (str,), "cycle": (str,), "timing": (str,), "seed": (int,), "engine": (str,), "map": (list,), "set": (list,),
+    "dialect": (str,), "heap": (int,),
+    "cycle": (str,), "timing": (str,), "seed": (int,), "engine": (str,), "map": (list,), "set": (list,),
     "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,), "test": (str,),
     "recording": (str,),
 }  # fmt: skip
@@ -97,7 +98,8 @@ def _program(given: Mapping[str, Any], folder: Path) -> Target:
     if errors(said):
         raise LaunchError("the project cannot be taken over", _said(said))
     compilation = compile_files(sources, program=given.get("main"), libraries=libraries, runnable=True, drawn=True,
-                                resource=given.get("resource"), dialect=given.get("dialect") or usual_dialect(files))  # fmt: skip
+                                resource=given.get("resource"), dialect=given.get("dialect") or usual_dialect(files),
+                                heap=given.get("heap"))  # fmt: skip
     image = _image(compilation.image, compilation.diagnostics)
     sets = [_SetRow.of(row) for row in given.get("set", ())]
     image = image.with_e_banks(e_banks_in([row.name for row in sets] + list(given.get("force", {}))))
@@ -154,7 +156,7 @@ def _test(node: str, folder: Path) -> Target:
 
 def _project(given: Mapping[str, Any], path: Path) -> Target:
     """The PLCs of a project, which share one time and one network in memory."""
-    own = {"main", "resource", "libraries", "dialect", "cycle", "engine", "timing", "map"} & set(given)
+    own = {"main", "resource", "libraries", "dialect", "heap", "cycle", "engine", "timing", "map"} & set(given)
     if own:
         raise LaunchError(f"{', '.join(sorted(own))}: with a project its file says that")
     project = _read_project(path)

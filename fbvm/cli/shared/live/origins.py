@@ -218,7 +218,8 @@ class ProjectOrigin:
             row = kind.row
             own = {path.name: path for path in row.sources} | sources_within(row.sources, row.resource)
             texts = source_texts(kind.runs[0].plc.image, own, row.libraries)
-            text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect)
+            text = program_text(row.sources, row.libraries, program=row.program, resource=row.resource, dialect=row.dialect,
+                                heap=row.heap)  # fmt: skip
             for name, run in zip(kind.names, kind.runs, strict=True):
                 plcs[name] = SeenPlc(run.plc, texts, text, tuple(row.watch))
         return Built(plcs, [self.bound(run) for run in plant.runs], plant.close)
