@@ -408,16 +408,18 @@ class Model:
         elif power:
             self.variables[node.text] = node.marks == "set"
 
-    def _at(self, node: Node, pin: str) -> Any:
-        values = [self._read(self.nodes[number]) if self.nodes[number].kind == "inout" and (node.id, (number, name)) in self.cut
-                  else self._of(self.nodes[number], name) for number, name in node.feeds[pin]]
+    def _at(self, node: Node, pin: str, consumer: int = 0) -> Any:
+        """The value at a pin, for the node `consumer` behind it if that takes it through coils."""
+        consumer = consumer or node.id
+        values = [self._read(self.nodes[number]) if self.nodes[number].kind == "inout" and (consumer, (number, name)) in self.cut
+                  else self._of(self.nodes[number], name, consumer) for number, name in node.feeds[pin]]
         return any(values) if len(values) > 1 else values[0]
 
-    def _of(self, node: Node, pin: str) -> Any:
+    def _of(self, node: Node, pin: str, consumer: int = 0) -> Any:
         if node.kind == "rail":
             return True
         if node.kind == "coil":
-            return self._at(node, "")
+            return self._at(node, "", consumer)
         if node.kind == "contact" and self.rereads:
             return self._contact(node)
         if node.kind in ("value", "inout") and self.rereads:

@@ -137,6 +137,22 @@ def test_an_interval_that_is_no_duration_is_named_with_its_task() -> None:
     assert "INTERVAL" not in "".join(made.files.values())
 
 
+def test_parts_of_a_window_of_beremiz_are_told_and_nobody_presses_them() -> None:
+    parts = {"start": "Button", "lamp": "Led", "said": "TextCtrl", "boolean": "GetBoolString"}
+    declared = "".join(variable(name, f'<derived name="{kind}"/>') for name, kind in parts.items()) + variable("n", "<INT/>")
+    text = ("start(set_state := TRUE, state_in := TRUE); lamp(state_in := TRUE); said(set_text := TRUE, text := 'a'); "
+            "boolean(VALUE := TRUE); n := SEL(start.state_out, LEN(boolean.CODE), 0);")
+    declared = f"<localVars>{declared}</localVars>"
+    made = import_xml(project(declared, text, header='<fileHeader companyName="Beremiz" productName="Beremiz"/>'))
+    assert [d.code for d in made.diagnostics] == ["X0292"] * 3
+    assert all("svgui" in d.message for d in made.diagnostics)
+    compiled = compile_sources(made.sources, "Main", dialect="matiec", lint=False)
+    assert compiled.image is not None, [d.render() for d in compiled.diagnostics]
+    plc = Plc(compiled.image)
+    assert plc.scan() is None
+    assert plc.read("Main.n") == 4
+
+
 def test_globals_of_other_files_of_a_beremiz_project_are_declared_and_told() -> None:
     declared = f"<externalVars>{variable('Level', '<INT/>')}</externalVars>" \
         f"""<localVars>{variable('py', '<derived name="python_eval"/>')}</localVars>"""

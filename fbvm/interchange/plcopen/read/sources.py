@@ -19,6 +19,8 @@ OUTSIDE = "extensions"
 """Name of the file for globals that other files of a project of Beremiz declare."""
 SERVED = ("PYTHON_EVAL", "PYTHON_POLL", "PYTHON_GEAR", "CSV_READ_BY_STRING", "CSV_READ_BY_INT", "CSV_RELOAD")
 """Blocks that ask a program on the host of the PLC (Beremiz, py_ext)."""
+WINDOWS = ("BUTTON", "LED", "TEXTCTRL")
+"""Blocks that stand for a part of a window on the host (Beremiz up to 1.2, svgui)."""
 _WHOLE = re.compile(r"(?is)\s*(FUNCTION_BLOCK|FUNCTION|PROGRAM)\s+(\w+)\b.*\bEND_\1\s*;?\s*")
 """A body that is a whole POU."""
 
@@ -45,15 +47,23 @@ def sources(reading: Reading, document: Document) -> dict[str, str]:
     return files.texts()
 
 
+def _served(reading: Reading, document: Document, pou: Pou) -> None:
+    """Name the blocks of a POU that stand for programs on the host of the PLC."""
+    for variable in (variable for listed in pou.lists for variable in listed.variables):
+        kind, reading.where = variable.type.upper(), pou.name
+        if kind in SERVED:
+            reading.report("X0292", pou.element, f"{variable.name} is a {variable.type}, which a program on the host of the "
+                           "PLC serves: here it never acknowledges")
+        elif kind in WINDOWS and reading.producer.family == "beremiz" and kind not in document.pous_by_name:
+            reading.report("X0292", pou.element, f"{variable.name} is a {variable.type} of svgui, a part of a window on the "
+                           "host of the PLC: here nobody sees or presses it")
+
+
 def _outside(reading: Reading, document: Document, files: SourceFiles) -> None:
     """Declare what POUs expect of other files of a project, and say so; name the blocks that other programs serve."""
     missing: dict[str, Variable] = {}
     for pou in document.pous:
-        for variable in (variable for listed in pou.lists for variable in listed.variables):
-            if variable.type.upper() in SERVED:
-                reading.where = pou.name
-                reading.report("X0292", pou.element, f"{variable.name} is a {variable.type}, which a program on the host of the "
-                               "PLC serves: here it never acknowledges")
+        _served(reading, document, pou)
         for variable in (v for listed in pou.lists if listed.kind == "VAR_EXTERNAL" for v in listed.variables):
             if variable.name.upper() not in document.globals_by_name:
                 missing.setdefault(variable.name.upper(), variable)
