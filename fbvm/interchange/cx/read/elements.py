@@ -87,7 +87,8 @@ class _Cells(Nets):
                 self._join((one.x, one.y), (one.x + 1, one.y))
             elif one.kind == VERTICAL:
                 self._join((one.x, one.y), (one.x, one.y + 1))
-        self._starts = {self._net(one.x, one.y).name for one in elements if one.kind not in (HORIZONTAL, VERTICAL, PIN)}
+        self._starts = {self._net(one.x, one.y + (one.kind == BLOCK)).name
+                        for one in elements if one.kind not in (HORIZONTAL, VERTICAL, PIN)}
         for one in elements:
             if one.kind not in (HORIZONTAL, VERTICAL, PIN):
                 self._place(one)
@@ -141,11 +142,11 @@ class _Cells(Nets):
         prefix = name[:len(name) - len(bare)]
         mnemonic, bracket, code = bare.partition("(")
         how = joined(mnemonic) or joined("LD" + mnemonic)
-        if one.in_series and how is not None and (how[1] or operands):
+        if spelling(mnemonic) in INLINE:
+            self._series(start, one, Box(-1, mnemonic, through=True))
+        elif one.in_series and how is not None and (how[1] or operands):
             self._series(start, one, drawn_contact(-1, prefix, how[1] + (bracket + code if how[1] != "NOT" else ""),
                                                    tuple(operands)))
-        elif spelling(mnemonic) in INLINE:
-            self._series(start, one, Box(-1, mnemonic, through=True))
         elif spelling(mnemonic) in ("OUT", "OUTNOT", "OUT NOT"):
             self.add_output(start, Coil(-1, prefix + ("/" if "NOT" in mnemonic.upper() else " " * (not prefix)), tuple(operands)))
         else:

@@ -1,0 +1,38 @@
+"""How deep an expression may be, to the operator; and what a POU's parser keeps of the one before: nothing."""
+
+from __future__ import annotations
+
+import pytest
+from rows import each_of
+
+from fbvm.base.diagnostics import Source
+from fbvm.syntax.parser import parse
+from fbvm.syntax.st import builder
+from fbvm.syntax.tree import Pou
+from fbvm.syntax.tree.il import InstructionList
+
+
+def codes(statement: str) -> list[str]:
+    return [d.code for d in parse(Source("x", f"PROGRAM p\n{statement}\nEND_PROGRAM"))[1]]
+
+
+@each_of(("head", "part", "tail", "deepest"), (
+    ("a := b", ".c", ";", 19), ("a := b", ".C#D", ";", 9), ("a := b", "[1]", ";", 19), ("a := b", "^", ";", 19),
+    ("a := b", "(1)", ";", 19), ("a := b", " + 1", ";", 19), ("a := ", "NOT ", "b;", 19), ("a := b", ".1", ".2;", 18),
+    ("a := b", "(c := d)", ";", 19), ("a := b", " ** 2", ";", 19)))  # fmt: skip
+def test_an_expression_is_as_deep_as_it_may_be(head: str, part: str, tail: str, deepest: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(builder, "CHAIN_LIMIT", 20)
+        assert codes(head + part * deepest + tail) == []
+        assert codes(head + part * (deepest + 1) + tail) == ["S0106"]
+
+
+def test_a_list_does_not_know_the_instances_of_the_pou_before() -> None:
+    text = "PROGRAM {0}\nVAR f : {1}; x : BOOL; END_VAR\nLD x\nS f\nEND_PROGRAM\n"
+    tree, errors = parse(Source("x", text.format("A", "RS") + text.format("B", "BOOL")))
+    assert not errors
+    made = []
+    for pou in tree.declarations:
+        assert isinstance(pou, Pou) and isinstance(pou.body[0], InstructionList)
+        made.append(type(pou.body[0].body[-1]).__name__)
+    assert made == ["CallStatement", "Assign"]
