@@ -71,8 +71,7 @@ class Values:
 
     def _find(self, path: str) -> Place:
         found = self._plc.find(f"{self._place.name}.{path}")
-        if not isinstance(found, Place):
-            raise UnknownPlace(f"{path} is a range; name one member after the other")
+        assert isinstance(found, Place), "only addresses have ranges"
         return found
 
 

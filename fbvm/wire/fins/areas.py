@@ -97,10 +97,5 @@ def place_of(code: int, number: int, bit: int) -> tuple[Span, int] | None:
     return span, 16 * element + bit if span.has_bits else element
 
 
-def word_code(area: str) -> int:
-    """The code that names the words of an area, in CS/CJ mode.  Raises KeyError for an area that has none."""
-    return WORD_CODES[area][0]
-
-
 WORD_CODES = {span.area: (span.code, span.first) for span in reversed(SPANS) if span.size == 2}
 """For each area of words its code, and the FINS number of its first word; where there are several, that of CS/CJ mode."""

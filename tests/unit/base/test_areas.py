@@ -125,3 +125,12 @@ def test_what_is_kept_over_a_start_and_what_a_program_must_not_write() -> None:
     box, bank = MAILBOX.at(SLOTS_OFFSET), e_bank("E3", SLOTS_OFFSET)
     assert [(area.read_only, area.retained, area.count, area.size_bytes) for area in (box, bank)] == [
         (0, False, 64, 128), (0, True, 32768, 65536)]
+
+
+@each_of("text, shown", [("%MX3.15", "%MX7.7"), ("%MX3.16", ""), ("%IX0.0", "%IX0.0"), ("%QX1.8", "%QX3.0"), ("%MW3.16", "")])
+def test_bits_of_words_where_a_number_counts_words(text: str, shown: str) -> None:
+    if shown:
+        assert str(parse_address(text, words=True)) == shown
+    else:
+        with pytest.raises(AddressError, match="bit 16 does not exist; bits of "):
+            parse_address(text, words=True)

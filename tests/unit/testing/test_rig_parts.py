@@ -10,11 +10,16 @@ from typing import Any, cast
 import pytest
 from rows import each_of
 
+from fbvm.base import types as t
 from fbvm.base.diagnostics import Source
 from fbvm.code.image import ProgramRun, TaskRow
-from fbvm.testing import Rig, Trapped, machine, plugin
+from fbvm.prove.encoding.execution import Refused
+from fbvm.testing import Rig, Trapped, machine, plugin, proofs, proved, strategies
 from fbvm.testing import subject as subjects
+from fbvm.testing.coverage import FileCoverage
+from fbvm.testing.coverage_plugin import CoveragePlugin
 from fbvm.testing.reads import VariableReads
+from fbvm.testing.recorded import Recorded
 from fbvm.testing.session import library_folders, search_folders
 from fbvm.testing.st_items import StFile, StItem
 from fbvm.testing.subject import LIBRARY, SubjectError, subject
@@ -406,3 +411,42 @@ def test_options_of_warnings_are_off_unless_given() -> None:
 
 def test_the_library_of_assert_is_there() -> None:
     assert (LIBRARY / "ASSERT.st").is_file() and isinstance(Rig.of("Count", text=COUNT).find("n"), Place)
+
+
+# --- what is refused in words -------------------------------------------------------------------------------------------
+
+
+def test_a_range_has_no_causes_and_a_session_hands_over_what_it_counted(tmp_path: Path) -> None:
+    rig = Rig.of("Main", text="PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM").scan()
+    seen = Recorded(rig, tmp_path / "t.fbtrace")
+    with pytest.raises(ValueError, match=r"^D0\.\.D3 is a range; name one place$"):
+        seen.why("D0..D3")
+    counted = CoveragePlugin(config(tmp_path))
+    worker = FileCoverage({(3, 5): 2}, {(3, 5): {(4, 9): 1}})
+    counted.coverage.files["a.st"] = worker
+    data: dict[str, Any] = {}
+    counted.pytest_sessionfinish(cast(Any, SimpleNamespace(config=SimpleNamespace(workeroutput=data))))
+    together = CoveragePlugin(config(tmp_path))
+    for node in (SimpleNamespace(workeroutput=data), SimpleNamespace(workeroutput={}), SimpleNamespace(),
+                 SimpleNamespace(workeroutput=data)):
+        together.pytest_testnodedown(node, None)
+    assert together.coverage.files == {"a.st": FileCoverage({(3, 5): 4}, {(3, 5): {(4, 9): 2}})}
+
+
+@each_of("site, said", [(-1, r"^too deep$"), (0, r"^test\.st:1:\d+ in Count: too deep$")])
+def test_a_proof_of_what_cannot_be_followed_says_where(site: int, said: str) -> None:
+    def refuse(*given: Any) -> Any:
+        raise Refused("too deep", site)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(proofs, "proved_once", refuse)
+        with pytest.raises(ValueError, match=said):
+            proved(Rig.of("Count", text=COUNT), never="n > 1")
+        with pytest.raises(ValueError, match=r"^say what to prove: one of never, always, no_trap and written_once$"):
+            proved(Rig.of("Count", text=COUNT))
+
+
+def test_values_of_a_structure_are_those_of_its_members_but_constants() -> None:
+    kind = t.StructType("S", 8, 4, {"A": t.Field("a", t.BOOL, 0), "K": t.Field("k", t.INT, 2, constant=True),
+                                    "B": t.Field("b", t.UINT, 4)})
+    assert repr(strategies.values(kind)) == "fixed_dictionaries({'a': booleans(), 'b': integers(min_value=0, max_value=65535)})"
