@@ -74,7 +74,9 @@ class Report:
             now += f" since scan {change.scan} ({show_time(at_ns)[2:]})"
             if change.phase is Phase.REFRESH:
                 return f"{now}, by a unit in the I/O refresh"
-            if change.site is None and change.instance == "":
+            if change.phase is Phase.PROGRAM and signal.place.name not in self._plc.forces:
+                return f"{now}, by a stub"
+            if change.phase is not None:
                 return f"{now}, written from outside the program"
         if writer is None:
             return f"{now}; {f'writes are known from scan {first} on' if first else 'no statement wrote it'}"

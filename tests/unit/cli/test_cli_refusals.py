@@ -386,3 +386,35 @@ def test_sources_with_errors_are_not_compared(folder: Path) -> None:
         assert result.exit_code == 3 and "broken.st" in result.stderr, result.output
     same = fbvm("diff", "counter.st", "counter.st")
     assert (same.exit_code, same.output) == (0, "")
+
+
+# --- projects and campaigns ---------------------------------------------------------------------------------------------
+
+
+@each_of("name, said", [
+    ("!x", "'!x' cannot be the name of a project; use letters, digits, - and _"),
+    (" x", "' x' cannot be the name of a project; use"),
+    ("con", "'con' cannot be the name of a project: Windows has no folder of this name"), ("full", "full is there already"),
+    ("counter.st", "counter.st is there already"), ("empty", ""), ("deep/my pump.1", ""),
+])
+def test_which_project_is_made(folder: Path, name: str, said: str) -> None:
+    (folder / "full" / "inside").mkdir(parents=True, exist_ok=True)
+    made = fbvm("new", name)
+    assert made.exit_code == (2 if said else 0) and said in made.output
+    assert (folder / name / "src" / "pump.st").is_file() == (not said)
+    if not said:
+        assert "src/pump.st                 a function block" in made.output
+
+
+@pytest.mark.slow
+@each_of("arguments, status, said", [
+    (("fleet", "wrong.toml", "--for", "1s"), 3, "wrong.st:1:40: error S0201: m is not declared"),
+    (("campaign", "wrong.toml", "--runs", "2"), 3, "wrong.st:1:40: error S0201: m is not declared"),
+    (("sweep", "wrong.toml", "--for", "1s", "--vary", "Main.n=1,2"), 3, "wrong.st:1:40: error S0201: m is not declared"),
+    (("campaign", "planned.toml"), 2, "planned.toml runs the project none.toml, which is not there"),
+])
+def test_programs_with_errors_and_projects_that_are_gone_are_told_before_runs_begin(
+        folder: Path, arguments: tuple[str, ...], status: int, said: str) -> None:  # fmt: skip
+    (folder / "planned.toml").write_text('[campaign]\nproject = "none.toml"\n', encoding="utf-8")
+    told = fbvm(*arguments)
+    assert (told.exit_code, said in told.output) == (status, True), told.output

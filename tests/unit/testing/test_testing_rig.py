@@ -425,6 +425,20 @@ def test_stubs_are_not_called_again() -> None:
     assert len(calls) == 5
 
 
+def test_what_a_stub_or_a_force_has_changed_is_told() -> None:
+    def ton(timer: Any) -> None:
+        timer.Q = timer.IN
+
+    pump = rig(stubs={"TON": ton}).scan().scan(Start=True).scan()
+    assert pump["Delay.Q"]
+    assert "Delay.Q is TRUE since scan 1 (10ms), by a stub\n" in pump.explain()
+    forced = rig().scan(Start=True)
+    with forced.force({"Delay.IN": False}):
+        forced.scan()
+        assert not forced["Delay.IN"]
+        assert "Delay.IN is FALSE since scan 1 (10ms), written from outside the program\n" in forced.explain()
+
+
 def test_a_table_of_the_last_scans() -> None:
     pump = rig().run("60ms", Start=True)
     assert pump.table("Running", "Starts", scans=1) == """\
