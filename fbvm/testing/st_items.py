@@ -63,7 +63,7 @@ class StFile(pytest.File):
         text, diagnostics = parse(source)
         programs = [node for node in text.declarations if isinstance(node, tree.Pou) and node.kind == "PROGRAM"]
         wrong = errors(diagnostics)
-        inside = [each for each in wrong if any(node.start <= each.start <= node.end for node in programs)]
+        inside = [each for each in wrong if any(node.start < each.start <= node.end for node in programs)]
         if wrong and (len(programs) < 2 or len(inside) < len(wrong)):
             raise self.CollectError("\n".join(message.render() for message in wrong))
         for node in programs:

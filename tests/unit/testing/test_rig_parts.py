@@ -374,7 +374,7 @@ def test_the_programs_of_a_file_are_its_tests(tmp_path: Path, monkeypatch: pytes
     assert collected(f"{COUNT}\n{PROGRAMS.format(2)}") == [
         {"name": "Good", "line": 2}, {"name": "Waits", "line": 6}, {"name": "Silent", "line": 13}, {"name": "Traps", "line": 17}]
     assert collected(PROGRAMS.format(";"))[1] == {"name": "Waits", "line": 5}, "an error in one of several is told by its test"
-    for text in ("PROGRAM A n := ; END_PROGRAM", f"{PROGRAMS}\n{COUNT.replace('n + 1', '')}"):
+    for text in ("PROGRAM A n := ; END_PROGRAM", f"PROGRAM\n{PROGRAMS.format(2)}", f"{PROGRAMS}\n{COUNT.replace('n + 1', '')}"):
         with pytest.raises(file.CollectError, match=r"test_it\.st"):
             collected(text)
     file.path = tmp_path / "none.st"
