@@ -15,6 +15,7 @@ from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import SIZES, Block, Node
 from fbvm.engine.bases import base_ranges
 from fbvm.engine.effects import Effects, Span
+from fbvm.engine.python import held
 from fbvm.engine.python.engine import PythonEngine
 
 INSTANCE = SLOTS_OFFSET + 4096
@@ -46,6 +47,15 @@ def test_what_was_stored_or_loaded_is_not_read_again() -> None:
 
 def test_what_one_place_alone_reads_is_not_held() -> None:
     assert "i16_at" not in source_of((store("i16", 2, X),))
+
+
+def test_of_many_values_so_many_are_held_and_the_others_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = (store("i16", 4, X), store("i16", 6, Y), store("i16", 8, X), store("i16", 10, Y))
+    assert (looks(code, 0), looks(code, 2)) == (1, 1)
+    monkeypatch.setattr(held, "MOST_NAMES", 1)
+    assert (looks(code, 0), looks(code, 2)) == (1, 2)
+    rig = execute(code, before={0: b"\1\0\2\0"})
+    assert [rig.slot("i16", offset) for offset in (4, 6, 8, 10)] == [1, 2, 1, 2]
 
 
 FORGETTING: dict[str, tuple[Block, int]] = {
