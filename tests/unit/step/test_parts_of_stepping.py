@@ -1,0 +1,190 @@
+"""Parts of stepping alone: values of properties, filters between two scans, ends of statements, how far nothing is done."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rows import each_of
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Site
+from fbvm.machine.plc import Plc
+from fbvm.step import commands as step_commands
+from fbvm.step.commands import Commands
+from fbvm.step.filters import BetweenScans
+from fbvm.step.position import Position
+from fbvm.step.session import Session
+from fbvm.step.statement_ends import StatementEnds
+from fbvm.step.stop_report import StopReport
+from fbvm.step.world import World
+
+MS = 1_000_000
+MOTORS = """\
+FUNCTION Twice : INT
+VAR_INPUT a : INT; END_VAR
+    Twice := Again(a) * 2;
+END_FUNCTION
+FUNCTION Again : INT
+VAR_INPUT a : INT; END_VAR
+    Again := a;
+END_FUNCTION
+FUNCTION_BLOCK Motor
+VAR_INPUT other : REF_TO Motor; END_VAR
+VAR k : INT := 3; END_VAR
+PROPERTY Speed : INT
+GET Speed := Twice(k); END_GET
+END_PROPERTY
+PROPERTY Deep : INT
+GET Deep := Twice(Speed) + 1; END_GET
+END_PROPERTY
+PROPERTY Bad : INT
+GET Bad := 10 / (k - 3); END_GET
+END_PROPERTY
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR one : Motor := (k := 5); two : Motor; found : REF_TO Motor; none : REF_TO Motor; n : INT; END_VAR
+    found := REF(one); one.other := REF(two); n := one.Speed;
+END_PROGRAM
+"""
+
+
+def session() -> Session:
+    image = compile_text(MOTORS, lint=False).image
+    assert image is not None
+    made = Session.of(lambda: Plc(image))
+    made.goto(1)
+    return made
+
+
+@pytest.mark.slow
+def test_properties_are_read_through_calls_and_references() -> None:
+    made = session()
+    values: dict[str, object] = {}
+    for text in ("Main.one.Speed", "Main.two.Speed", "Main.one.Deep", "Main.found^.Speed", "Main.one.other^.Deep",
+                 "Main.none^.Speed", "Main.one.Nobody", "Main.n.Speed", "Main.one"):  # fmt: skip
+        try:
+            found = made.property(text, made.scope(None))
+            values[text] = (found.place.name, found.value) if found else None
+        except LookupError as error:
+            values[text] = type(error).__name__
+    assert values == {
+        "Main.one.Speed": ("Main.one.Speed", 10), "Main.two.Speed": ("Main.two.Speed", 6), "Main.one.Deep": ("Main.one.Deep", 21),
+        "Main.found^.Speed": ("Main.one.Speed", 10), "Main.one.other^.Deep": ("Main.two.Deep", 13), "Main.none^.Speed": None,
+        "Main.one.Nobody": None, "Main.n.Speed": None, "Main.one": None}
+    with pytest.raises(ValueError, match=r"Main.two.Bad cannot be computed: R0101 .* divided by 0"):
+        made.property("Main.two.Bad", made.scope(None))
+    assert made.read("Main.n") == 10, "nothing was done to the program"
+
+
+@pytest.mark.slow
+def test_a_run_that_reaches_no_breakpoint_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(step_commands, "LOOK_AHEAD_NS", 55 * MS)
+    made = session()
+    commands = Commands(made, StopReport(made, {"text.st": MOTORS}))
+    list(commands.run("break Main.n = 77"))
+    assert list(commands.run("run"))[0] == "no breakpoint was reached in 5 scans"
+    assert made.here.scan == 6
+    said = list(commands.run("run 25ms"))
+    assert said[0].startswith("scan 9, 90ms") and made.here.scan == 9, "who says for how long is told nothing more"
+
+
+@each_of(("times_ms", "wanted", "late"), [
+    ((0, 10, 20, 30), frozenset(), [""] * 4), ((0, 10, 30, 40), frozenset(), ["", "", "scan 2 began 10ms late", ""]),
+    ((0, 10, 29, 40), frozenset(), [""] * 4), ((0, 10, 25, 31), frozenset({5}), ["", "", "scan 2 began 5ms late", ""]),
+    ((0, 10, 24, 31), frozenset({5}), [""] * 4), ((0, 10, 24, 36), frozenset({5, 2}), ["", "", "scan 2 began 4ms late",
+                                                                                    "scan 3 began 2ms late"]),
+    ((0, 30, 40, 50), frozenset(), ["", "scan 1 began 20ms late", "", ""]), ((0, 10, 20, 30), frozenset({0}), [""] * 4),
+])  # fmt: skip
+def test_late_scans_by_the_time_that_is_asked_for(times_ms: tuple[int, ...], wanted: frozenset[int], late: list[str]) -> None:
+    plc: Any = SimpleNamespace(now_ns=0, cycle_ns=10 * MS, scans=0, units=[])
+    filters = BetweenScans({"late": wanted})
+    filters.attached(plc)
+    found = []
+    for number, time_ms in enumerate(times_ms):
+        plc.now_ns, plc.scans = time_ms * MS, number + 1
+        found.append((filters.found, filters.kind) if filters.checked(plc) else ("", ""))
+    assert [text for text, _ in found] == late and {kind for text, kind in found if text} <= {"late"}
+    others = BetweenScans({"response": frozenset()})
+    others.attached(plc)
+    plc.now_ns += 100 * MS
+    assert not others.checked(plc), "nobody asks for late scans"
+
+
+class Units:
+    """A PLC with two units whose response codes are told; one has meanings."""
+
+    def __init__(self) -> None:
+        self.codes = {"D1": 0, "D2": 0}
+        self.now_ns, self.cycle_ns, self.scans = 0, 10 * MS, 5
+        one = SimpleNamespace(descriptions={"D1": "Response Code of 1", "D9": "other"}, meanings={"D1": {5: "no such node"}})
+        self.units: list[Any] = [SimpleNamespace(unit=unit, network=None) for unit in (
+            one, SimpleNamespace(descriptions={"D2": "Response Code"}), SimpleNamespace())]  # fmt: skip
+
+    def find(self, address: str) -> Any:
+        from fbvm.base.types import WORD
+        from fbvm.watch.paths import Place
+
+        return Place(address, WORD, int(address[1:]))
+
+    def read(self, place: Any) -> int:
+        return self.codes[place.name]
+
+
+@each_of(("wanted", "codes", "said"), [
+    ((), {"D1": 5}, "D1 Response Code is 16#0005: no such node"), ((), {"D1": 6}, "D1 Response Code is 16#0006"),
+    ((), {"D2": 0x302}, "D2 Response Code is 16#0302"), ((0x302,), {"D2": 0x302}, "D2 Response Code is 16#0302"),
+    ((1,), {"D2": 0x302}, ""), ((), {"D1": 0}, ""), ((7,), {"D1": 6, "D2": 7}, "D2 Response Code is 16#0007"),
+])  # fmt: skip
+def test_response_codes_that_come_anew(wanted: tuple[int, ...], codes: dict[str, int], said: str) -> None:
+    plc: Any = Units()
+    filters = BetweenScans({"response": frozenset(wanted)})
+    filters.attached(plc)
+    assert not filters.checked(plc)
+    plc.codes |= codes
+    assert filters.checked(plc) is bool(said) and (filters.found, filters.kind) == (said, "response" if said else "")
+    assert not filters.checked(plc), "it stays as it is"
+    plc.codes |= dict.fromkeys(codes, 0)
+    assert not filters.checked(plc), "none any more"
+
+
+def test_a_scan_that_differs_is_told_with_its_number() -> None:
+    plc: Any = SimpleNamespace(now_ns=0, cycle_ns=1, scans=8, units=[])
+    for wanted, differs, found in (({"differs": frozenset[int]()}, lambda scan: scan == 7, True), ({}, lambda scan: True, False),
+                                   ({"differs": frozenset[int]()}, lambda scan: scan == 8, False)):  # fmt: skip
+        filters = BetweenScans(wanted, differs)
+        filters.attached(plc)
+        assert filters.checked(plc) is found
+        assert filters.found == ("scan 7 comes out differently here: its memory is not the recorded one" if found else "")
+
+
+def test_where_statements_end() -> None:
+    text = "PROGRAM Main\nVAR n : INT; END_VAR\n    n := 1; IF n = 1\n    THEN n := 2;\n    END_IF;\nEND_PROGRAM\n"
+    ends = StatementEnds({"a.st": text})
+    rows = {(3, 5): (3, 11), (3, 13): (5, 11), (4, 10): (4, 16), (3, 6): None, (9, 1): None}
+    assert {place: ends.end(Site("a.st", "Main", *place)) for place in rows} == rows
+    assert ends.end(Site("gone.st", "Main", 3, 5)) is None
+
+
+def live(scans: int, **more: Any) -> Any:
+    given = {"actions": [], "timed": {}, "waiting": [], **more}
+    return SimpleNamespace(plc=SimpleNamespace(scans=scans, elapsed_ns=scans * 10 * MS, cycle_ns=10 * MS), **given)
+
+
+@each_of(("made", "pace", "wanted"), [
+    (live(5), None, 100), (live(5), object(), 5), (live(5, actions=[Position(3), Position(9), Position(7)]), None, 7),
+    (live(5, actions=[Position(5)]), None, 5), (live(5, actions=[Position(200)]), None, 100), (live(5, timed={5: []}), None, 5),
+    (live(5, timed={6: []}), None, 100), (live(5, waiting=[SimpleNamespace(at_ns=80 * MS)]), None, 8),
+    (live(5, waiting=[SimpleNamespace(at_ns=81 * MS)]), None, 9), (live(5, waiting=[SimpleNamespace(at_ns=0)]), None, 5),
+    (live(5, waiting=[SimpleNamespace(at_ns=80 * MS)], actions=[Position(6)]), None, 6),
+])  # fmt: skip
+def test_up_to_which_scan_nothing_is_done_from_outside(made: Any, pace: object, wanted: int) -> None:
+    world: Any = SimpleNamespace(_live={"a": made}, _pace=pace)
+    assert World.quiet_until(world, "a", 100) == wanted
+
+
+def test_what_was_done_inside_a_scan() -> None:
+    world: Any = SimpleNamespace(_live={"a": SimpleNamespace(actions=[Position(3), Position(4, 2), Position(6, 1)])})
+    asked = range(9), range(5, 9), range(4), range(7, 9)
+    assert [World.unchanged_until(world, "a", scans) for scans in asked] == [4, 6, 4, 9]
