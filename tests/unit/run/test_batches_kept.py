@@ -111,3 +111,46 @@ def test_runs_that_may_not_stay_leave_and_their_batch_takes_others(kept: Batches
     for run in runs:
         run.wants = True
     assert kept.check() == [0, 2] and list(batch.members) == [5]
+
+
+class Member:
+    """A run in a batch that counts its scans down."""
+
+    def __init__(self, left: int, until_ns: int = 1 << 60) -> None:
+        self.scans_left, self.times = left, list[int]()
+        self.plc = SimpleNamespace(scans=7, scan_times=SimpleNamespace(add=lambda *given: None),
+                                   lateness=SimpleNamespace(add=lambda *given: None))
+        self.batched: Any = Batched(self, SimpleNamespace(leave=self._leave), 100, until_ns)  # type: ignore[arg-type]
+
+    def _leave(self, plc: object, rounds: int, now_ns: int) -> None:
+        self.scans_left -= rounds
+        self.times.append(now_ns)
+
+    def leave_batch(self, due_ns: int, missed: int) -> None:
+        self.due = due_ns, missed
+
+
+@pytest.mark.parametrize(("members", "scanned", "left"), [
+    ((Member(4), Member(9)), [(0, 2), (10, 2), (20, 2), (30, 1), (40, 1), (50, 1), (60, 1), (70, 1)], [(30, [0]), (80, [1])]),
+    ((Member(9, 20), Member(3, 15)), [(0, 2), (10, 2), ], [(20, [0, 1])]),
+    ((Member(3),), [(0, 1), (10, 1)], [(20, [0])]),
+])  # fmt: skip
+def test_who_has_one_scan_left_or_whose_time_has_come_leaves_in_front_of_the_scan(
+    monkeypatch: pytest.MonkeyPatch, members: tuple[Member, ...], scanned: list[tuple[int, int]],
+    left: list[tuple[int, list[int]]],
+) -> None:
+    done: list[tuple[int, int]] = []
+    monkeypatch.setattr(module, "BatchScans", lambda rows: SimpleNamespace(
+        scan=lambda now_ns: done.append((now_ns, len(rows))) or []))
+    batch, gone = Batch(), []
+    batch.begin((0, 10, 1))
+    for number, member in enumerate(members):
+        batch.add(number, member.batched)
+    while not batch.reason:
+        now_ns = batch.due_ns
+        if found := batch.scan(now_ns):
+            gone.append((now_ns, found))
+        assert batch.due_ns == (now_ns + 10 if batch.members else now_ns)
+    assert (done, gone) == (scanned, left)
+    assert all(member.scans_left < 2 or member.batched.until_ns <= left[-1][0] for member in members)
+    assert all(each.times[-1] == now_ns - 10 - 100 for now_ns, numbers in left for each in (members[at] for at in numbers))

@@ -10,11 +10,13 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import pytest
 from images import counter_image
 from test_run_loop import Idle
 
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
+from fbvm.run import interactive
 from fbvm.run.interactive import Control, run_interactive
 from fbvm.run.running import Running
 
@@ -108,3 +110,25 @@ def test_a_run_goes_turn_by_turn_as_it_is_kept() -> None:
     if os.environ.get("FBVM_REWRITE"):
         file.write_text(came, encoding="utf-8")
     assert came == kept
+
+
+def test_scans_of_real_time_have_a_watchdog_from_their_beginning_to_their_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    for real in (True, False):
+        told: list[str] = []
+
+        class Dog:
+            def __init__(self, plc: Plc, told: list[str] = told) -> None:
+                self._told = told
+
+            def begin(self, now_ns: int) -> None:
+                self._told.append(f"{now_ns / MS:g}")
+
+            def end(self) -> None:
+                self._told.append("end")
+
+            def stop(self) -> None:
+                self._told.append("stop")
+
+        monkeypatch.setattr(interactive, "Watchdog", Dog)
+        turns([10], Control(), {}, count=3, real=real)
+        assert told == (["0", "end", "10", "end", "stop"] if real else [])

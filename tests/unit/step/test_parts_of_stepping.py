@@ -84,7 +84,7 @@ def test_a_run_that_reaches_no_breakpoint_says_so(monkeypatch: pytest.MonkeyPatc
     made = session()
     commands = Commands(made, StopReport(made, {"text.st": MOTORS}))
     list(commands.run("break Main.n = 77"))
-    assert list(commands.run("run"))[0] == "no breakpoint was reached in 5 scans"
+    assert next(iter(commands.run("run"))) == "no breakpoint was reached in 5 scans"
     assert made.here.scan == 6
     said = list(commands.run("run 25ms"))
     assert said[0].startswith("scan 9, 90ms") and made.here.scan == 9, "who says for how long is told nothing more"
