@@ -35,11 +35,14 @@ SECTIONS = {word: f"{word}\n\t$0\nEND_VAR" for word in (
     "VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR CONSTANT")}
 METHODS = {"METHOD": "METHOD ${1:Name} : ${2:INT}\nVAR_INPUT\n\t$3\nEND_VAR\n\t$0\nEND_METHOD",
            "PROPERTY": "PROPERTY ${1:Name} : ${2:INT}\nGET\n\t$0\nEND_GET\nEND_PROPERTY"}
+DYNAMIC = {"__NEW": "pointer := __NEW(TYPE), __NEW(TYPE, count), __NEW(BLOCK(arguments of FB_init))",
+           "__DELETE": "__DELETE(pointer)"}
 OPERATORS = ("AND", "OR", "XOR", "NOT", "MOD", "TRUE", "FALSE")
 _PATH = re.compile(r"([A-Za-z_]\w*(?:\s*\[[^\[\]]*\]|\^|\.[A-Za-z_]\w*)*)\.\w*\Z")
 _TYPED = re.compile(r"([A-Za-z_]\w*)#\w*\Z")
 _AT = re.compile(r"\bAT\s+(%?[\w. ]*)\Z", re.I)
 _OF_TYPE = re.compile(r"(?::|\bOF|\bTO)\s+\w*\Z|:\s*\w*\Z", re.I)
+_MADE = re.compile(r"\b__NEW\s*\(\s*\w*\Z", re.I)
 _KINDS = {"field": "variable", "enumeration": "type"}
 """The kinds of members that are called otherwise as items."""
 _NO_TYPES, _ONLY_TYPES = ("field", "function"), ("block", "type")
@@ -87,6 +90,8 @@ def complete(program: Program, name: str, offset: int) -> list[Item]:
         return list(_types(program, scope)) if _OF_TYPE.search(line) else [Item("END_VAR", "keyword")]
     if _is_outside(text):
         return [Item(word, "keyword", insert=snippet) for word, snippet in DECLARATIONS.items()]
+    if _MADE.search(line):
+        return list(_types(program, scope))
     return [*_pins(program, name, offset), *_named(program, scope, text)]
 
 
@@ -153,6 +158,8 @@ def _named(program: Program, scope: Scope, text: str) -> Iterator[Item]:
     for function in (*functions.SIGNATURES, *functions.OPERATORS):
         if not function.startswith("__"):
             yield Item(function, "function", describe.signature(function), f"{function}($0)", rank=6)
+    if program.dialect.dynamic_memory:
+        yield from (Item(word, "function", detail, f"{word}($0)", rank=6) for word, detail in DYNAMIC.items())
     yield from (Item(word, "keyword", insert=snippet, rank=7) for word, snippet in {**STATEMENTS, **SECTIONS, **METHODS}.items())
     yield from (Item(word, "keyword", rank=7) for word in OPERATORS)
     yield from (replace(item, rank=8) for item in _blocks(program, scope) if item.kind == "function")

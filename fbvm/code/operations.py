@@ -54,10 +54,12 @@ FIRST_OBJECT, LEASED = 2, 1 << 23
 LEASE_BYTES = 16
 """A lease in the buffer: offset of the first byte and of the first behind, the number under which it is held now (0:
 it has ended), how often it was given; 32 bits each."""
-HEAP = {"reference": 0, "wanted": 8, "verdict": 12, "used": 16, "free": 20, "start": 24, "end": 28, "row": 32}
+HEAP = {"reference": 0, "wanted": 8, "verdict": 12, "used": 16, "free": 20, "start": 24, "end": 28, "row": 32,
+        "steps": 36}
 """Offsets of the words that __NEW and __DELETE work with: the reference that is made or ended (ref), and 32 bits each the bytes
 that are wanted, what is found of a reference (0: it can be ended, see `HEAP_TRAPS`), how many leases were ever given, the first
-of those that were given back (counted from 1, 0: none), where the heap begins and ends, the row that was found."""
+of those that were given back (counted from 1, 0: none), where the heap begins and ends, the row that was found, how many
+steps the work was worth."""
 HEAP_BYTES = 40
 HEAP_TRAPS = {1: "R0123", 2: "R0124"}
 """What can be wrong with a reference that __DELETE is given, and the trap of each."""

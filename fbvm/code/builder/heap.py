@@ -3,7 +3,10 @@
 The heap is a row of blocks, each a head of 8 bytes (its size in units of 8 bytes, the number of its lease from 1 on, 0 if it is
 free) and what __NEW makes.  A size of 0 means that everything from there on was never given out.  `taking` takes the first block
 that is large enough; free ones beside each other become one on the way.  What is made is the object of a lease, so that a
-pointer which is kept longer traps."""
+pointer which is kept longer traps.
+
+All POUs share these bodies, so they charge no steps, since a trap could not say at which statement: the word `steps` has what the
+caller is to charge."""
 
 from __future__ import annotations
 
@@ -61,6 +64,10 @@ class _Code(Emitter):
     def store(self, name: str, value: Node) -> Node:
         return ("store", "u32", word(self.objects, name), value)
 
+    def more(self, steps: int) -> Node:
+        """The statement that adds to the steps."""
+        return self.store("steps", _add(self.load("steps"), _u32(steps)))
+
     def head(self, at: Node, offset: int) -> Address:
         """A word of the head of the block at so many units: 0 for its size, 4 for its lease."""
         return "abs", offset, ((UNIT, ("convert", "i64", "u32", at)),)
@@ -91,7 +98,7 @@ def _is(comparison: str, a: Node, b: Node) -> Node:
 def taking(objects: Objects, site: int) -> Block:
     """The code that makes `reference` one to as many bytes as are `wanted`, NULL without room for them; it sets no values."""
     code = _Code(objects, site)
-    code.emit(("charge", 8, site), ("store", "ref", word(objects, "reference"), ("const", "ref", 0)))
+    code.emit(code.store("steps", _u32(8)), ("store", "ref", word(objects, "reference"), ("const", "ref", 0)))
     wanted = code.to_temporary(code.units(_add(code.load("wanted"), _u32(UNIT * HEAD_UNITS + UNIT - 1))))
     free, used = code.to_temporary(code.load("free")), code.to_temporary(code.load("used"))
     is_used_again = _is("ne", free, _u32(0))
@@ -137,7 +144,7 @@ def _find(code: _Code, wanted: Node, at: Node) -> None:
                           _if(_is("gt", size, wanted), ("store", "u32", code.head(behind, 0), rest),
                               ("store", "u32", code.head(behind, 4), _u32(0))), *_EXIT))
         code.emit(_if(_is("eq", ("load", "u32", code.head(at, 4)), _u32(0)), *free))
-    code.emit(("loop", (("charge", 2, code.site),), tuple(body), (_let(at, _add(at, size)),)))
+    code.emit(("loop", (code.more(2),), tuple(body), (_let(at, _add(at, size)),)))
 
 
 def _join(code: _Code, at: Node, size: Node, end: Node) -> None:
@@ -149,7 +156,7 @@ def _join(code: _Code, at: Node, size: Node, end: Node) -> None:
         code.emit(_if(_is("eq", its, _u32(0)), ("store", "u32", code.head(at, 0), _u32(0)), _let(size, _u32(0)), *_EXIT),
                   _if(_is("ne", ("load", "u32", code.head(following, 4)), _u32(0)), *_EXIT),
                   _let(size, _add(size, its)), ("store", "u32", code.head(at, 0), size))
-    code.emit(("loop", (("charge", 1, code.site),), tuple(body), ()))
+    code.emit(("loop", (code.more(1),), tuple(body), ()))
 
 
 # --- taking back ------------------------------------------------------------------------------------------------------
@@ -158,7 +165,7 @@ def _join(code: _Code, at: Node, size: Node, end: Node) -> None:
 def looking(objects: Objects, site: int) -> Block:
     """The code that finds out whether `reference` can be ended: `verdict` says so, and `row` which lease it has."""
     code = _Code(objects, site)
-    code.emit(("charge", 2, site), code.store("verdict", _u32(1)))
+    code.emit(code.store("verdict", _u32(1)))
     bits = code.to_temporary(("bits", "u64", "ref", ("load", "ref", word(objects, "reference"))))
     first = _u64(LEASED + (objects.heap_row << objects.held_bits))
     number = code.to_temporary(("div", "u64", bits, _u64(1 << OBJECT_SHIFT), site))
@@ -177,7 +184,6 @@ def looking(objects: Objects, site: int) -> Block:
 def giving(objects: Objects, site: int) -> Block:
     """The code that ends what the lease `row` holds: every pointer to it traps from now on."""
     code = _Code(objects, site)
-    code.emit(("charge", 2, site))
     row = code.to_temporary(code.load("row"))
     at = ("sub", "u32", code.units(("load", "u32", code.row(row, _START))), _u32(HEAD_UNITS))
     code.emit(("store", "u32", code.head(code.to_temporary(at), 4), _u32(0)), ("store", "u32", code.row(row, _HELD), _u32(0)),

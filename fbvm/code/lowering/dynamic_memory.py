@@ -19,10 +19,12 @@ from fbvm.code.image import LARGEST_HEAP, Body
 from fbvm.code.layout.objects import headers
 from fbvm.code.lowering import pointers, pou_calls
 from fbvm.code.lowering.context import BodyContext
-from fbvm.code.lowering.step_costs import with_costs
+from fbvm.code.lowering.step_costs import UNITS_A_STEP
 from fbvm.code.operations import HEAP_TRAPS, OBJECT_SHIFT, Block, Node
 from fbvm.syntax import tree
 
+_CHARGED = 8
+"""Steps that are charged at once."""
 _CLEARED = 64
 """Bytes that a step of a loop sets to 0."""
 _NULL: Node = ("const", "ref", 0)
@@ -34,13 +36,18 @@ def new(body: BodyContext, call: tree.Call) -> Node:
     objects, slot = body.program.objects, body.place(made.held)
     wanted = _size(body, made)
     body.emit(("store", "u32", heap.word(objects, "wanted"), wanted), _execute(body, "__NEW", heap.taking, site))
+    _charge(body, site)
     reference = body.to_temporary(("load", "ref", heap.word(objects, "reference")))
     body.emit(slot.store(reference, site))
     with body.block() as filling:
         content = _content(body, made.kind)
-        fill = (_filled if made.count is None else _repeated)(body, made.kind, content, site)
+        fill = _filled(body, made.kind, content, site) if made.count is None else _repeated(body, made.kind, content)
         filled: Node = ("call", fill, (("ref", reference, site), 0, ()))
-        body.emit(filled if made.count is None else ("if", ((("ne", "b", "u32", wanted, ("const", "u32", 0)), (filled,)),), ()))
+        if made.count is None:
+            body.emit(("charge", 1 + made.kind.size // UNITS_A_STEP, site), filled)
+        else:
+            body.emit(("if", ((("ne", "b", "u32", wanted, ("const", "u32", 0)), (filled,)),), ()))
+            _charge(body, site)
         _run(body, made.construction)
     body.emit(("if", ((("ne", "b", "ref", reference, _NULL), tuple(filling)),), ()))
     return reference
@@ -92,10 +99,17 @@ def _size(body: BodyContext, made: Made) -> Node:
 
 
 def _execute(body: BodyContext, name: str, code: Callable[..., Block], site: int) -> Node:
-    """The call of a body that works on the heap.  It charges steps, so each place in the source has its own."""
+    """The call of a body that works on the heap."""
     objects = body.program.objects
-    made = body.program.shared_part((name, site), lambda: Body(name, "FUNCTION", with_costs(code(objects, site)), 0, True))
-    return ("call", made, None)
+    return ("call", body.program.shared_part(name, lambda: Body(name, "FUNCTION", code(objects, site), 0, True)), None)
+
+
+def _charge(body: BodyContext, site: int) -> None:
+    """Emit the charge of the steps that a shared body has counted."""
+    left = body.to_temporary(("load", "u32", heap.word(body.program.objects, "steps")), always=True)
+    less = ("let", left[2], "u32", ("sub", "u32", left, ("const", "u32", _CHARGED)))
+    over: Block = (("if", ((("lt", "b", "u32", left, ("const", "u32", _CHARGED)), (("exit",),)),), ()), less)
+    body.emit(("loop", (("charge", _CHARGED, site),), over, ()))
 
 
 # --- initial values ---------------------------------------------------------------------------------------------------
@@ -112,7 +126,7 @@ def _filled(body: BodyContext, kind: Type, content: bytes, site: int) -> int:
     """The number of a body that gives what has been made its initial values, references in them included."""
     def make() -> Body:
         part = body.part({})
-        part.emit(("charge", 1, site), ("fill", ("self", 0, ()), content))
+        part.emit(("fill", ("self", 0, ()), content))
         bits = ("bits", "u64", "ref", ("load", "ref", heap.word(body.program.objects, "reference")))
         number: Node = ("convert", "u32", "u64", ("div", "u64", bits, ("const", "u64", 1 << OBJECT_SHIFT), site))
         part.emit(*(("store", "u32", ("self", at + OBJECTS_AT, ()), number) for at in headers(kind, 0)))
@@ -122,9 +136,9 @@ def _filled(body: BodyContext, kind: Type, content: bytes, site: int) -> int:
             if owner is not None:
                 node = _moved(node, around[owner])
             part.emit(Place(("self", at, ()), start.kind).store(node, site))
-        return Body(f"__NEW({kind.name})", "FUNCTION_BLOCK", with_costs(tuple(part.out)), kind.size, True)
+        return Body(f"__NEW({kind.name})", "FUNCTION_BLOCK", tuple(part.out), kind.size, True)
 
-    return body.program.shared_part((kind.name, site), make)
+    return body.program.shared_part((kind.name, content), make)
 
 
 def _moved(node: Any, by: int) -> Any:
@@ -136,21 +150,22 @@ def _moved(node: Any, by: int) -> Any:
     return tuple(_moved(part, by) for part in node)
 
 
-def _repeated(body: BodyContext, kind: Type, content: bytes, site: int) -> int:
+def _repeated(body: BodyContext, kind: Type, content: bytes) -> int:
     """The number of a body that gives as many bytes as are wanted the initial value of one element again and again."""
     def make() -> Body:
         part = body.part({})
         wanted = ("convert", "i64", "u32", ("load", "u32", heap.word(body.program.objects, "wanted")))
-        part.emit(("charge", 1, site))
         steps = (_CLEARED, heap.UNIT) if not any(content) else (len(content),)
+        counted = heap.word(body.program.objects, "steps")
+        part.emit(("store", "u32", counted, ("const", "u32", 0)))
         at = part.to_temporary(("const", "i64", 0), always=True)
         for step in steps:  # what is left behind the last whole step, or, of units, within the block
             reach = ("add", "i64", at, ("const", "i64", step if step == _CLEARED else 1))
             pattern = content if any(content) else bytes(step)
-            part.emit(("loop", (("charge", 1, site),), (
+            part.emit(("loop", (("store", "u32", counted, ("add", "u32", ("load", "u32", counted), ("const", "u32", 1))),), (
                 ("if", ((("gt", "b", "i64", reach, wanted), (("exit",),)),), ()),
                 ("fill", ("self", 0, ((1, at),)), pattern)),
                 (("let", at[2], "i64", ("add", "i64", at, ("const", "i64", step))),)))
-        return Body(f"__NEW({kind.name}, ...)", "FUNCTION_BLOCK", with_costs(tuple(part.out)), 0, True)
+        return Body(f"__NEW({kind.name}, ...)", "FUNCTION_BLOCK", tuple(part.out), 0, True)
 
-    return body.program.shared_part((kind.name, "many", site), make)
+    return body.program.shared_part(("many", content if any(content) else b""), make)

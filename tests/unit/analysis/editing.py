@@ -17,15 +17,15 @@ def at_mark(text: str, dialect: str = "standard") -> tuple[Program, int]:
     return program, offset
 
 
-def at_word(text: str, before: str, word: str) -> tuple[Program, int]:
+def at_word(text: str, before: str, word: str, dialect: str = "standard") -> tuple[Program, int]:
     """The checked program of a text, and the place of a word that stands in a piece of it."""
     at = text.index(before) + text[text.index(before):].index(word)
-    return at_mark(text[:at] + MARK + text[at:])
+    return at_mark(text[:at] + MARK + text[at:], dialect)
 
 
-def check_declaration(text: str, before: str, word: str, line: int, count: int) -> None:
+def check_declaration(text: str, before: str, word: str, line: int, count: int, dialect: str = "standard") -> None:
     """Fails if the word does not lead to a declaration in `line`, or not to `count` places in all."""
-    program, offset = at_word(text, before, word)
+    program, offset = at_word(text, before, word, dialect)
     declared = declared_at(program, "pump.st", offset)
     assert declared is not None
     placed = program.place(declared.source)
