@@ -96,8 +96,8 @@ def inherited(block: Pou | None, name: str) -> Variable | None:
 
 
 def _plain(name: str) -> str:
-    """The name as it is written, of a variable or function that the compiler made of another one."""
-    return name.partition(" ")[0]
+    """The name as it is written, of a variable, function or block that the compiler made of another one."""
+    return name.partition(" ")[0].partition("<")[0]
 
 
 def declared_name(pou: tree.Pou, name: str) -> tree.Name | None:
@@ -197,7 +197,8 @@ class _Names:
         if field is not None and whole.block:
             block, folded = self.checker.block_of(whole), fold(field.name)
             variable = inherited(block, folded)
-            return key_of(variable) if variable is not None else ("variable", block.source.library, fold(block.name), folded)
+            unknown = "variable", block.source.library, fold(_plain(block.name)), folded
+            return key_of(variable) if variable is not None else unknown
         if field is None and whole.block and (method := method_of(self.checker.block_of(whole), fold(name))) is not None:
             return key_of_pou(method)
         if field is None and whole.block and fold(name) in self.checker.block_of(whole).actions:
@@ -301,7 +302,8 @@ class _Names:
             name = fold(argument.name.text)
             name = pou.owner.other_names.get(name, name)
             if name in pou.owner.variables:
-                key = "variable", pou.source.library, fold(_plain(pou.owner.name)), name
+                key = key_of(pou.owner.variables[name]) if pou.owner.nesting else \
+                    ("variable", pou.source.library, fold(_plain(pou.owner.name)), name)
                 yield Use(argument.name.start, argument.name.end, key, "written" if argument.kind == ":=" else "read")
 
     def assignment(self, node: tree.Assign) -> Iterator[Use]:
@@ -326,7 +328,8 @@ class _Names:
     def type_name(self, node: tree.NamedType) -> Iterator[Use]:
         name = node.text.rpartition(".")[2]
         if (key := self._key_of_name(node.text) or self._key_of_name(name)) is not None:
-            yield Use(node.end - len(name), node.end, key)
+            end = node.start + len(node.text) if node.constants else node.end
+            yield Use(end - len(name), end, key)
 
     def structure(self, node: tree.StructInit) -> Iterator[Use]:
         for name, _ in node.fields:

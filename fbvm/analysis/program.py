@@ -222,6 +222,7 @@ class Program:
         if _is_object(before) or _is_object(after) or any(pou.base is known for pou in checked.project.pous.values()):
             return False  # what derived blocks inherit, and which bodies calls may mean, is worked out for all
         return known is not None and known.source.whole is old.source and not generics.is_generic(known, checked.project) and \
+            known.template is None and \
             not generics.variables(after) and not external(new.syntax, after)
 
     def _signature(self, part: Part, pou: tree.Pou) -> object:

@@ -84,6 +84,7 @@ class Dialect:
     ampersand_refers: bool = False
     bits_by_name: bool = False
     generic_functions: bool = False
+    generic_constants: bool = False
     own_in_outs: bool = False
     places_for_all: bool = False
     wrong_bcd_is_zero: bool = False
@@ -232,6 +233,8 @@ QUESTIONS = {
     "ampersand_refers": ("p := &x", "an error", "REF(x)"),
     "bits_by_name": ("w.%Xk, where k is a CONSTANT", "an error", "the bit k"),
     "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
+    "generic_constants": ("VAR_GENERIC CONSTANT size : INT of a FUNCTION_BLOCK, b : Buffer<100>", "an error (S0901)",
+                          "a block of its own for each size; behind VAR_GENERIC may stand EXTENDS and IMPLEMENTS"),
     "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
                     "a variable of the program, with a warning (S0193)"),
     "places_for_all": ("VAR_CONFIG p.count AT %MW0 : INT, where count is not declared AT %M*", "an error",
@@ -323,7 +326,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
                    conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
                    bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True,
-                   assignments_are_values=True, signs_are_lost=True,
+                   assignments_are_values=True, signs_are_lost=True, generic_constants=True,
                    short_addresses=True,
                    dates_take_durations=True, dynamic_memory="marked")
 _ROWS = (
@@ -336,7 +339,7 @@ _ROWS = (
             large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
             libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True,
-            glued_words=True, dynamic_memory=""),
+            glued_words=True, dynamic_memory="", generic_constants=False),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from fbvm.check.calls import calls, dynamic_memory, generics
-from fbvm.check.declarations import construction, first_cycle, globals, inheritance, interfaces, specs, variables
+from fbvm.check.declarations import construction, first_cycle, generic_blocks, globals, inheritance, interfaces, specs, variables
 from fbvm.check.declarations.configurations import Configurations
 from fbvm.check.declarations.var_config import VarConfig
 from fbvm.check.expressions import references, rules
@@ -84,7 +84,8 @@ class Checker(Context):
             self._progress(len(self.bodies), len(self.bodies) + len(self.project.new_pous))
             yield
             pou = self.project.new_pous.popleft()
-            if (not pou.source.library or pou.block is not None) and not generics.is_generic(pou, self.project):
+            if (not pou.source.library or pou.block is not None) and not generics.is_generic(pou, self.project) \
+                    and not generic_blocks.lacks_constants(pou):
                 self.check_body(pou)
 
     def check_usings(self) -> None:

@@ -35,7 +35,15 @@ from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Step, Transition
 
-Section = VarSection | Refused | Settings
+
+class Behind(NamedTuple):
+    """EXTENDS or IMPLEMENTS that stands behind VAR_GENERIC, with the names behind it."""
+
+    word: str
+    names: tuple[NamedType, ...]
+
+
+Section = VarSection | Refused | Settings | Behind
 Element = Action | Step | Transition | Refused | Members
 
 
@@ -51,6 +59,13 @@ class Head(NamedTuple):
     def with_usings(self, more: list[Using] | None) -> tuple[Using, ...]:
         """Its USINGs and those behind the type of its result."""
         return (*self.usings, *(more or ()))
+
+    def with_more(self, sections: list[Section]) -> tuple[Head, list[Section]]:
+        """The head with what stands behind VAR_GENERIC, and the sections without that."""
+        more = [(each.word, name) for each in sections if isinstance(each, Behind) for name in each.names]
+        head = self._replace(bases=(*self.bases, *(name for word, name in more if word == "EXTENDS")),
+                             interfaces=(*self.interfaces, *(name for word, name in more if word == "IMPLEMENTS")))
+        return head, [each for each in sections if not isinstance(each, Behind)]
 
 
 Inherited = list[tuple[str, NamedType] | Using]
@@ -99,6 +114,15 @@ class SourceBuilder(SfcElements):
         parts.append(using)
         return parts
 
+    def add_inheritance_behind(self, sections: list[Section], word: Token, names: list[NamedType]) -> list[Section]:
+        """EXTENDS and IMPLEMENTS behind VAR_GENERIC, as CODESYS writes a block with generic constants."""
+        before = sections[-1] if sections else None
+        if isinstance(before, VarSection) and before.kind != "VAR_GENERIC":
+            self.report("S0101", word.start, word.end, f"{word.text} stands behind the name of the block",
+                        "only VAR_GENERIC may stand between them")
+        sections.append(Behind(word.text.upper(), tuple(names)))
+        return sections
+
     def generic_type(self, token: Token, colon: Token, kind: Token) -> tuple[Token, Token]:
         return token, kind
 
@@ -126,10 +150,11 @@ class SourceBuilder(SfcElements):
 
     def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None, usings: list[Using] | None,
                  sections: list[Section], items: Items, elements: list[Element], end: Token) -> Pou:
+        head, sections = head.with_more(sections)
         refused: list[Refused] = []
         accesses = tuple(each for each in sections if isinstance(each, AccessVars) and word.type == "PROGRAM")
         refused += [_out_of_place(part) for part in (*sections, *elements)
-                    if part not in accesses and not isinstance(part, VarSection | Action | Step | Transition | Members)]
+                    if part not in accesses and not isinstance(part, VarSection | Behind | Action | Step | Transition | Members)]
         methods = [method for each in (*items, *elements) if isinstance(each, Members) for method in each.methods]
         body = self.block([each for each in items if not isinstance(each, Members)])
         declared = [each for each in sections if isinstance(each, VarSection)]

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, StructType, Type, fold
+from fbvm.check.declarations import generic_blocks
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.syntax import tree
@@ -69,7 +71,8 @@ def _named(context: Context, pou: Pou, spec: tree.NamedType, kinds: tuple[str, .
         context.report.add("S1001", pou.source, spec, f"{pou.name} extends itself" if found is pou else
                            f"{found.name} extends or holds {pou.name}", "a base is declared without what is derived from it")
         return None
-    return found if context.interface(found, pou.source, spec) and found.type is not None else None
+    chosen = generic_blocks.chosen(Scope(context, pou.source, pou), found, spec)
+    return chosen if chosen is not None and context.interface(chosen, pou.source, spec) and chosen.type is not None else None
 
 
 def shown(method: Pou) -> str:

@@ -23,7 +23,7 @@ from fbvm.base.types import (
     fold,
     followed,
 )
-from fbvm.check.declarations import construction, initializers, same_names
+from fbvm.check.declarations import construction, generic_blocks, initializers, same_names
 from fbvm.check.declarations.hidden import add_hidden
 from fbvm.check.declarations.inheritance import refuse_abstract, resolve_head
 from fbvm.check.declarations.locations import is_open
@@ -47,7 +47,7 @@ _LOCATED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
 """Sections of blocks and programs whose variables may lie AT an address."""
 _WITH_BOUNDS = (OpenArrayType, AnyType)
 """Types of parameters whose slot holds a reference, and the bounds or the type of the argument."""
-_NOT_EXECUTED = ("VAR_INST", "VAR_GENERIC", "VAR_ACCESS", "VAR_CONFIG")
+_NOT_EXECUTED = ("VAR_INST", "VAR_ACCESS", "VAR_CONFIG")
 
 
 def resolve_interface(context: Context, pou: Pou) -> None:
@@ -75,7 +75,7 @@ class _Interface:
             self._inherit(pou.base)
         pou.later = {fold(name.text): (declared, section) for section in pou.tree.sections if section.kind != "VAR_EXTERNAL"
                      for declared in section.variables for name in declared.names}
-        for section in pou.tree.sections:
+        for section in generic_blocks.sections(self.scope, pou):
             if self._is_allowed(section):
                 self._section(section)
         pou.later = {}

@@ -26,6 +26,7 @@ from fbvm.base.types import (
     reference,
     string,
 )
+from fbvm.check.declarations import generic_blocks
 from fbvm.check.declarations.construction import INIT_KEY
 from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.locations import is_open
@@ -130,11 +131,14 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
     if folded in generic:
         return generic[folded], default(generic[folded])
     entry = scope.project.type_entry(folded, scope.source)
+    pou = scope.project.pou(folded, scope.source) if entry is None else None
+    if spec.constants and (pou is None or pou.kind != "FUNCTION_BLOCK"):
+        scope.error("S0402", spec, f"{spec.text} has no generic constants", "blocks with VAR_GENERIC CONSTANT have")
     if entry is not None:
         return scope.context.declared_type(folded, scope.source)
-    pou = scope.project.pou(folded, scope.source)
     if pou is not None and not (pou.is_function and folded in ELEMENTARY):
-        return _block(scope, pou, spec)
+        chosen = generic_blocks.chosen(scope, pou, spec)
+        return _block(scope, chosen, spec) if chosen is not None else None
     kind = BOOL if folded == "BIT" and scope.pou is not None and scope.pou.kind == "FUNCTION_BLOCK" else elementary_type(folded)
     if kind is not None:
         return kind, default(kind)

@@ -13,6 +13,7 @@ from fbvm.check.symbols.dynamic_facts import Ended, Made
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
+from fbvm.syntax.tree import Pou as PouTree
 from fbvm.syntax.tree.il import CallsInRow
 
 Value = int | float | bool | bytes | str
@@ -85,8 +86,7 @@ class Variable:
     init_slot: int = GLOBAL_SLOT
     """Of a global variable the place of its list in the order of initialisation."""
     object: int | None = None
-    """Of a variable that something refers to: the number of its object (see code.operations), or of one that every
-    instance has, its position among those.  Known after layout, or when it is referred to."""
+    """The number of its object (see code.operations), or its position among those of an instance, once something refers to it."""
 
     @property
     def role_of_parameter(self) -> str:
@@ -125,11 +125,13 @@ class Pou:
     """Bytes at the start of a method's frame that lie alike in its overrides: inputs, and what the caller reads."""
     frame_offset: int = 0
     stack_bytes: int = 0
-    """Bytes of each of its frames on the stack if calls of it may come back; at `frame_offset` lies a reference to the newest
-    then."""
+    """Bytes of each of its frames on the stack, if calls of it may come back; a reference to the newest is at `frame_offset`."""
     number: int = -1
     as_written: bool = True
     """False if its tree is not that of its source, but was made for one call or one program."""
+    template: PouTree | None = None
+    """Of a block with VAR_GENERIC its tree as it is written, of which blocks for other constants are made."""
+    nesting: int = 0  # of a block that was made so, how many such blocks ask for one another in front of it
     resolved: bool = False
     calls: dict[Pou, Node] = field(default_factory=dict)
     dynamic_calls: dict[Pou, Node] = field(default_factory=dict)

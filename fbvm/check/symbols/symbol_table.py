@@ -117,7 +117,8 @@ class SymbolTable:
         self.operator_types: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
         """By operator and elementary types of its operands, if none is constant: the types of the operation and the result."""
         self.instantiated: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
-        """Functions that were instantiated of generic ones, by the types that the generic types stand for."""
+        """Functions that were instantiated of generic ones, by the types that the generic types stand for, and blocks, by the
+        values of their generic constants."""
         self.nameless: dict[Type, bytes] = {}
         """The initial bytes of structures that are declared where variables are."""
         self.new_pous: deque[Pou] = deque()
@@ -211,6 +212,8 @@ class SymbolTable:
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
             pou.modifiers = frozenset(word.text for word in declaration.modifiers)
             pou.written_actions += [(action, source) for action in declaration.actions]
+            if any(section.kind == "VAR_GENERIC" for section in declaration.sections):
+                pou.template = declaration
             self.new_pous.append(pou)
             report_objects(self.report, self.dialect, source, declaration)
             if self.dialect.functions_have_inputs and pou.is_function and not source.library and not any(

@@ -48,6 +48,10 @@ class DeclarationLayout(TypeLayout, SfcLayout):
     def add_inheritance(self, parts: list[Doc], word: Token, names: list[Phrase]) -> list[Doc]:
         return [*parts, " ", self.leaf(word), " ", self.listed(names, fill=True)]
 
+    def add_inheritance_behind(self, sections: list[Phrase], word: Token, names: list[Phrase]) -> list[Phrase]:
+        sections.append(Phrase(word.start, self.leaf(word), " ", self.listed(names, fill=True)))
+        return sections
+
     def add_using(self, parts: list[Doc], using: Phrase) -> list[Doc]:
         return [*parts, " ", using.doc]
 

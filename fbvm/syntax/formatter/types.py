@@ -149,6 +149,9 @@ class TypeLayout(StatementLayout):
     def type_name_dotted(self, name: Phrase, dot: Token, token: Token) -> Phrase:
         return self.member(name, dot, token)
 
+    def type_name_given(self, name: Phrase, opener: Token, values: list[Phrase], closer: Token) -> Phrase:
+        return Phrase(name.start, name.doc, self.leaf(opener), self.listed(values), self.closer(closer))
+
     def named_type(self, name: Phrase) -> Phrase:
         return name
 

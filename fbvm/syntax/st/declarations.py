@@ -51,6 +51,9 @@ class Declarations(Types):
         for declared in variables:
             if isinstance(declared.spec, NamedType) and declared.spec.text.upper().partition("_")[0] in _LATCHING:
                 self.blocks.update((name.text.upper(), declared.spec.text.upper()) for name in declared.names)
+        if word.text.upper() == "VAR_GENERIC":
+            self.forms.append(Form("generic_constants", word.start, word.end, (
+                "S0901", "VAR_GENERIC is of CODESYS", "declare VAR CONSTANT, and give each size a block of its own")))
         return VarSection(word.start, end.end, word.text.upper(), tuple(qualifiers), tuple(variables))
 
     def global_vars(self, section: VarSection) -> GlobalVars:

@@ -12,6 +12,7 @@ from fbvm.syntax.tree import (
     Declaration,
     EnumSpec,
     Expr,
+    Form,
     Initial,
     Name,
     NamedType,
@@ -63,6 +64,11 @@ class Types(Statements):
 
     def type_name_dotted(self, name: NamedType, dot: Token, token: Token) -> NamedType:
         return NamedType(name.start, token.end, f"{name.text}.{token.text}")
+
+    def type_name_given(self, name: NamedType, opener: Token, values: list[Expr], closer: Token) -> NamedType:
+        self.forms.append(Form("generic_constants", opener.start, closer.end, (
+            "S0901", "generic constants behind the name of a block are of CODESYS", "give each size a block of its own")))
+        return NamedType(name.start, closer.end, name.text, tuple(values))
 
     def named_type(self, name: NamedType) -> NamedType:
         kind = self.generic_types.get(name.text.upper())

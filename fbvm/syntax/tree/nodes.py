@@ -1,8 +1,8 @@
 """The tree of a source text, named as the productions of IEC 61131-3 Annex A.
 
-A tree is a value: it never changes after parsing and holds no facts about names or types.  Nodes compare by identity,
-so that facts can be kept about each in side tables.  `start` and `end` are character offsets in the source.
-Names are kept as written; comparing them without case is the checker's work.
+A tree is a value: it never changes after parsing and holds no facts about names or types.  Nodes compare by identity, so that
+facts can be kept about each in side tables.  `start` and `end` are character offsets in the source.  Names are kept as written;
+comparing them without case is the checker's work.
 """
 
 from __future__ import annotations
@@ -31,9 +31,10 @@ class TypeSpec(Node):
 
 @_node
 class NamedType(TypeSpec):
-    """An elementary, generic, derived or block type by name (dotted names keep their dots)."""
+    """An elementary, generic, derived or block type by name (dotted names keep their dots), with `constants` in Buffer<100>."""
 
     text: str
+    constants: tuple[Expr, ...] = ()
 
 
 @_node
@@ -122,9 +123,8 @@ class VarDecl(Node):
 
 @_node
 class VarSection(Node):
-    """One VAR.. END_VAR: `kind` is VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP, VAR_EXTERNAL, VAR_GLOBAL,
-    VAR_STAT or VAR_INST; `qualifiers` the words behind it in capitals; `hidden` ones hold what rungs and charts need, unwritten;
-    their `role` is "step" or "action" where they are the flags of these, which programs may read."""
+    """One VAR.. END_VAR: `kind` is VAR, VAR_INPUT, VAR_TEMP ...; `qualifiers` the words behind it in capitals; `hidden` ones hold
+    what rungs and charts need, unwritten; their `role` is "step" or "action" where they are the flags of these."""
 
     kind: str
     qualifiers: tuple[Name, ...]

@@ -76,13 +76,14 @@ def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: 
 def test_the_grammar_has_only_the_conflicts_that_are_meant(caplog: pytest.LogCaptureFixture) -> None:
     """A result type in front of a statement that begins with `(`, `[` or a name: that belongs to the type.  A `;`
     behind VAR sections belongs to them (of POUs, methods, accessors, PROPERTY_GET, prototypes), one behind END_STRUCT to the
-    structure, and a `(` behind __CATCH is that of its variable."""
+    structure, a `(` behind __CATCH is that of its variable, and EXTENDS behind the name of a POU belongs to its head."""
     text = grammar_text("st")
     with caplog.at_level(logging.DEBUG, logger=lark.logger.name):
         lark.Lark(text, parser="lalr", start="source_text", debug=True, keep_all_tokens=True, maybe_placeholders=True)
     messages = [line for record in caplog.records for line in record.getMessage().splitlines()]
     conflicts = sorted(line for line in messages if "conflict" in line.lower())
-    assert conflicts == ["Shift/Reduce conflict for terminal LPAR: (resolving as shift)"] * 4 + [
+    assert conflicts == ["Shift/Reduce conflict for terminal INHERITANCE: (resolving as shift)"] * 2 + [
+        "Shift/Reduce conflict for terminal LPAR: (resolving as shift)"] * 4 + [
         "Shift/Reduce conflict for terminal LSQB: (resolving as shift)"] * 3 + [
         "Shift/Reduce conflict for terminal NAME: (resolving as shift)"] + [
         "Shift/Reduce conflict for terminal SEMICOLON: (resolving as shift)"] * 13
