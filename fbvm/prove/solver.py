@@ -5,7 +5,7 @@ Bitwuzla is a solver for bit-vectors by A. Niemetz and M. Preiner, under the MIT
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from fbvm.prove.encoding.terms import Term
@@ -36,18 +36,24 @@ class Solver:
         options.set(self._api.Option.PRODUCE_MODELS, True)
         self._solver = self._api.Bitwuzla(self._manager, options)
         self._expired, self._interrupt = expired, False
-        self._solver.configure_terminator(self._is_over)
+        terminator = self._terminator()
+        next(terminator)
+        self._solver.configure_terminator(terminator.__next__)
         self._made: dict[Term, Any] = {}
         self._names = 0
         self.questions = 0
 
-    def _is_over(self) -> bool:
-        """What the solver asks now and then; an exception would not get through it."""
-        try:
-            return self._expired()
-        except KeyboardInterrupt:
-            self._interrupt = True
-            return True
+    def _terminator(self) -> Iterator[bool]:
+        """Whether the solver has to stop, which asks now and then; an exception would not get through it.
+
+        Python handles a signal where its code goes on: in a function before the first `try`, in a generator inside of it."""
+        is_over = False
+        while True:
+            try:
+                yield is_over
+                is_over = self._expired()
+            except KeyboardInterrupt:
+                self._interrupt = is_over = True
 
     def assume(self, *terms: Term) -> None:
         """Asserts terms for good."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, SupportsIndex
 
-from fbvm.base.types import StructType, base
+from fbvm.base.types import ArrayType, StructType, base
 from fbvm.machine.plc import Plc
 from fbvm.testing.value_types import as_read, for_writing
+from fbvm.watch.names import element
 from fbvm.watch.paths import Place, Span, UnknownPlace
 
 OnRead = Callable[[Place], None]
@@ -22,7 +23,7 @@ def write(plc: Plc, place: Place | Span, value: object) -> None:
 
 
 class Values:
-    """The variables of one structure or instance.  Structures in it are `Values` again, arrays are lists.
+    """The variables of one structure or instance.  Structures in it are `Values` again, arrays are `Elements`.
 
     A variable whose name is no attribute in Python is `values["name"]`."""
 
@@ -75,13 +76,39 @@ class Values:
         return found
 
 
+class Elements(list[Any]):
+    """The elements of an array, the first one with index 0; structures and instances are `Values`.
+
+    An assignment to one writes it in the PLC.  The list has the values of the moment at which it was read."""
+
+    def __init__(self, plc: Plc, place: Place, values: list[Any], read: OnRead) -> None:
+        kind = base(place.type)
+        assert isinstance(kind, ArrayType)
+        self._plc, self._place, self._kind = plc, place, kind
+        is_structured = isinstance(base(kind.element), StructType)
+        super().__init__([Values(plc, self._element(at), read) for at in range(len(values))] if is_structured else values)
+
+    def __setitem__(self, index: SupportsIndex | slice, value: Any) -> None:
+        if isinstance(index, slice):
+            raise TypeError(f"{self._place.name}: assign to one element after the other, or a list to the whole array")
+        at = range(len(self))[index]
+        place = self._element(at)
+        write(self._plc, place, value)
+        if not isinstance(self[at], Values):  # which reads what is there now
+            super().__setitem__(at, as_read(self._kind.element, self._plc.read(place)))
+
+    def _element(self, at: int) -> Place:
+        return element(self._place, self._kind, at)
+
+
 def value_of(plc: Plc, found: Place | Span, read: OnRead) -> Any:
-    """The value at a place; of a structure or instance, its variables."""
+    """The value at a place; of a structure or instance its variables, of an array its elements."""
     if isinstance(found, Place):
         if isinstance(base(found.type), StructType):
             return Values(plc, found, read)
         read(found)
-        return as_read(found.type, plc.read(found))
+        value = as_read(found.type, plc.read(found))
+        return Elements(plc, found, value, read) if isinstance(value, list) else value
     return plc.read(found)
 
 

@@ -110,6 +110,28 @@ def test_a_bare_number_is_no_time(kind: t.Type, value: object, said: str) -> Non
         for_writing(kind, value, "x")
 
 
+def test_elements_of_an_array_are_read_and_written_in_place() -> None:
+    rig = Rig.of("Main", text="""
+        TYPE Channel : STRUCT Raw : INT; Limits : ARRAY[1..2] OF INT; END_STRUCT; END_TYPE
+        PROGRAM Main
+        VAR channels : ARRAY[3..4] OF Channel; timers : ARRAY[0..1] OF TON; times : ARRAY[0..1, 1..2] OF TIME; END_VAR
+            timers[1](IN := TRUE, PT := T#10ms);
+        END_PROGRAM""")
+    rig.channels[0].Raw = 7
+    rig.channels[-1].Limits[1] = 9
+    rig.times[3] = "20ms"
+    assert (rig["channels[3].Raw"], rig["channels[4].Limits[2]"], rig["times[1, 2]"]) == (7, 9, ns("20ms"))
+    assert rig.channels == [{"Raw": 7, "Limits": [0, 0]}, {"Raw": 0, "Limits": [0, 9]}]
+    found = rig.times
+    found[0] = "1s"
+    assert found == [ns("1s"), 0, 0, ns("20ms")] == rig.times
+    assert rig.run(scans=2).timers[1].Q is True
+    with pytest.raises(TypeError, match="assign to one element"):
+        rig.times[0:2] = ["1s", "2s"]
+    with pytest.raises(IndexError):
+        rig.channels[2].Raw = 1
+
+
 def test_variables_of_an_instance_are_attributes() -> None:
     rig = Rig.of("Main", text="PROGRAM Main VAR d : TON; END_VAR d(IN := TRUE, PT := T#30ms); END_PROGRAM")
     rig.scan()
