@@ -50,6 +50,8 @@ RUNGS = {
     "k(CU := a, CD := b OR c, R := FALSE, PV := n);": "LD a; LD b; OR c; CALL CTUD k CU:= CD:= R:=FALSE PV:=n",
     "t();": "CALL TON t",
     "edge(a);": "LD a; CALL R_TRIG edge CLK:=",
+    "t(IN := SEL(a, b, c), PT := T#1s);": "CALL TON t IN:=SEL(a, b, c) PT:=T#1s",
+    "k(CU := a AND NOT b, CD := SEL(a, b, c), PV := n);": "LD a; ANDNOT b; CALL CTUD k CU:= CD:=SEL(a, b, c) PV:=n",
 }
 REFUSED = {
     "n := m + 1;": "in line 3 is not drawn: an assignment that is not of BOOL",
@@ -71,6 +73,18 @@ def test_a_statement_is_a_rung(body: str) -> None:
 @each_of("body", REFUSED)
 def test_what_is_no_rung_is_named_with_its_line_and_the_rest_is_drawn(body: str) -> None:
     assert steps(f"{body}\na := b;") == [REFUSED[body], "LD b; OUT a"]
+
+
+@pytest.mark.slow
+@each_of("dialect, body, said", [
+    ("rusty", "IF n THEN a := TRUE; END_IF", "an expression that is not of BOOL"),
+    ("codesys", "a := (b := c);", "this expression"),
+    ("codesys", "a := b AND (c := d);", "this expression"),
+])
+def test_conditions_of_dialects_are_no_contacts(dialect: str, body: str, said: str) -> None:
+    made = compile_text(f"PROGRAM Main VAR {DECLARED} END_VAR\n{body}\nEND_PROGRAM", drawn=True, lint=False, dialect=dialect)
+    assert made.image is not None, made.errors[0].render()
+    assert [rung.comment for rung in made.image.rungs] == [f"in line 3 is not drawn: {said}"]
 
 
 LISTS = {

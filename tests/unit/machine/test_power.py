@@ -217,3 +217,33 @@ def test_an_instance_without_rungs_has_no_elements() -> None:
     with powering(plc) as power:
         plc.scan()
         assert power.elements("Main.t") == {} and len(power.elements("Main")) == 5
+
+
+IN_STATEMENTS = """PROGRAM Main
+VAR a, b, c, d : BOOL; n, i : INT; END_VAR
+    n := n + 1; b := n MOD 2 = 0; c := n > 2;
+    CASE n MOD 3 OF
+        0: a := b AND c;
+        1: a := b OR c;
+    ELSE
+        d := NOT b;
+    END_CASE;
+    FOR i := 1 TO 3 DO d := a AND i > 2; END_FOR
+    WHILE c DO c := d AND NOT c; END_WHILE
+    REPEAT b := c; UNTIL TRUE END_REPEAT
+END_PROGRAM"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_contacts_of_statements_inside_others_have_their_power(engine: str) -> None:
+    made = compile_text(IN_STATEMENTS, drawn=True).image
+    assert made is not None
+    plc, observed, seen = Plc(made, engine=engine), Plc(made, engine="python"), Seen()
+    with powering(plc) as power, observing(observed, seen):
+        for _ in range(7):
+            power.forget()
+            seen.states.clear()
+            plc.scan()
+            observed.scan()
+            assert known(power, ["Main"]) == seen.states != {}
