@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from fbvm.base import cache
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.cli.main import main
 from fbvm.code.compiler import Compilation, compile_files, driver
 from fbvm.code.store import cache as image_cache
@@ -169,3 +170,22 @@ def test_the_command_line_can_do_without(anew: list[int], folder: Path) -> None:
     cache.switch(True)
     compiled()
     assert folder.exists()
+
+
+def test_messages_come_back_with_their_places_and_one_about_a_library_keeps_all_from_disk() -> None:
+    image = compiled().image
+    assert image is not None
+    sources = [Source("a.st", "text of a"), Source("b.st", "text of b")]
+    first = Diagnostic("S0290", sources[1], 1, 3, "never used", "remove it", (sources[0], 4, "declared here"), True)
+    second = Diagnostic("S0390", sources[0], 0, 2, "compared")
+    named = image_cache.name(sources, [], ["Main"])
+    assert image_cache.read(named, sources) is None
+    image_cache.write(named, sources, image, [first, second])
+    found = image_cache.read(named, sources)
+    assert found is not None and found[1] == [first, second] and encode(found[0]) == encode(image)
+    assert found[1][0].source is sources[1] and found[1][0].related is not None and found[1][0].related[0] is sources[0]
+    other = image_cache.name(sources, [], ["Other"])
+    for about in (Diagnostic("S0290", Source("TON.st", "", "iec"), 0, 1, "x"), Diagnostic("S0290", sources[0], 0, 1, "x", "", (
+            Source("TON.st", "", "iec"), 0, "there"))):  # fmt: skip
+        image_cache.write(other, sources, image, [about])
+        assert image_cache.read(other, sources) is None
