@@ -313,3 +313,30 @@ def test_a_project_with_errors_is_told_and_not_begun(tmp_path: Path, monkeypatch
     assert "S0201: m is not declared" in capsys.readouterr().err
     origin = FileOrigin([Path("a.st")], (), None, cast(Any, None), cast(Any, None))
     assert [each.code for each in origin.mistakes()] == ["S0201"] and origin.image is None
+
+
+def test_a_network_that_cannot_be_used_is_told_when_the_project_is_built(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    Path("a.st").write_text(COUNTER, encoding="utf-8")
+    Path("fbvm.toml").write_text(PROJECT, encoding="utf-8")
+
+    def refuse(*given: Any, **more: Any) -> Any:
+        raise OSError(98, "Address already in use")
+
+    monkeypatch.setattr(origins, "Plant", refuse)
+    origin = ProjectOrigin(Path("fbvm.toml"), None, lambda run: run)
+    assert origin.mistakes() == [] and origin.project is not None
+    with pytest.raises(SystemExit) as ended:
+        origin.build()
+    assert ended.value.code == 5
+    assert capsys.readouterr().err == "the network cannot be used: Address already in use\n"
+
+
+def test_what_is_wrong_inside_a_file_of_another_tool_is_a_mistake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.xml").write_text("<project xmlns='http://www.plcopen.org/xml/tc6_0201'><types>", encoding="utf-8")
+    origin = FileOrigin([Path("a.xml")], (), None, cast(Any, None), cast(Any, None))
+    assert [each.code[0] for each in origin.mistakes()] == ["X"] and origin.image is None
+    [program] = origin.programs()
+    assert program.libraries == () and list(program.sources()) == []

@@ -197,6 +197,7 @@ class ProjectOrigin:
         try:
             tried = Plant(found, net="loop")
         except OSError:  # it is said when the project is built
+            self.project = found
             return []
         tried.close()
         self.project = found
