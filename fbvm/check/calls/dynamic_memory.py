@@ -20,19 +20,21 @@ from fbvm.base.types import ArrayType, RefType, StructType, Type, derives, fold,
 from fbvm.check.calls import methods
 from fbvm.check.expressions import aggregates, objects, qualified
 from fbvm.check.expressions.constant_integers import integer
+from fbvm.check.expressions.constants import default
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.dynamic_facts import Ended, Made
 from fbvm.check.symbols.facts import Pou, StandardCall, is_block
+from fbvm.check.symbols.symbol_table import TypeEntry
 from fbvm.syntax import tree
 
 NEW, DELETE = "__NEW", "__DELETE"
 _MARK = "enable_dynamic_creation"
 _LONGEST = 65534
-Found = tuple[Type, tuple[tree.Argument, ...]]
-"""The type that is made, and the arguments of its FB_init."""
+Found = tuple[Type, bytes, tuple[tree.Argument, ...]]
+"""The type that is made, the bytes with which it begins, and the arguments of its FB_init."""
 
 
 def _is_taken(scope: Scope, call: tree.Call, name: str) -> bool:
@@ -57,9 +59,9 @@ def new(scope: Scope, call: tree.Call) -> Type | None:
     count = values[1] if len(values) > 1 else None
     if found is None or count is not None and not _is_count(scope, count, found[0]):
         return None
-    kind, given = found
+    kind, content, given = found
     held = _held(scope, call, pointer(kind))
-    made = scope.facts.made[call] = Made(kind, count, held, [])
+    made = scope.facts.made[call] = Made(kind, content, count, held, [])
     made.construction += _calls(scope, scope.context.rules.construction(scope.context, scope.source, tree.Deref(
         held.start, held.end, held), kind, given))
     scope.facts.calls[call] = StandardCall(NEW, [])
@@ -72,7 +74,8 @@ def _is_alone(scope: Scope, call: tree.Call) -> bool:
     if wrong is not None or not 1 <= len(call.arguments) <= 2:
         scope.error("S0402", wrong or call, "__NEW takes a type, and how many of it", "write p := __NEW(BYTE, 100)")
     elif scope.pou is None or call not in scope.facts.assigned:
-        scope.error("S0405", call, "__NEW stands alone behind := of a statement", "assign it to a variable: p := __NEW(...)")
+        scope.error("S0405", call, "__NEW stands alone behind := of a statement",
+                    "assign it to a variable in a body or in FB_init: p := __NEW(...)")
     else:
         return True
     return False
@@ -82,7 +85,7 @@ def _type(scope: Scope, expr: tree.Expr) -> Found | None:
     """The type that stands in a __NEW, with the arguments of FB_init; None after a diagnostic."""
     if isinstance(expr, tree.TypeOperand):
         resolved = scope.context.rules.type_of(scope, expr.spec)
-        return (resolved[0], ()) if resolved is not None else None
+        return (*resolved, ()) if resolved is not None else None
     named, given = (expr.callee, expr.arguments) if isinstance(expr, tree.Call) else (expr, ())
     name = named.text if isinstance(named, tree.NameRef) else qualified.bare(scope, named)
     if name is None:
@@ -92,15 +95,24 @@ def _type(scope: Scope, expr: tree.Expr) -> Found | None:
         return _text(scope, name, given)
     kind = scope.named_type(name)
     if kind is not None:
-        return (kind, ()) if _has_no_arguments(scope, expr, kind, given) and _is_marked_type(scope, expr, name, kind) else None
+        entry = scope.project.type_entry(name, scope.source)
+        content = entry.resolved[1] if entry is not None and entry.resolved is not None else default(kind)
+        good = _has_no_arguments(scope, expr, kind, given) and _is_marked_type(scope, expr, entry, kind)
+        return (kind, content, ()) if good else None
+    return _block(scope, expr, named, name, given)
+
+
+def _block(scope: Scope, expr: tree.Expr, named: tree.Expr, name: str, given: tuple[tree.Argument, ...]) -> Found | None:
+    """A block that is made, whose name is written `named`."""
     pou = scope.project.pou(name, scope.source)
-    if pou is None or pou.kind not in ("FUNCTION_BLOCK", "CLASS") or not scope.context.interface(pou, scope.source, named):
-        if pou is None or pou.kind not in ("FUNCTION_BLOCK", "CLASS"):
-            scope.error("S0203", named, f"there is no type {name}", scope.project.nearest(name, [
-                *(each.name for each in scope.project.types.values()), *(each.name for each in scope.project.pous.values())]))
+    if pou is None or pou.kind not in ("FUNCTION_BLOCK", "CLASS"):
+        scope.error("S0203", named, f"there is no type {name}", scope.project.nearest(name, [
+            *(each.name for each in scope.project.types.values()), *(each.name for each in scope.project.pous.values())]))
+        return None
+    if not scope.context.interface(pou, scope.source, named) or not _can_be_made(scope, expr, pou):
         return None
     assert pou.type is not None
-    return (pou.type, given) if _can_be_made(scope, expr, pou) else None
+    return pou.type, pou.initial, given
 
 
 def _text(scope: Scope, name: str, given: tuple[tree.Argument, ...]) -> Found | None:
@@ -109,7 +121,8 @@ def _text(scope: Scope, name: str, given: tuple[tree.Argument, ...]) -> Found | 
     if not 1 <= size <= _LONGEST:
         scope.error("S0405", given[0], f"the length of {name} is a constant from 1 to {_LONGEST}")
         return None
-    return string(size, fold(name) == "WSTRING"), ()
+    kind = string(size, fold(name) == "WSTRING")
+    return kind, default(kind), ()
 
 
 def _has_no_arguments(scope: Scope, expr: tree.Expr, kind: Type, given: tuple[tree.Argument, ...]) -> bool:
@@ -118,8 +131,7 @@ def _has_no_arguments(scope: Scope, expr: tree.Expr, kind: Type, given: tuple[tr
     return not given
 
 
-def _is_marked_type(scope: Scope, expr: tree.Expr, name: str, kind: Type) -> bool:
-    entry = scope.project.type_entry(name, scope.source)
+def _is_marked_type(scope: Scope, expr: tree.Expr, entry: TypeEntry | None, kind: Type) -> bool:
     if not isinstance(kind, StructType | ArrayType) or entry is None:
         return True
     return _is_marked(scope, expr, entry.name, entry.source.library, entry.attributes)
@@ -187,7 +199,11 @@ def find_exits(context: Context) -> None:
     for call, source, pou in context.deletions:
         scope, ended = Scope(context, source, pou), context.facts.ended[call]
         target = ended.kind.target if isinstance(ended.kind, RefType) else None
-        if target is None or not is_block(target):
+        if target is None:
+            continue
+        if not is_block(target):
+            ended.parts += _calls(scope, context.rules.destruction(
+                context, source, tree.Deref(ended.held.start, ended.held.end, ended.held), target, target))
             continue
         for block in blocks:
             if block.type is None or not derives(block.type, target) or block.identifier in ended.exits:
@@ -214,10 +230,7 @@ def _calls(scope: Scope, statements: Iterable[tree.Statement]) -> list[tree.Call
     """The calls of hidden methods that construct or end an instance, checked."""
     found = []
     for statement in statements:
-        if not isinstance(statement, tree.CallStatement) or not isinstance(statement.call, tree.Call):
-            scope.error("S0901", statement, "__NEW of a structure with an array of blocks that have FB_init or FB_exit is "
-                        "understood but not executed", "put the array into a FUNCTION_BLOCK, and make that")
-            break
+        assert isinstance(statement, tree.CallStatement) and isinstance(statement.call, tree.Call), "they are unrolled"
         methods.call(scope, statement.call)
         found.append(statement.call)
     return found

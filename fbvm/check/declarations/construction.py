@@ -15,6 +15,7 @@ Source: Beckhoff Information System and CODESYS online help, Methods FB_init, FB
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, StructType, Type, fold
@@ -86,10 +87,11 @@ def _declared(level: Pou) -> list[Variable]:
 
 
 class Statements:
-    """Makes the statements that construct variables.  Arrays need counters, which the body must declare."""
+    """Makes the statements that construct variables.  Arrays need counters, which the body must declare, unless the statements
+    are to be `unrolled`: one for each element then."""
 
-    def __init__(self, context: Context, source: Source) -> None:
-        self.context, self.source = context, source
+    def __init__(self, context: Context, source: Source, unrolled: bool = False) -> None:
+        self.context, self.source, self.unrolled = context, source, unrolled
         self.counters = 0
 
     def sections(self) -> tuple[tree.VarSection, ...]:
@@ -130,6 +132,11 @@ class Statements:
             for index, each in zip(range(kind.bounds[0][0], kind.bounds[0][1] + 1), own, strict=False):
                 element = tree.Index(place.start, place.end, place, (_integer(place, index),))
                 yield from self.value(element, kind.element, each, None, phase)
+            return
+        if self.unrolled:
+            for subscripts in product(*(range(low, high + 1) for low, high in kind.bounds)):
+                element = tree.Index(place.start, place.end, place, tuple(_integer(place, each) for each in subscripts))
+                yield from self.value(element, kind.element, given, None, phase)
             return
         counters = []
         for _ in kind.bounds:
@@ -231,7 +238,7 @@ def of_value(context: Context, source: Source, place: tree.Expr, kind: Type,
 
     place: an expression that names the value.
     given: the arguments of FB_init, if it is an instance."""
-    made_of = Statements(context, source)
+    made_of = Statements(context, source, unrolled=True)
     return [statement for phase in PHASES for statement in made_of.value(place, kind, given, None, phase)]
 
 
@@ -242,7 +249,7 @@ def endings_of_value(context: Context, source: Source, place: tree.Expr, kind: T
     __DELETE)."""
     if not constructs(context, known, EXIT):
         return []
-    return list(Statements(context, source).value(place, kind, (), None, EXIT))
+    return list(Statements(context, source, unrolled=True).value(place, kind, (), None, EXIT))
 
 
 # --- methods ----------------------------------------------------------------------------------------------------------

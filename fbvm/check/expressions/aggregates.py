@@ -39,7 +39,7 @@ def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
                     f"{dialect.name}", f"assign the parts one by one, or take {takers('written_out')}")
         return None
     values = list(_values(scope, want, expr, (0,)))
-    content = bytearray(first_bytes(scope.project, want))
+    content = bytearray(_initial_bytes(scope.project, want))
     parts = [part for part in (_part(scope, value, content) for value in values) if part is not None]
     scope.facts.aggregates[expr] = Aggregate(in_frame(scope, expr, want, _form(expr)), bytes(content), tuple(parts))
     return want
@@ -162,10 +162,10 @@ def _part(scope: Scope, value: Value, content: bytearray) -> AggregatePart | Non
     return None
 
 
-def first_bytes(project: SymbolTable, kind: Type) -> bytes:
+def _initial_bytes(project: SymbolTable, kind: Type) -> bytes:
     """The bytes of a variable of a type that is declared without an initial value."""
     if isinstance(kind, ArrayType):
-        return first_bytes(project, kind.element) * kind.count
+        return _initial_bytes(project, kind.element) * kind.count
     known = project.nameless.get(kind) or next((entry.resolved[1] for entry in project.types.values()
                                                 if entry.resolved is not None and entry.resolved[0] is kind), None)
     if known is not None or not isinstance(kind, StructType):
@@ -173,5 +173,5 @@ def first_bytes(project: SymbolTable, kind: Type) -> bytes:
     content = bytearray(kind.size)
     for member in kind.fields.values():
         if member.bit is None and not any(content[member.offset:member.offset + member.type.size]):
-            content[member.offset:member.offset + member.type.size] = first_bytes(project, member.type)
+            content[member.offset:member.offset + member.type.size] = _initial_bytes(project, member.type)
     return bytes(content)

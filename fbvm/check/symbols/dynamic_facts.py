@@ -12,10 +12,11 @@ from fbvm.syntax import tree
 class Made:
     """What a __NEW makes: one variable of a type, or, with `count`, as many behind one another as that says.
 
-    `held` names a hidden variable in the frame of the POU, which holds the pointer while FB_init runs; `construction` are the
-    calls of hidden methods that do so."""
+    `content` are the bytes with which one begins, references in them as marks.  `held` names a hidden variable in the frame of
+    the POU, which holds the pointer while FB_init runs; `construction` are the calls of hidden methods that do so."""
 
     kind: Type
+    content: bytes
     count: tree.Expr | None
     held: tree.NameRef
     construction: list[tree.Call]
@@ -31,3 +32,5 @@ class Ended:
     clears: bool
     held: tree.NameRef
     exits: dict[int, list[tree.Call]] = field(default_factory=dict)
+    parts: list[tree.Call] = field(default_factory=list)
+    """Where no instance is ended: the calls that do FB_exit for the instances in what is."""

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fbvm.base.types import UDINT, StructType, Type
+from fbvm.base.types import UDINT
 from fbvm.check.declarations.interfaces import OBJECTS_AT
-from fbvm.check.expressions.aggregates import first_bytes
 from fbvm.check.symbols.dynamic_facts import Made
 from fbvm.check.symbols.facts import PouCall
 from fbvm.code.builder import heap
@@ -40,8 +39,7 @@ def new(body: BodyContext, call: tree.Call) -> Node:
     reference = body.to_temporary(("load", "ref", heap.word(objects, "reference")))
     body.emit(slot.store(reference, site))
     with body.block() as filling:
-        content = _content(body, made.kind)
-        fill = _filled(body, made.kind, content, site) if made.count is None else _repeated(body, made.kind, content)
+        fill = (_filled if made.count is None else _repeated)(body, made)
         filled: Node = ("call", fill, (("ref", reference, site), 0, ()))
         if made.count is None:
             body.emit(("charge", 1 + made.kind.size // UNITS_A_STEP, site), filled)
@@ -70,7 +68,11 @@ def delete(body: BodyContext, call: tree.Call) -> None:
                 _run(body, calls)
             if row:
                 rows.append((((number, number),), tuple(row)))
-        if rows:
+        with body.block() as parts:
+            _run(body, ended.parts)
+        if parts:
+            body.emit(held.store(reference, site), *parts, *looks)
+        elif rows:
             kind = Place((("ref", reference, site), 0, ()), UDINT)
             body.emit(held.store(reference, site), ("case", "u32", kind.load(), tuple(rows), ()), *looks)
         if place is not None:
@@ -115,15 +117,10 @@ def _charge(body: BodyContext, site: int) -> None:
 # --- initial values ---------------------------------------------------------------------------------------------------
 
 
-def _content(body: BodyContext, kind: Type) -> bytes:
-    """The bytes with which a value of a type begins."""
-    if isinstance(kind, StructType) and kind.block:
-        return body.checker.block_of(kind).initial
-    return first_bytes(body.checker.project, kind)
-
-
-def _filled(body: BodyContext, kind: Type, content: bytes, site: int) -> int:
+def _filled(body: BodyContext, made: Made) -> int:
     """The number of a body that gives what has been made its initial values, references in them included."""
+    kind, content, site = made.kind, made.content, body.entry_site
+
     def make() -> Body:
         part = body.part({})
         part.emit(("fill", ("self", 0, ()), content))
@@ -150,8 +147,10 @@ def _moved(node: Any, by: int) -> Any:
     return tuple(_moved(part, by) for part in node)
 
 
-def _repeated(body: BodyContext, kind: Type, content: bytes) -> int:
+def _repeated(body: BodyContext, made: Made) -> int:
     """The number of a body that gives as many bytes as are wanted the initial value of one element again and again."""
+    kind, content = made.kind, made.content
+
     def make() -> Body:
         part = body.part({})
         wanted = ("convert", "i64", "u32", ("load", "u32", heap.word(body.program.objects, "wanted")))

@@ -60,6 +60,10 @@ def read_object(data: bytes, name: str) -> ImportedObject:
     return ImportedObject(Source(name, written.text()), None, written.diagnostics)
 
 
+_ACCESS = re.compile(r"(?:\s|//[^\n]*\n|\{[^}]*\}|\(\*(?:(?!\*\)).)*\*\))*(PUBLIC|PRIVATE|PROTECTED|INTERNAL)\b", re.I | re.S)
+"""The access word of an accessor, which stands at the head of its declaration."""
+
+
 class _Written:
     """The Structured Text of an object, at the places at which it stands in the XML."""
 
@@ -72,6 +76,8 @@ class _Written:
         """Words that wait for a place: they are written behind the next line end, where no comment swallows them."""
         self._ahead = 0
         """By how many columns the present line is ahead of that of the XML."""
+        self._moves_access = False
+        """Whether the access word at the head of the next text is among the words already."""
         self.diagnostics: list[Diagnostic] = []
 
     def text(self) -> str:
@@ -102,7 +108,10 @@ class _Written:
     def _property(self, element: Element) -> None:
         self._code(element.one("Declaration"))
         for accessor in element.all("Get", "Set"):
-            self._words.append(accessor.name.upper())
+            declaration = accessor.one("Declaration")
+            access = _ACCESS.match(declaration.text) if declaration else None
+            self._words.append(f"{access[1] if access else ''} {accessor.name.upper()}".strip())
+            self._moves_access = access is not None
             self._body(accessor, self._declaration(accessor, accessor.name.upper(), [accessor]))
             self._words.append(f"END_{accessor.name.upper()}")
         self._words.append("END_PROPERTY")
@@ -143,6 +152,9 @@ class _Written:
         for start, end, text in self._pieces(element) if element else []:
             if text.strip():
                 self._blank(start)
+                if self._moves_access and (access := _ACCESS.match(text)):  # blanks keep its place
+                    text = text[:access.start(1)] + " " * len(access[1]) + text[access.end(1):]
+                self._moves_access = False
                 self._parts.append(text)
                 self._at, self._ahead = end, 0 if "\n" in text else self._ahead
 
