@@ -83,7 +83,7 @@ def test_code_that_holds_the_end_of_a_section_is_split_over_two() -> None:
 
 
 @pytest.mark.parametrize(("body", "said"), [
-    ("<SFC/>", "a sequential function chart"), ("<CFC/>", "a continuous function chart"), ("<LADDER/>", "ladder"),
+    ("<SFC/>", "a sequential function chart"), ("<LADDER/>", "ladder"),
 ])  # fmt: skip
 def test_bodies_in_other_languages_are_named_with_their_place(body: str, said: str) -> None:
     text = MAIN.replace(MAIN[MAIN.index("<ST>"):MAIN.index("</ST>") + 5], body)

@@ -1,4 +1,4 @@
-"""Network diagrams of a POU as rungs and statements, and at which lines of the file they stand.
+"""Network diagrams and function charts of a POU as rungs and statements, and at which lines of the file they stand.
 
 Variables that they need are declared in the POU.  A method keeps nothing from one call to the next, so an edge in one is refused.
 """
@@ -13,12 +13,14 @@ from fbvm.check.calls.functions import is_standard
 from fbvm.interchange.markup import Element
 from fbvm.interchange.plcopen.read.bodies import Bodies
 from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading, Variable, VarList
+from fbvm.interchange.twincat.function_charts import read_function_chart
 from fbvm.interchange.twincat.networks import Diagram, Pins, read_networks
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 
-LANGUAGE = "NWL"
-"""The element of a network diagram."""
+_READERS = {"NWL": read_networks, "CFC": read_function_chart}
+LANGUAGES = {"NWL": "the network diagram", "CFC": "the function chart"}
+"""The elements of drawings that are read, and what they are."""
 REFERENCE = "[REF]"
 """What stands behind the type of an in-out of a box."""
 _AROUND = {"METHOD": ("FUNCTION_BLOCK _\n", "END_METHOD END_FUNCTION_BLOCK"),
@@ -43,12 +45,12 @@ class _Reading(Reading):
 
 
 class Drawings:
-    """The network diagrams of one POU, method or accessor: `bodies` are the elements that hold them."""
+    """The drawings of one POU, method or accessor: `bodies` are the elements that hold them."""
 
     def __init__(self, xml: Source, owner: Owner, bodies: Sequence[Element]) -> None:
         self.owner = owner
         self.reading = _Reading(xml)
-        self.diagrams = {id(body): read_networks(body) for body in bodies}
+        self.diagrams = {id(body): _READERS[body.name](body) for body in bodies}
         pou = _declared(owner)
         known = {name: pins for diagram in self.diagrams.values() if diagram for name, pins in diagram.pins.items()}
         boxes = tuple(_box(pins) for name, pins in known.items() if not is_standard(name) and name != pou.name.upper())
@@ -67,13 +69,14 @@ class Drawings:
         """The lines of a body, each with the offset in the file at which its network begins."""
         diagram: Diagram | None = self.diagrams[id(body)]
         if diagram is None:
-            self.reading.report("X0203", body, f"the network diagram of {self.owner.name} is empty or damaged",
+            self.reading.report("X0203", body, f"{LANGUAGES[body.name]} of {self.owner.name} is empty or damaged",
                                 "open it in TwinCAT, and save it again")
             return []
         for refusal in diagram.refused:
             at, why = refusal.args
-            self.reading.report("X0203", at, f"a network of {self.owner.name} is not read: {why}",
-                                "write it as Structured Text, or draw it with contacts, coils and boxes")
+            what = "a network" if body.name == "NWL" else LANGUAGES[body.name]
+            self.reading.report("X0203", at, f"{what} of {self.owner.name} is not read: {why}",
+                                "export the object as PLCopen XML, and import that, or write it as Structured Text")
         lines = self.bodies.lines(Body(diagram.element.name, diagram.element))
         places = [(index, diagram.starts.get(number, body.at)) for index, number in self.bodies.places]
         made = []

@@ -137,7 +137,7 @@ class _Network:
         if not feeds:
             if not self.rail:
                 self.rail = (self._add("leftPowerRail", at, {}) if self.is_ladder else
-                             self._add("inVariable", at, {}, _expression("TRUE", at)))
+                             self._add("inVariable", at, {}, expression("TRUE", at)))
             feeds = ((self.rail, ""),)
         if closed := next((self.closed[number] for number, _ in feeds if number in self.closed), ""):
             raise Unreadable(at, closed)
@@ -173,7 +173,7 @@ class _Network:
         if self.is_ladder and text(operand, "Type").upper() in _LOGIC:
             return ((self._add("contact", tree, _modified(own), self._point(tree, power),
                                Element("variable", "", {}, tree.at, [name])), ""),)
-        here = ((self._add("inVariable", tree, _modified(own), _expression(name, tree)), ""),)
+        here = ((self._add("inVariable", tree, _modified(own), expression(name, tree)), ""),)
         return self._series(tree, power, here)
 
     def _series(self, tree: Element, power: Feeds, behind: Feeds) -> Feeds:
@@ -183,8 +183,8 @@ class _Network:
         pins = [_variable(tree, name, 0) for name in ("IN1", "IN2")]
         for pin, feeds in zip(pins, (power, behind), strict=True):
             pin.content.append(self._point(tree, feeds))
-        return ((self._add("block", tree, {"typeName": "AND"}, _pins("inputVariables", tree, pins),
-                           _pins("outputVariables", tree, [_variable(tree, "OUT", 0)])), "OUT"),)
+        return ((self._add("block", tree, {"typeName": "AND"}, pins_of("inputVariables", tree, pins),
+                           pins_of("outputVariables", tree, [_variable(tree, "OUT", 0)])), "OUT"),)
 
     def _demux(self, tree: Element, power: Feeds) -> Feeds:
         number = text(tree, "VarId")
@@ -236,7 +236,7 @@ class _Network:
         if self.is_ladder and text(out, "Type").upper() in _LOGIC:
             self._add("coil", out, said, self._point(out, feeds), Element("variable", "", {}, out.at, [name]))
         else:
-            self._add("outVariable", out, said, self._point(out, feeds), _expression(name, out))
+            self._add("outVariable", out, said, self._point(out, feeds), expression(name, out))
 
     # --- boxes ---
 
@@ -253,8 +253,8 @@ class _Network:
         pins, in_outs = self._inputs(tree, names)
         shown = [_variable(tree, name, flags(tree) if at == leads else 0) for at, name in enumerate(outs)]
         number = self._add("block", tree, {"typeName": kind, **({"instanceName": instance} if instance else {})},
-                           _pins("inputVariables", tree, pins), _pins("inOutVariables", tree, in_outs),
-                           _pins("outputVariables", tree, shown))
+                           pins_of("inputVariables", tree, pins), pins_of("inOutVariables", tree, in_outs),
+                           pins_of("outputVariables", tree, shown))
         for at, (entry, out) in enumerate(outputs):
             if entry and text(out, "Operand").strip():
                 if at >= len(outs):
@@ -298,7 +298,7 @@ class _Network:
             if not entry or operand is not None and not text(operand, "Operand").strip():
                 continue
             if operand is not None and is_in_out:
-                pin.content.append(Element("connectionPointIn", "", {}, inner.at, [_expression(_named(operand), inner)]))
+                pin.content.append(Element("connectionPointIn", "", {}, inner.at, [expression(_named(operand), inner)]))
             else:
                 pin.content.append(self._point(inner, self._value(entry, inner, ())))
         return pins, in_outs
@@ -379,15 +379,22 @@ def _modified(found: int) -> dict[str, str]:
     return {**({"negated": "true"} if found & NEGATED else {}), **({"edge": edge} if edge else {})}
 
 
-def _expression(written: str, at: Element) -> Element:
+def expression(written: str, at: Element) -> Element:
+    """An operand that is typed at a pin."""
     return Element("expression", "", {}, at.at, [written])
 
 
+def pin_named(at: Element, name: str, attributes: dict[str, str]) -> Element:
+    """A pin of a block."""
+    return Element("variable", "", {"formalParameter": name, **attributes}, at.at)
+
+
 def _variable(at: Element, name: str, modifiers: int) -> Element:
-    return Element("variable", "", {"formalParameter": name, **_modified(modifiers)}, at.at)
+    return pin_named(at, name, _modified(modifiers))
 
 
-def _pins(name: str, at: Element, pins: list[Element]) -> Element:
+def pins_of(name: str, at: Element, pins: list[Element]) -> Element:
+    """The inputs, in-outs or outputs of a block."""
     return Element(name, "", {}, at.at, [*pins])
 
 

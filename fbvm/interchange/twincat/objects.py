@@ -14,12 +14,12 @@ from html import unescape
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.markup import Element, parse_markup
-from fbvm.interchange.twincat.drawings import LANGUAGE, Drawings, Owner
+from fbvm.interchange.twincat.drawings import LANGUAGES, Drawings, Owner
 
 ROOT = "TcPlcObject"
 _CHILDREN = {"POU": "", "Itf": "INTERFACE", "DUT": "", "GVL": "", "Task": ""}
 """Children of the root, and what each of them declares where its text need not be asked."""
-_LANGUAGES = {"LADDER": "ladder", "SFC": "a sequential function chart", "CFC": "a continuous function chart"}
+_OTHERS = {"LADDER": "ladder", "SFC": "a sequential function chart"}
 _NO_CODE = re.compile(r"//[^\n]*|\(\*.*?\*\)|\{[^}]*\}|'(?:\$.|[^'$])*'", re.S)
 _KIND = re.compile(r"\b(FUNCTION_BLOCK|FUNCTION|PROGRAM|INTERFACE|CLASS)\b", re.I)
 _TAG = re.compile(r"""<(?:"[^"]*"|'[^']*'|[^>"'])*>""")
@@ -117,11 +117,11 @@ class _Written:
         self._words.append("END_PROPERTY")
 
     def _declaration(self, element: Element, kind: str, holders: list[Element]) -> Drawings | None:
-        """The declaration of a POU, method or accessor, with the variables that the network diagrams in `holders` need; those
-        diagrams, if there are any."""
+        """The declaration of a POU, method or accessor, with the variables that the drawings in `holders` need; those
+        drawings, if there are any."""
         declaration = element.one("Declaration")
         self._code(declaration)
-        bodies = [part for holder in holders if (inside := holder.one("Implementation")) for part in inside.all(LANGUAGE)]
+        bodies = [part for holder in holders if (inside := holder.one("Implementation")) for part in inside.all(*LANGUAGES)]
         if not bodies:
             return None
         owner = Owner(kind, element.get("Name"), declaration.text if declaration else "")
@@ -135,10 +135,10 @@ class _Written:
         for part in implementation.children if implementation else []:
             if part.name == "ST":
                 self._code(part)
-            elif part.name == LANGUAGE and drawings is not None:
+            elif part.name in LANGUAGES and drawings is not None:
                 self._lines(drawings.written[id(part)])
-            elif part.name in _LANGUAGES:
-                language = _LANGUAGES[part.name]
+            elif part.name in _OTHERS:
+                language = _OTHERS[part.name]
                 self._report(part, f"the body of {element.get('Name')} is {language}, which is not read from this file")
 
     def _report(self, element: Element, message: str) -> None:
