@@ -98,8 +98,8 @@ class Connection(HostChannel):
         elif self._resetting:
             self.give_up(now_ns)
             return
-        elif ready & READ and self.sock:
-            self._receive(self.sock, now_ns)
+        elif ready & READ:
+            self.fetch(now_ns)
         if ready & WRITE and self.sock:
             self._flush(self.sock, now_ns)
 
@@ -111,14 +111,49 @@ class Connection(HostChannel):
 
     def fetch(self, now_ns: int) -> None:
         """Reads the socket now and no earlier, since the unit may change its grant until it asks for events."""
-        sock = self.sock
+        sock, granted = self.sock, self.granted
         if sock is None:
             return
-        if not self._stalled and not self._fin_seen:
-            self._receive(sock, now_ns)
-        elif code := sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
-            self._broke(code, now_ns)
-        if (self._stalled or self._fin_seen) and self.sock:  # the selector does not tell that it breaks
+        if self._stalled or self._fin_seen:
+            if code := sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+                self._broke(code, now_ns)
+            self._ask_again()
+            return
+        most = granted if granted < BUFFER_BYTES else BUFFER_BYTES
+        try:
+            # Without a grant only look, whether FIN has come; data stay in the host.
+            data = sock.recv(most) if most > 0 else sock.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._broke(error, now_ns)
+            return
+        if not data or granted <= 0 or self._orphan:
+            self._hold(sock, not data, now_ns)
+            return
+        self.granted = granted - len(data)
+        if self.network.tap:
+            self._tap(now_ns, DATA, False, data)
+        self.link.pending.append(Received(self.channel, data))
+
+    def _hold(self, sock: socket.socket, is_end: bool, now_ns: int) -> None:
+        """Takes no data any more: FIN has come, or data for which the unit has no room, or which nobody wants."""
+        if is_end:
+            self._fin_seen = True
+            self._tap(now_ns, TapKind.FIN, False)
+            self._report(PeerClosed(self.channel))
+            self._finish(sock, now_ns)
+        elif self._orphan:
+            self.give_up(now_ns)
+            return
+        else:
+            self._stalled = True
+        self._watch()
+        self._ask_again()
+
+    def _ask_again(self) -> None:
+        """Asks the socket in each refresh whether it has broken, since the selector does not tell that."""
+        if self.sock and not self._orphan:
             self.link.waiting[self] = None
 
     def send(self, data: bytes, now_ns: int) -> str:
@@ -171,33 +206,6 @@ class Connection(HostChannel):
     def meet_faults(self, relays: Relays, now_ns: int) -> None:
         if self._connected and relays.concern(self.local, self.remote) and (self._active or not relays.is_unit(self.remote)):
             relays.take_over(self, self.local, self.remote, len(self._outbox), self._fin_seen)
-
-    def _receive(self, sock: socket.socket, now_ns: int) -> None:
-        wanted = self.granted if self.granted < BUFFER_BYTES else BUFFER_BYTES
-        try:
-            # Without a grant only look, whether FIN has come; data stay in the host.
-            data = sock.recv(wanted) if wanted > 0 else sock.recv(1, socket.MSG_PEEK)
-        except BlockingIOError:
-            return
-        except OSError as error:
-            self._broke(error, now_ns)
-            return
-        if data and wanted > 0 and not self._orphan:
-            self.granted -= len(data)
-            if self.network.tap:
-                self._tap(now_ns, DATA, False, data)
-            self.link.pending.append(Received(self.channel, data))
-        elif not data:
-            self._fin_seen = True
-            self._tap(now_ns, TapKind.FIN, False)
-            self._report(PeerClosed(self.channel))
-            self._finish(sock, now_ns)
-            self._watch()
-        elif self._orphan:
-            self.give_up(now_ns)
-        else:
-            self._stalled = True
-            self._watch()
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
         outbox, tap = self._outbox, self.network.tap

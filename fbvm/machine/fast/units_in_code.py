@@ -80,9 +80,9 @@ class WithUnits:
         self._scans = machine.scans(tasks, CLOCK_WORDS, units=units)
         self._parameters, self._parameters_at = self._scans.parameters, self._scans.parameters_at
         self._has_intervals = any(task.interval_ns for task in tasks)
-        self._rows = [(1 << number, cast(ProcessorUnit, attached.unit), attached.link)
+        self._rows = [(number, cast(ProcessorUnit, attached.unit), attached.link)
                       for number, attached in enumerate(io.units)]  # fmt: skip
-        """Of each unit the bit by which machine code names it, the unit, and its link."""
+        """Of each unit the number of the bit by which machine code names it, the unit, and its link."""
         self._counts_refreshes = any(attached.network.virtual_time for attached in io.units)
         """True if there are links that want to know of each refresh, so that machine code comes back after each scan."""
         self.is_open = False
@@ -209,7 +209,7 @@ class WithUnits:
         if self._parameters.unfinished:
             self._submit_requests(now_ns)
         more, recorder = False, self._io.recorder
-        for number, (_, unit, link) in enumerate(self._rows):
+        for number, unit, link in self._rows:
             if link.is_quiet:
                 link.pass_by(1)
                 continue
@@ -251,10 +251,8 @@ class WithUnits:
             number = parameters.faulty.bit_length() - 1
             raise RuntimeError(str(self._scans.units[number].trap_at(parameters.point)))
         unfinished, parameters.unfinished = parameters.unfinished, 0
-        for bit, unit, link in self._rows:
-            if unfinished & bit:
-                requests = unit.finish()
-                if requests:
-                    link.submit(requests, now_ns)
-                    submitted = True
+        for number, unit, link in self._rows:
+            if unfinished >> number & 1 and (requests := unit.finish()):
+                link.submit(requests, now_ns)
+                submitted = True
         return submitted and self._has_pending_events()

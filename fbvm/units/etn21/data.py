@@ -11,7 +11,8 @@ from sys import byteorder
 
 from fbvm.units.contract import AreaMemory
 
-LOW, HIGH = (0, 1) if byteorder == "little" else (1, 0)
+LITTLE_ENDIAN = byteorder == "little"
+LOW, HIGH = (0, 1) if LITTLE_ENDIAN else (1, 0)
 """Where the bytes of a word lie in the host's memory."""
 AREA_OF_CODE: dict[int, tuple[str, int]] = {  # code: (area, words of it that a data address may name)
     0xB0: ("CIO", 6144),
@@ -39,7 +40,7 @@ def fetch(memory: AreaMemory, high: int, low: int, size_bytes: int) -> bytes:
     """The bytes to send, from a data address that the unit has checked."""
     words, begin = memory.words(AREA_OF_CODE[high >> 8][0]), (high & 0xFF) << 8 | low >> 8
     data = array("H", words[begin : begin + (size_bytes + 1) // 2].tobytes())
-    if byteorder == "little":
+    if LITTLE_ENDIAN:
         data.byteswap()
     return data.tobytes()[:size_bytes]
 

@@ -103,7 +103,8 @@ class Agreed:
     """What the tables of this module are in one program: numbers, sizes in bytes, functions that write and read rows."""
 
     event_bytes: int
-    most_events: int
+    events_bytes: int
+    """Of all rows together."""
     events: Mapping[type, tuple[Packer, int, Values]]
     pack_sent: Packer
     sent: int
@@ -140,7 +141,7 @@ def agreed(contract: Contract) -> Agreed:
     _, _, ring_bytes = contract.array("ETN21_Rings")
     return Agreed(
         event_bytes=event.size,
-        most_events=contract.array("ETN21_Events")[1],
+        events_bytes=contract.array("ETN21_Events")[1] * event.size,
         events={type_: (event.packer(*EVERY_EVENT, *row.fields), told[row.kind], row.values) for type_, row in EVENTS.items()},
         pack_sent=event.packer(*EVERY_EVENT, "size"),
         sent=told[EVENTS[Sent].kind],
@@ -212,16 +213,15 @@ class Mail:
         if self._later:
             events, self._later = [*self._later, *events], []
             self._behind[0] = 0
-        agreed, rows = self._agreed, self._events
+        agreed, rows, row = self._agreed, self._events, self._agreed.event_bytes * posted
         for event in events:
-            if posted == agreed.most_events:
+            if row == agreed.events_bytes:
                 self._later.append(event)
                 self._behind[0] = 1
                 continue
             channel = event.channel
             if channel not in at.SOCKETS:
                 continue
-            row = agreed.event_bytes * posted
             if isinstance(event, Sent):
                 agreed.pack_sent(rows, row, agreed.sent, channel, event.size)
             elif not isinstance(event, Received):
@@ -234,8 +234,8 @@ class Mail:
             else:
                 pack, kind, _ = agreed.events[Received]
                 pack(rows, row, kind, channel, *words_of(remote.host), remote.port, len(event.data), place)
-            posted += 1
-        self._posted[0] = posted
+            row += agreed.event_bytes
+        self._posted[0] = row // agreed.event_bytes
 
     def _keep(self, channel: int, data: bytes) -> int | None:
         """Puts bytes into the ring of a socket.  Returns the place behind them, or None: there were more than the socket would
@@ -258,23 +258,22 @@ class Mail:
         """After a refresh: what the program asks of the network.  Data to be sent are taken from `memory`, the PLC's."""
         if self._later:
             self.post(())
+        agreed, rows = self._agreed, self._requests
         requests: list[Request] = []
-        if count := self._requested[0]:
-            self._requested[0] = self._urgent[0] = 0
-            agreed, rows, part = self._agreed, self._requests, self._agreed.part_bytes
-            for at_byte in range(0, agreed.request_bytes * count, agreed.request_bytes):
-                kind, channel, high, low, size = agreed.request(rows, at_byte)
-                if kind == agreed.send:
-                    data = fetch(memory, high, low, size)
-                    if size <= part:
-                        requests.append(Send(channel, data))
-                    else:
-                        requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
-                elif kind == agreed.grant:
-                    requests.append(Grant(channel, size))
+        for row in range(0, agreed.request_bytes * self._requested[0], agreed.request_bytes):
+            kind, channel, high, low, size = agreed.request(rows, row)
+            if kind == agreed.send:
+                data, part = fetch(memory, high, low, size), agreed.part_bytes
+                if size <= part:
+                    requests.append(Send(channel, data))
                 else:
-                    row = dict(zip(REQUEST_FIELDS, agreed.rare_request(rows, at_byte), strict=True))
-                    requests.append(agreed.rare[kind](row, memory))
+                    requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
+            elif kind == agreed.grant:
+                requests.append(Grant(channel, size))
+            else:
+                fields = dict(zip(REQUEST_FIELDS, agreed.rare_request(rows, row), strict=True))
+                requests.append(agreed.rare[kind](fields, memory))
+        self._requested[0] = self._urgent[0] = 0
         return requests
 
     def move(self, memory: AreaMemory) -> None:
