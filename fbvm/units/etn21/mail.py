@@ -5,7 +5,7 @@ their names what an event becomes there, and which request a row is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -111,7 +111,8 @@ class Agreed:
     pack_received: Packer
     """Of bytes of a connection."""
     received: int
-    request_bytes: int
+    request_rows: Sequence[int]
+    """At which bytes the rows begin."""
     request: Unpacker
     """What `SEND_FIELDS` names."""
     rare_request: Unpacker
@@ -147,7 +148,7 @@ def agreed(contract: Contract) -> Agreed:
         sent=told[EVENTS[Sent].kind],
         pack_received=event.packer(*EVERY_EVENT, "size", "place"),
         received=told[EVENTS[Received].kind],
-        request_bytes=request.size,
+        request_rows=tuple(range(0, contract.array("ETN21_Requests")[1] * request.size, request.size)),
         request=request.unpacker(*SEND_FIELDS),
         rare_request=request.unpacker(*REQUEST_FIELDS),
         send=asked[SEND],
@@ -208,7 +209,7 @@ class Mail:
     def post(self, events: Iterable[Event]) -> None:
         """Gives events to the program.  Those that do not fit wait for the refresh after, those of unknown channels are lost."""
         posted: int = self._posted[0]
-        if not posted:  # what the program has not kept gives way to the next
+        if not posted and self._fresh:  # what the program has not kept gives way to the next
             self._fresh.clear()
         if self._later:
             events, self._later = [*self._later, *events], []
@@ -260,7 +261,7 @@ class Mail:
             self.post(())
         agreed, rows = self._agreed, self._requests
         requests: list[Request] = []
-        for row in range(0, agreed.request_bytes * self._requested[0], agreed.request_bytes):
+        for row in agreed.request_rows[: self._requested[0]]:
             kind, channel, high, low, size = agreed.request(rows, row)
             if kind == agreed.send:
                 data, part = fetch(memory, high, low, size), agreed.part_bytes
