@@ -10,6 +10,8 @@ from cx_text import Cxt
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.lsp import foreign
+from fbvm.lsp.foreign import project_with
 from fbvm.lsp.projects import MOST_FILES, TEST_LIBRARY, Project, Projects, Settings, project_file_above
 
 MAIN = "PROGRAM Main\nVAR a : Pump; END_VAR\n    a();\nEND_PROGRAM\n"
@@ -178,3 +180,32 @@ def test_sources_within_a_container_stand_at_places_of_it(tmp_path: Path) -> Non
     assert projects.place_in_container(Source(str(folder / "a.st"), "x"), 0) is None
     assert projects.place_in_container(Source(name, "\n" * 500), 499) is None, "behind the end"
     assert projects.forget_regrouped(folder / "line3.cxt") == []
+
+
+def test_an_object_belongs_to_the_nearest_project_that_lists_it(tmp_path: Path) -> None:
+    folder = tmp_path / "plant"
+    shutil.copytree(Path(__file__).resolve().parents[3] / "examples" / "twincat", folder)
+    motor, project = folder / "Drives" / "FB_Motor.TcPOU", folder / "Conveyor.plcproj"
+    asked: list[Path] = []
+
+    def ends(below: Path, at: Path) -> bool:
+        asked.append(below)
+        return below == at
+
+    assert project_with(motor, lambda below: ends(below, tmp_path)) == project and asked == [motor.parent]
+    assert project_with(motor, lambda below: ends(below, motor.parent)) is None, "it ends below the project"
+    stray = folder / "Drives" / "FB_Stray.TcPOU"
+    stray.write_text(motor.read_text(encoding="utf-8"), encoding="utf-8")
+    assert project_with(stray, lambda below: ends(below, tmp_path)) is None and asked[-1] == tmp_path
+    assert project_with(Path("/FB_Nowhere.TcPOU"), lambda below: False) is None
+
+
+def test_what_cannot_be_read_is_no_part_of_a_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = folder_with(tmp_path, {"main.st": MAIN, "gone.plcproj": "x"})
+
+    def within(path: Path, resource: str | None) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(foreign, "within", within)
+    found = foreign.gathered([folder / "gone.plcproj", folder / "main.st"])
+    assert (found.paths, found.held, found.said, found.containers) == ([folder / "main.st"], {}, {}, {})
