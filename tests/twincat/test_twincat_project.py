@@ -81,6 +81,22 @@ def test_a_project_is_read_with_those_of_its_solution_that_it_refers_to(tmp_path
     assert sum(name.endswith("Tasks.st") for name in given_sources([line])) == 1
 
 
+def test_a_program_of_a_library_is_none_of_the_project_that_has_one_of_that_name(tmp_path: Path) -> None:
+    line = write_solution(tmp_path)
+    core = tmp_path / "Core" / "Core.plcproj"
+    text = core.read_text(encoding="utf-8")
+    core.write_text(text.replace("<Compile ", '<Compile Include="Main.TcPOU"/><Compile Include="Other.TcPOU"/><Compile ', 1),
+                    encoding="utf-8")  # fmt: skip
+    for name in ("Main", "Other"):
+        (core.parent / f"{name}.TcPOU").write_text(f"""<TcPlcObject><POU Name="{name}"><Declaration><![CDATA[// a test
+PROGRAM INTERNAL {name}
+VAR wrong : Nowhere; END_VAR]]></Declaration><Implementation><ST><![CDATA[]]></ST></Implementation></POU></TcPlcObject>""",
+                                                   encoding="utf-8")
+    found, _ = inputs([line])
+    compiled = compile_sources([each for each in found if isinstance(each, Source)], dialect="twincat")
+    assert [Path(error.source.name).name for error in compiled.errors] == ["Other.TcPOU"]
+
+
 def test_a_project_that_is_named_and_used_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_solution(tmp_path)
     monkeypatch.chdir(tmp_path / "Line")

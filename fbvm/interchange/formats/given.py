@@ -4,6 +4,7 @@ The readers of other tools' files are loaded when there is such a file: most run
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -22,6 +23,7 @@ TWINCAT_SUFFIXES = (*OBJECT_SUFFIXES, TASK_SUFFIX)
 PROJECT_SUFFIXES = (PROJECT_SUFFIX, SYSTEM_SUFFIX)
 SUFFIXES = (*CX_SUFFIXES, *PROJECT_SUFFIXES, *TWINCAT_SUFFIXES)
 """Endings, in small letters, of files of other tools; PLCopen XML is known by what it says."""
+_PROGRAM = re.compile(r"(?im)^\s*PROGRAM\s+(?:(?:PUBLIC|INTERNAL)\s+)?([a-z_]\w*)")
 DOCUMENT, HEAD_BYTES = b"plcopen.org/xml/tc6", 4_000
 """What a document in PLCopen XML has among its first bytes."""
 
@@ -121,9 +123,11 @@ def given_sources(paths: Sequence[Path], resource: str | None = None, memory: bo
 def sources_by_name(found: Mapping[Path, Imported | None]) -> dict[str, Path | str]:
     """By the name that messages use, each source of files in which `within` has looked: its path, or its text.
 
-    Of several projects of TwinCAT the first runs its tasks; the others are libraries that it uses."""
+    Of several projects of TwinCAT the first runs its tasks; the others are libraries that it uses.  A PROGRAM of one of those
+    is left out if a project in front has one of that name: in TwinCAT a project does not see programs of its libraries."""
     found = with_used(found)
     sources: dict[str, Path | str] = {}
+    programs: set[str] = set()
     projects = [path for path in found if path.suffix.lower() in PROJECT_SUFFIXES]
     values = {key: value for made in found.values() if made is not None for key, value in made.parameters.items()}
     for path, made in found.items():
@@ -131,11 +135,20 @@ def sources_by_name(found: Mapping[Path, Imported | None]) -> dict[str, Path | s
             from fbvm.interchange.twincat.references import with_parameters
 
             made = with_parameters(made, values)
-        sources.update({str(path): path} if made is None else made.files)
+        own = _programs_of(made) if made is not None and path in projects else {}
+        sources.update({str(path): path} if made is None else
+                       {name: text for name, text in made.files.items() if own.get(name) not in programs})
+        programs.update(own.values())
         if path in projects[1:]:
             for name in [name for name in made.files if name.endswith(f"{PROJECT_SUFFIX}/{TASKS}")] if made else []:
                 sources.pop(name)
     return sources
+
+
+def _programs_of(made: Imported) -> dict[str, str]:
+    """By file of a project of TwinCAT the name, in small letters, of the PROGRAM in it."""
+    return {name: said[1].lower() for name, text in made.files.items()
+            if Path(name).suffix.lower() in OBJECT_SUFFIXES and (said := _PROGRAM.search(text)) is not None}
 
 
 def with_used(found: Mapping[Path, Imported | None]) -> dict[Path, Imported | None]:
