@@ -138,3 +138,18 @@ END_PROGRAM"""
             assert lines(made, counts.executed()) == {3: 4 * times, 4: 4 * times, 5: 4 * times, 6: 2 * times, 7: times}
             assert lines(made, counts.skipped()) == {5: 2 * times}
             plc.warm_start()
+
+
+def test_a_function_that_is_in_place_of_a_block_stays_there(image: Image) -> None:
+    plc, calls = Plc(image, engine="python"), list[int]()
+    python_of(plc.engine).substitute(next(n for n, body in enumerate(image.bodies) if body.name == "Half"), calls.append)
+    with counting(plc) as counts:
+        plc.run(scans=3)
+    plc.scan()
+    assert len(calls) == 4 and len(set(calls)) == 1
+    assert lines(image, counts.executed())[8] == 3 and not lines(image, counts.executed()).get(4)
+
+
+def test_machine_code_alone_has_no_place_for_python() -> None:
+    with pytest.raises(ValueError, match=r"^Python in place of a block needs the Python engine$"):
+        python_of(object())
