@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -34,6 +34,8 @@ MACHINE = {"logic": 0.8, "pid": 1.5, "crc": 1.4, "mtcp": 2.5}
 """The limits of a scan of the four programs, as multiples of C by hand."""
 MANY = (("logic", 1_000), ("logic", 10_000), ("polling", 1_000))
 AT_ONCE = 8
+ROUNDS = 9
+"""In how many rounds two servers take turns."""
 PROCESSES = 9
 IN_ONE_PROCESS = "in-one-process"
 """The word by which a new process is asked for its figures of the four programs."""
@@ -112,13 +114,17 @@ def programs() -> Iterator[Row]:
     command = [sys.executable, __file__, IN_ONE_PROCESS]
     told = [json.loads(subprocess.check_output(command, text=True)) for _ in range(PROCESSES)]
     for name, step_ns in native.PROGRAMS.items():
-        ratios = sorted(machine / hand for hand, machine in (process[name] for process in told))
-        figure = f"{statistics.median(ratios):.2f} ({ratios[0]:.2f} to {ratios[-1]:.2f})"
-        yield f"{name}: machine code, times C by hand, {PROCESSES} processes", figure, f"<= {MACHINE[name]}"
+        hands, machines = zip(*(process[name] for process in told), strict=True)
+        yield f"{name}: machine code, times C by hand, {PROCESSES} processes", times(machines, hands), f"<= {MACHINE[name]}"
         image = native.compiled(BENCH / "programs" / f"{name}.st")
-        hand = statistics.median(process[name][0] for process in told)
-        python = native.shortest_ns(native.in_python(image, step_ns), 5) / hand
+        python = native.shortest_ns(native.in_python(image, step_ns), 5) / statistics.median(hands)
         yield f"{name}: python engine, times C by hand", f"{python:.0f}", f"<= {PYTHON[name]}"
+
+
+def times(ours: Sequence[float], theirs: Sequence[float]) -> str:
+    """How many times theirs ours are: the median of all rounds, each of which compares the two, and the range."""
+    ratios = sorted(our / their for our, their in zip(ours, theirs, strict=True))
+    return f"{statistics.median(ratios):.2f} ({ratios[0]:.2f} to {ratios[-1]:.2f})"
 
 
 def in_one_process() -> dict[str, tuple[float, float]]:
@@ -139,18 +145,16 @@ def peers() -> Iterator[Row]:
             rates, used = exchanges.measure({
                 exchanges.BEST: exchanges.in_c(binary, "plain", port), exchanges.PLAIN: exchanges.pymodbus(stack, port),
                 ours: exchanges.Blocks(stack, exchanges.poll(), port, "native", "event", 10)})  # fmt: skip
-        rate = {name: statistics.median(found) for name, found in rates.items()}
         yield "an exchange of the blocks, own processor time", f"{statistics.median(used[ours]):.0f} us", "<= 60 us"
-        yield "  its rate, times C that only sends and receives", f"{rate[ours] / rate[exchanges.BEST]:.2f}", ">= 0.6"
-        yield "  its rate, times pymodbus's client", f"{rate[ours] / rate[exchanges.PLAIN]:.2f}", ""
+        yield "  its rate, times C that only sends and receives", times(rates[ours], rates[exchanges.BEST]), ">= 0.6"
+        yield "  its rate, times pymodbus's client", times(rates[ours], rates[exchanges.PLAIN]), ""
         commands = servers.commands(binary)
         found: dict[str, list[float]] = {"etn_modbus, 8 sockets": [], "pymodbus": []}
-        for _ in range(servers.ROUNDS):
+        for _ in range(ROUNDS):
             for name, measured in found.items():
                 with servers.server(commands[name]) as served:
                     measured.append(servers.rate(binary, served, AT_ONCE))
-        ratio = statistics.median(found["etn_modbus, 8 sockets"]) / statistics.median(found["pymodbus"])
-        yield f"{AT_ONCE} clients on {AT_ONCE} sockets, times pymodbus's server", f"{ratio:.2f}", ">= 2"
+        yield f"{AT_ONCE} clients on {AT_ONCE} sockets, times pymodbus's server", times(*found.values()), ">= 2"
 
 
 PARTS: dict[str, Callable[[], Iterator[Row]]] = {
