@@ -108,6 +108,8 @@ class StatementLayout(ExpressionLayout):
     def assignment(self, targets: Phrase, value: Phrase) -> Phrase:
         return Phrase(targets.start, targets.doc, self.hung(value))
 
+    one_set_target, add_set_target, set_assignment = one_target, add_target, assignment
+
     def assignment_other(self, target: Phrase, sign: Token, value: Phrase) -> Phrase:
         return self.assignment(self.one_target(target, sign), value)
 

@@ -22,6 +22,7 @@ from fbvm.syntax.tree import (
     For,
     Form,
     If,
+    Literal,
     NameRef,
     Node,
     Pou,
@@ -156,6 +157,26 @@ class Statements(Expressions):
 
     def assignment_other(self, target: Expr, sign: Token, value: Expr) -> Statement:
         return Assign(target.start, value.end, (target,), sign.text.upper(), value)
+
+    def one_set_target(self, target: Expr, sign: Token) -> list[tuple[Expr, Token]]:
+        return [(target, sign)]
+
+    def add_set_target(self, targets: list[tuple[Expr, Token]], target: Expr, sign: Token) -> list[tuple[Expr, Token]]:
+        targets.append((target, sign))
+        return targets
+
+    def set_assignment(self, targets: list[tuple[Expr, Token]], value: Expr) -> Statement:
+        """`a S= b R= c` sets a and resets b while c is TRUE: all of them look at the last value."""
+        signs = {sign.text.upper() for _, sign in targets}
+        if "REF=" in signs and len(targets) > 1:
+            sign = targets[1][1]
+            self.report("S0101", sign.start, sign.end, f"`;` expected, but `{sign.text}` found", "REF= binds one reference")
+        if len(signs) == 1 or "REF=" in signs:
+            found = tuple(target for target, _ in targets)
+            return Assign(found[0].start, value.end, found, targets[0][1].text.upper(), value)
+        given = [Assign(target.start, target.end, (target,), ":=", Literal(
+            sign.start, sign.end, "bool", sign.text.upper() == "S=", None, sign.text)) for target, sign in targets]
+        return If(targets[0][0].start, value.end, ((value, self.block([*given])),), None)
 
     def call_statement(self, call: Expr) -> Statement:
         return CallStatement(call.start, call.end, call)
