@@ -186,6 +186,8 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
             return False
         scope.facts.copies[value] = aggregates.in_frame(scope, value, variable.type, "copy of a text")
         return True
+    if isinstance(kind, AnyType) and not isinstance(variable.type, AnyType) and scope.describes(value, variable.type):
+        return True
     if not scope.is_variable(value):
         scope.error("S0407", value, f"the {role} {variable.name} needs a variable, not a value",
                     "it is read where it lies: assign the value to a variable, and pass that" if variable.by_reference else "")

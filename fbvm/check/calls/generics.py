@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from fbvm.base.diagnostics import Source
 from fbvm.base.types import ANYTHING, AnyType, StringType, SubrangeType, Type, base, common, families, fold, string
 from fbvm.check.calls.functions import RESULT_STRING
 from fbvm.check.expressions.any_parameters import MEMBERS
@@ -20,6 +21,9 @@ from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
 from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import changed, copied, walk
+
+_ALIASES = 8
+"""Other names for a type that are followed one behind the other."""
 
 
 def variables(declared: tree.Pou) -> dict[str, str]:
@@ -47,9 +51,28 @@ def _passed_on(call: tree.Call, called: Pou | None, project: SymbolTable) -> set
     """Folded names that a call passes to parameters that take any argument as it is."""
     if called is None or not called.is_function:
         return set()
-    as_is = passed_as_is(called, project)
+    as_is = passed_as_is(called, project) | _structures(called, project)
     return {fold(value.text) for name, value, _ in _given(call, called)
             if name in as_is and isinstance(value, tree.NameRef)}
+
+
+def _structures(pou: Pou, project: SymbolTable) -> set[str]:
+    """Folded names of the parameters that are declared as the structure AnyType, or a REFERENCE TO it."""
+    return {fold(name.text) for section in pou.tree.sections for variable in section.variables
+            if _is_description(variable.spec, pou.source, project) for name in variable.names}
+
+
+def _is_description(spec: tree.TypeSpec, source: Source, project: SymbolTable) -> bool:
+    """True for the name of the structure AnyType, another name for it, and REFERENCE TO it."""
+    for _ in range(_ALIASES):
+        spec = spec.target if isinstance(spec, tree.RefSpec) else spec
+        if not isinstance(spec, tree.NamedType) or fold(spec.text).rpartition(".")[2] == "ANYTYPE":
+            return isinstance(spec, tree.NamedType)
+        entry = project.type_entry(spec.text, source)
+        if entry is None or not isinstance(entry.tree.spec, tree.NamedType):
+            return False
+        spec, source = entry.tree.spec, entry.source
+    return False
 
 
 def _given(call: tree.Call, called: Pou) -> Iterator[tuple[str, tree.Expr, str]]:

@@ -86,15 +86,7 @@ def _form(expr: Written) -> str:
 
 def in_frame(scope: Scope, expr: tree.Expr, kind: Type, what: str) -> Variable:
     """A new variable for a value in the frame of the POU that is executed."""
-    pou = scope.pou
-    assert pou is not None
-    scope.project.dependencies.repeatable = False  # the frame becomes larger
-    owner = pou.owner
-    owner.frame_size += -owner.frame_size % 8
-    made = Variable(f"{what} at {expr.start}", kind, "VAR_TEMP", pou.source, expr, owner, place="frame",
-                    offset=owner.frame_size)
-    owner.frame_size += kind.size
-    return made
+    return scope.in_frame(expr, kind, what)
 
 
 # --- values -----------------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from __future__ import annotations
 from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BYTE,
+    AnyType,
     ArrayType,
     StringType,
     StructType,
@@ -221,6 +222,9 @@ def lend(scope: Scope, value: tree.Expr, kind: Type, code: str, name: str, any_l
         scope.error("S0407", value, f"{name} is bound to a variable, and this makes a reference already",
                     f"name the variable alone: {scope.text(named(value))}")
         return False
+    if isinstance(scope.infer(value), AnyType) and scope.describes(value, kind):
+        scope.facts.holders[value] = _held(scope, value, scope.facts.aggregates[value].place)
+        return True
     found = refer(scope, value, lasting=False)
     if found is None or derives(found, kind) or any_length and isinstance(found, StringType) and found.wide is _is_wide(kind):
         return found is not None

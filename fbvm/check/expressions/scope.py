@@ -39,7 +39,17 @@ from fbvm.check.expressions.assignability import (
 from fbvm.check.expressions.constants import convert, cut, limits
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
+from fbvm.check.symbols.facts import (
+    UNTYPED_INT,
+    UNTYPED_REAL,
+    Aggregate,
+    AggregatePart,
+    Facts,
+    Pou,
+    Value,
+    Variable,
+    is_block,
+)
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 from fbvm.syntax.tree.node import written
@@ -119,6 +129,8 @@ class Scope:
         kind = self.infer(expr, target)
         if kind is None:
             return False
+        if isinstance(kind, AnyType) and self.describes(expr, target):
+            return True
         if kind is target and isinstance(kind, Elementary) and expr not in self.facts.constants:
             return True  # most values
         if is_untyped(kind):
@@ -137,11 +149,15 @@ class Scope:
         if self.takes_power(expr, base(target)):
             self.facts.types[expr] = UNTYPED_REAL
             return self.adopt(expr, target, code) is not None
+        self._misfit(expr, kind, target, code, role)
+        return False
+
+    def _misfit(self, expr: tree.Expr, kind: Type, target: Type, code: str, role: str) -> None:
+        """Report a value that does not fit."""
         constant, value = code in _CONSTANT_PLACES and not is_block(kind), self.facts.constants.get(expr)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
                    hidden_hint(expr, target) or self.power_hint(expr, target) or
                    (literal_hint(value, base(target)) if constant else mismatch_hint(expr, kind, target)))
-        return False
 
     def _is_converted(self, expr: tree.Expr, kind: Type, target: Type) -> bool:
         """True if the dialect converts a value implicitly.
@@ -152,6 +168,32 @@ class Scope:
         number = kind.base if isinstance(kind, EnumType) else kind
         return self.dialect.numbers_of_enumerations and isinstance(target, EnumType) and isinstance(number, Elementary) and \
             self.facts.constants.get(expr) in target.shown and converts(number, target.base)
+
+    def describes(self, expr: tree.Expr, target: Type) -> bool:
+        """True if an ANY parameter stands where the structure AnyType is needed: one in the frame of the POU gets what the
+        parameter tells of its argument (CODESYS online help, data type __SYSTEM.AnyType: an ANY is such a structure)."""
+        if not isinstance(expr, tree.NameRef) or self.pou is None or not isinstance(target, StructType) or \
+                target is not self.context.description():
+            return False
+        parts = []
+        for field in target.fields.values():
+            told = tree.Member(expr.start, expr.end, tree.NameRef(expr.start, expr.end, expr.text),
+                               tree.Name(expr.start, expr.end, field.name))
+            self.infer(told)
+            parts.append(AggregatePart((field.offset,), None, field.type, told))
+        self.facts.aggregates[expr] = Aggregate(self.in_frame(expr, target, "$any"), bytes(target.size), tuple(parts))
+        return True
+
+    def in_frame(self, expr: tree.Expr, kind: Type, what: str) -> Variable:
+        """A new variable for a value in the frame of the POU that is executed."""
+        assert self.pou is not None
+        self.project.dependencies.repeatable = False  # the frame becomes larger
+        owner = self.pou.owner
+        owner.frame_size += -owner.frame_size % 8
+        made = Variable(f"{what} at {expr.start}", kind, "VAR_TEMP", self.pou.source, expr, owner, place="frame",
+                        offset=owner.frame_size)
+        owner.frame_size += kind.size
+        return made
 
     def refer_to(self, expr: tree.Expr, kind: StructType) -> None:
         """Record that an interface refers to an instance of this type."""

@@ -174,6 +174,10 @@ class Context:
         assert isinstance(kind, EnumType)
         return kind
 
+    def description(self) -> Type | None:
+        """The structure AnyType, which has what an ANY parameter tells; a library declares it."""
+        return self.named_type("AnyType", Source("", "", "codesys"))
+
     def exception_codes(self) -> EnumType:
         """The enumeration ExceptionCode, of which __CATCH gives a member; a library declares it."""
         kind = self.named_type("ExceptionCode", Source("", "", "codesys"))

@@ -12,7 +12,7 @@ from fbvm.code.operations import Node
 from fbvm.syntax import tree
 
 
-def written_out(body: BodyContext, expr: tree.ArrayInit | tree.StructInit, kind: Type) -> Place:
+def written_out(body: BodyContext, expr: tree.ArrayInit | tree.StructInit | tree.NameRef, kind: Type) -> Place:
     """The place of the whole in the frame of the POU, with its values stored there: all are evaluated first, in order."""
     whole = body.facts.aggregates[expr]
     place, site = body.slot(whole.place), body.site(expr)
@@ -37,8 +37,8 @@ def _value(body: BodyContext, part: AggregatePart) -> Node:
     return body.value(part.value, part.kind)
 
 
-def _structure(body: BodyContext, expr: tree.StructInit, kind: Type) -> Place:
-    """The place of a structure that is written out, or of the variable that `(a := b)` assigns."""
+def _structure(body: BodyContext, expr: tree.StructInit | tree.NameRef, kind: Type) -> Place:
+    """The place of a structure that is written out, or that an ANY stands for, or of the variable that `(a := b)` assigns."""
     assignment = body.facts.assignments.get(expr)
     if assignment is None:
         return written_out(body, expr, kind)

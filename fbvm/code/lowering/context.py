@@ -152,6 +152,8 @@ class BodyContext(Emitter):
             expr = facts.gets.get(expr, expr)
         reference = facts.followed.get(expr)
         if reference is None or isinstance(expr, tree.Call):
+            if expr in facts.aggregates and isinstance(expr, tree.NameRef):  # an ANY as a structure
+                return self._places[tree.StructInit](self, expr, facts.types[expr])
             if (variable := facts.variables.get(expr)) is not None:
                 return self.variable(variable, expr)
             return self._places[type(expr)](self, expr, facts.types[expr])
