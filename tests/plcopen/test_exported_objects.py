@@ -103,6 +103,7 @@ def test_parts_of_a_block_stand_in_the_text_again(line: str) -> None:
     ("TYPE T EXTENDS U : STRUCT a : INT; END_STRUCT END_TYPE", "the base of T is kept as CODESYS and TwinCAT have it"),
     ("{attribute 'strict'} TYPE T : (a, b); END_TYPE", "the pragma {attribute 'strict'} is kept as CODESYS and TwinCAT have it"),
     ("FUNCTION_BLOCK A VAR r : REFERENCE TO INT; END_VAR END_FUNCTION_BLOCK", "REFERENCE TO is written as CODESYS has it"),
+    ("FUNCTION_BLOCK A VAR r : REFERENCE TO A(THIS^); END_VAR END_FUNCTION_BLOCK", "REFERENCE TO is written as CODESYS has it"),
     ("FUNCTION_BLOCK A VAR b : B(1); END_VAR END_FUNCTION_BLOCK", "what the variable gives FB_init is kept as CODESYS has it"),
     ("FUNCTION_BLOCK B END_FUNCTION_BLOCK FUNCTION_BLOCK A VAR k : INT; b : ARRAY[1..2] OF B(k); END_VAR END_FUNCTION_BLOCK",
      "what the variable gives FB_init is kept as CODESYS has it"),

@@ -120,9 +120,10 @@ class Types:
     def _reference(self, spec: tree.RefSpec) -> Element:
         if spec.kind == "POINTER TO":
             return element("pointer", element("baseType", self.spec(spec.target)))
-        if spec.kind == "REFERENCE TO" and isinstance(spec.target, tree.NamedType):
+        target = spec.target.base if isinstance(spec.target, tree.ConstructedSpec) else spec.target  # it constructs nothing
+        if spec.kind == "REFERENCE TO" and isinstance(target, tree.NamedType):
             self.foreign.append((spec, "REFERENCE TO is written as CODESYS has it, as the name of a type"))
-            return element("derived", name=f"REFERENCE TO {spec.target.text}")
+            return element("derived", name=f"REFERENCE TO {target.text}")
         raise self._unknown(spec)
 
     def _struct(self, spec: tree.StructSpec) -> Element:
