@@ -349,8 +349,8 @@ class Prover:
         invariants = Invariants(self.summary, state, self.goal.stop, self.goal.given, self.clock, self.limits.expired)
         kept = invariants.kept(found)
         if kept is not None and (doubted := {guess for guess in found if isinstance(guess, Literal)} - {*kept}):
-            known = {*found}
-            kept = invariants.kept([*kept, *(guess for guess in guesses(state, samples, doubted) if guess not in known)])
+            # what a scan has broken only behind a state of the doubted may hold with the clauses that exclude this state
+            kept = invariants.kept([guess for guess in guesses(state, samples, doubted) if guess not in doubted])
         return self._induced(kept, self._deepest()) if kept else None
 
     def _with_lemmas(self) -> Verdict | None:

@@ -117,6 +117,22 @@ def test_decimal_digits_that_make_too_large_a_number_trap(kind: str, greatest: i
     assert asked(digits, NO_TRAP, "", f"Main.w = {few}").word == "proved"
 
 
+@pytest.mark.slow
+def test_steps_behind_a_long_wait_are_never_active_with_those_before() -> None:
+    """No random run waits so long: that Draining is never active is guessed, and refuted with much that holds without it."""
+    image = image_of("""PROGRAM Main
+        VAR_INPUT Start, Full, Hot, Empty : BOOL; END_VAR
+        VAR Valve, Drain : BOOL; END_VAR
+        INITIAL_STEP Idle: END_STEP  STEP Filling: Valve(N); END_STEP  STEP Heating: END_STEP  STEP Mixing: END_STEP
+        STEP Draining: Drain(N); END_STEP
+        TRANSITION FROM Idle TO Filling := Start; END_TRANSITION
+        TRANSITION FROM Filling TO (Heating, Mixing) := Full; END_TRANSITION
+        TRANSITION FROM (Heating, Mixing) TO Draining := Hot AND Mixing.T >= T#3s; END_TRANSITION
+        TRANSITION FROM Draining TO Idle := Empty; END_TRANSITION
+        END_PROGRAM""")
+    assert asked(image, NEVER, "Main.Valve AND Main.Drain").word == "proved"
+
+
 def test_a_program_that_always_traps_is_told_so() -> None:
     with pytest.raises(Refused, match=r"each run ends in a trap .* within 4 scans: there is nothing to prove"):
         asked(program("n := n + 1; n := n + 10 / (3 - n) * 0;", "n : INT;"), NEVER, "Main.n > 5")
