@@ -45,6 +45,9 @@ def test_rows_are_written_and_read_by_name(own: Contract) -> None:
     names = ("what", "size", "sure", "words[1]", "words[2]", "deep.low", "deep.high")
     rows = row.rows(*names)(memoryview(table))
     assert [*rows] == [(kind, 1000 + number, False, 0, 0xABCD, 0, -5) for number, kind in enumerate((0, 7, 8))]
+    for number, fields in enumerate(row.rows(*names)(memoryview(table))):
+        assert row.unpacker(*names)(memoryview(table), row.size * number) == fields
+    assert row.unpacker("what", "size")(memoryview(table), 2 * row.size) == (8, 1002)
     in_order = row.rows("what", "sure", "size")(memoryview(table))
     assert [*in_order] == [(kind, False, 1000 + number) for number, kind in enumerate((0, 7, 8))]
     assert table.count(0xFF) == 3 * 7, "only what -5 has of them"
