@@ -388,3 +388,24 @@ def test_ctrl_c_when_machine_code_comes_back_loses_nothing() -> None:
         assert [] in times and rig.plc.scans == rig.plc.read("Main.n")
         assert rig.plc.now_ns == rig.plc.memory.views["i64"][NOW // 8]
         assert len(rig.networks[0].log) >= rig.plc.read("D20001") > 3  # type: ignore[operator]
+
+
+@pytest.mark.slow
+def test_a_burst_takes_over_when_tasks_are_due_from_scans_in_python() -> None:
+    found = []
+    for is_inside in (True, False):
+        rig = Rig(image(3, "INTERVAL := T#1ms, "), (0,), is_inside=is_inside)
+        bursts(rig, 5, 16, 1000)
+
+        def watch(plc: Plc, phase: object) -> None:
+            pass
+
+        rig.plc.phases.append(watch)
+        for _ in range(4):
+            rig.clock.now_ns += 700_000
+            rig.plc.scan(rig.clock())
+        rig.plc.phases.remove(watch)
+        rig.clock.now_ns += 100_000
+        times = [rig.plc.scan_at_once(16, rig.clock.now_ns, rig.time) for _ in range(3)]
+        found.append((times, rig.plc.read("D20001"), rig.state))
+    assert found[0] == found[1]
