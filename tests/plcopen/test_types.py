@@ -7,6 +7,7 @@ from drawings import block, codes, document, imported, pou, result, value, varia
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.interchange.imported import Imported
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.scope import _library_pins
 from fbvm.interchange.plcopen.read.types import duration
@@ -48,6 +49,18 @@ def test_types(element: str, text: str) -> None:
 def test_a_variable_without_a_type_that_can_be_said_is_named(wrong: str) -> None:
     made = import_xml(document(pou("", f'<variable name="v">{wrong}</variable>', language="ST")))
     assert [d.code for d in made.errors] == ["X0105"]
+
+
+def test_an_initial_value_in_the_name_of_a_type_is_one() -> None:
+    def made(name: str, more: str = "") -> Imported:
+        kind = f'<type><derived name="{name}"/></type>'
+        return import_xml(document(pou("", f'<variable name="v">{kind}{more}</variable>', language="ST")))
+
+    assert "v : DWORD := 2#0101;" in made("DWORD := 2#0101").files["Main.st"]
+    assert [d.code for d in made("DWORD := 2#0101").diagnostics] == ["X0292"]
+    assert "v : DWORD := 3;" in made("DWORD := 4", '<initialValue><simpleValue value="3"/></initialValue>').files["Main.st"]
+    assert "v : Valve (2) := (n := 1);" in " ".join(made("Valve (2) := (n := 1)").files["Main.st"].split())
+    assert [d.code for wrong in ("DWORD :=", "a b := 1", "INT := 1; END_VAR") for d in made(wrong).errors] == ["X0105"] * 3
 
 
 CONFIGURATION = """

@@ -36,7 +36,7 @@ from fbvm.interchange.plcopen.read.objects import (
     members,
     property_type,
 )
-from fbvm.interchange.plcopen.read.types import duration, location, note, type_text, value_text
+from fbvm.interchange.plcopen.read.types import duration, location, note, type_and_value, type_text, value_text
 from fbvm.interchange.plcopen.schema import KINDS, LOCATION, MNEMONIC, QUALIFIERS, SECTIONS
 
 TC6 = "http://www.plcopen.org/xml/tc6"
@@ -132,9 +132,9 @@ def _var_list(reading: Reading, element: Element, name: str = "") -> Iterator[Va
 
 def _variable(reading: Reading, element: Element) -> Iterator[Variable]:
     name = identifier(reading, element)
-    kind = type_text(reading, element.one("type"), element)
+    kind, written = type_and_value(reading, element)
     if name and kind:
-        initial = value_text(element.one("initialValue"), kind, reading.producer.family)
+        initial = value_text(element.one("initialValue"), kind, reading.producer.family) or written
         yield Variable(name, kind + arguments(element), initial, location(element), note(element))
 
 

@@ -17,6 +17,8 @@ _NAME = re.compile(r"((REFERENCE|POINTER)\s+TO\s+|REF_TO\s+|ARRAY\s*\[[\w\s.,*+-
                    r"[^\W\d]\w*(\.[^\W\d]\w*)*", re.IGNORECASE)
 """The name of a type.  CODESYS writes a reference in its place, which the schema has no element for; editors that take any text
 there also have arrays."""
+_CONSTRUCTED = re.compile(rf"{_NAME.pattern}(\s*\([^;()]*\))?", re.IGNORECASE)
+"""The same with arguments of FB_init."""
 _TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})(\.\d{1,9})?")
 _DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
 
@@ -36,6 +38,18 @@ def type_text(reading: Reading, holder: Element | None, owner: Element) -> str:
         return _WRITERS[inner.name](reading, inner)
     reading.report("X0105", inner, f"{inner.name} is no type of PLCopen XML")
     return ""
+
+
+def type_and_value(reading: Reading, variable: Element) -> tuple[str, str]:
+    """The type of a variable, and the initial value that a tool has written into the name of the type, `DWORD := 2#10`; "" for
+    none."""
+    derived = variable.one("type", "derived")
+    name, sign, value = (part.strip() for part in (derived.get("name") if derived else "").partition(":="))
+    if derived is None or not sign or not value or ";" in value or not _CONSTRUCTED.fullmatch(name):
+        return type_text(reading, variable.one("type"), variable), ""
+    reading.report("X0292", derived, f"the type of {variable.get('name')} is {name}, and {value} its initial value",
+                   "an initial value stands in <initialValue>")
+    return name, value
 
 
 def _array(reading: Reading, element: Element) -> str:
