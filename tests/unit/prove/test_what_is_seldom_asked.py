@@ -242,3 +242,21 @@ def test_a_handshake_is_asked_of_an_instance() -> None:
     for path in ("Main.n", "D0..D1"):
         with pytest.raises(UnknownPlace, match=f"{path} is no instance of a function block"):
             handshake(names, path)
+
+
+SOCKET = """PROGRAM Main VAR status AT CIO 1505 : WORD; switches AT CIO 1519 : WORD; code AT D30027 : WORD; n : INT; END_VAR
+    IF n < 100 THEN n := n + 1; END_IF
+    IF n = 3 THEN switches := 16#0008; END_IF
+    IF code <> 0 OR status <> 0 THEN n := 50; END_IF
+END_PROGRAM"""
+
+
+@pytest.mark.slow
+def test_what_a_unit_writes_at_random_keeps_its_rules() -> None:
+    image = image_of(SOCKET)
+    question = Question(NEVER, "Main.n > 2000", units=((0, 1),))
+    prover = Prover(image, question, Limits(**FEW), lambda said: None)
+    assert len(prover.inputs) > 3
+    machine, judge = Machine(image, 10 * MS, 10 * MS, STEP_BUDGET), Judge.of(image, question)
+    found = sampled(machine, judge, prover.inputs, dict(prover.summary.cells), 5, 1)
+    assert len(found) == 6 * 5, "no run breaks a rule"
