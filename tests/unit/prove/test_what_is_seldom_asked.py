@@ -17,7 +17,9 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import STEP_BUDGET
 from fbvm.prove import prover as prover_module
 from fbvm.prove.bounded import BoundedSearch, Inputs
+from fbvm.prove.encoding import execution
 from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.encoding.terms import Terms
 from fbvm.prove.invariants import Invariants
 from fbvm.prove.prover import Limits, Prover, SpuriousRun, prove
 from fbvm.prove.question import ALWAYS, NEVER, NO_TRAP, REACH, Names, Question, Verdict
@@ -260,3 +262,23 @@ def test_what_a_unit_writes_at_random_keeps_its_rules() -> None:
     machine, judge = Machine(image, 10 * MS, 10 * MS, STEP_BUDGET), Judge.of(image, question)
     found = sampled(machine, judge, prover.inputs, dict(prover.summary.cells), 5, 1)
     assert len(found) == 6 * 5, "no run breaks a rule"
+
+
+@pytest.mark.slow
+def test_where_no_run_keeps_the_assumptions_no_invariants_are_guessed() -> None:
+    assert prover_of(Question(NEVER, "Main.n > 2", ("Main.n = 77",)))._with_invariants(24) is None
+
+
+@pytest.mark.slow
+def test_a_scan_of_too_many_statements_is_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(execution, "MOST_STEPS", 1)
+    with pytest.raises(Refused, match="a scan may execute more than 1 statements, which is too long to be followed"):
+        prover_of(Question(NEVER, "Main.n > 2"))
+
+
+def test_terms_are_shown_for_people() -> None:
+    terms = Terms()
+    one, other = terms.variable("x", 8), terms.constant(8, 5)
+    assert repr(one) == "x" and repr(other) == "5"
+    assert repr(terms.add(one, other)) in ("(add x 5)", "(add 5 x)")
+    assert repr(terms.extract(one, 3, 2)) == "(extract:3 x)"
