@@ -40,7 +40,7 @@ def assignable(kind: Type, target: Type) -> bool:
     """True if a value of `kind` may be stored where `target` is declared, arrays and structures as a whole included."""
     if kind is target and isinstance(kind, Elementary):
         return True
-    if isinstance(target, _PASSED_WITH_BOUNDS) or isinstance(kind, _PASSED_WITH_BOUNDS):
+    if isinstance(kind, _PASSED_WITH_BOUNDS):
         return False
     if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
         return kind.bounds == target.bounds and same(kind.element, target.element) and not (kind.packed or target.packed)

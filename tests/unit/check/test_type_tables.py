@@ -31,7 +31,9 @@ PLAIN = t.StructType("Plain", 4, 2, {"A": t.Field("a", t.INT, 0)})
 REF, POINTER = t.RefType("REF_TO INT", 8, 8, t.INT), t.RefType("POINTER TO INT", 8, 8, t.INT, moves=True)
 TEXT, WIDE = t.string(5), t.string(5, True)
 ROW, OTHER_ROW, LONGER = (t.array((bounds,), t.INT) for bounds in ((0, 2), (1, 3), (0, 3)))
-OTHERS = TEXT, WIDE, COLOUR, SMALL, REF, POINTER, ROW, OTHER_ROW, LONGER, PLAIN, BLOCK
+OPEN, OPEN_PLANE, PLANE = t.open_array(1, t.INT), t.open_array(2, t.INT), t.array(((0, 1), (0, 1)), t.INT)
+ANY, NUMBER = t.AnyType("ANY", 24, 8), t.AnyType("ANY_NUM", 24, 8)
+OTHERS = TEXT, WIDE, COLOUR, SMALL, REF, POINTER, ROW, OTHER_ROW, LONGER, PLANE, PLAIN, BLOCK, OPEN, OPEN_PLANE, ANY, NUMBER
 VALUES = t.Elementary | t.StringType | t.EnumType
 NAMED = {kind.name: kind for kind in (*dict.fromkeys(t.ELEMENTARY.values()), *OTHERS)}
 
@@ -74,6 +76,11 @@ def test_types_are_taken_as_they_are_listed() -> None:
     if os.environ.get("FBVM_REWRITE"):
         KEPT.write_text(made, encoding="utf-8")
     assert made == KEPT.read_text(encoding="utf-8")
+
+
+def test_what_brings_its_bounds_or_its_type_is_no_value() -> None:
+    assert not any(a.assignable(kind, target) for kind in (OPEN, ANY) for target in NAMED.values())
+    assert not any(a.assignable(kind, target) for kind in NAMED.values() for target in (OPEN, ANY))
 
 
 # --- arguments that meet ------------------------------------------------------------------------------------------------
