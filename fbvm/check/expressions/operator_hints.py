@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.dialects import takers
-from fbvm.base.types import BOOL, DATE, Elementary, EnumType, StringType, StructType, Type, common
+from fbvm.base.types import BOOL, DATE, Elementary, EnumType, StringType, StructType, Type, base, common
 from fbvm.check.expressions.assignability import UNSIGNED, conversion_hint, convertible, is_untyped
 from fbvm.check.expressions.constants import limits
 from fbvm.check.expressions.scope import Scope
@@ -66,12 +66,12 @@ _SWITCHES = {
 def _time_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str | None:
     """What to write where one operand is a duration; None if that is not the mistake."""
     timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
-    if expr.op == "*" and timed == [False, True]:
+    if expr.op == "*" and timed[1] and _kind(left) in ("integer", "real"):
         return f"the {right} stands in front: {scope.text(expr.right)} * {scope.text(expr.left)}"
     if expr.op in "+-" and left == DATE and timed[1]:
         date, time = scope.text(expr.left), scope.text(expr.right)
         return f"a DATE has no time of day: write DT_TO_DATE(CONCAT_DATE_TOD({date}, TOD#0:0:0) {expr.op} {time})"
-    if any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
+    if any(timed) and expr.op in ("+", "-") and UNTYPED_INT in (left, right):
         return "a duration is written T#500ms"
     return None
 
@@ -109,7 +109,7 @@ def bit_hint(kind: Type, other: Type | None) -> str:
     names = {1: "BYTE", 2: "WORD", 4: "DWORD", 8: "LWORD"}
     if kind is UNTYPED_INT:
         return "write a typed literal such as WORD#16#FF"
-    return f"convert with {kind}_TO_{names[kind.size]}(...)" if is_any(kind, "ANY_INT") else ""
+    return f"convert with {base(kind)}_TO_{names[kind.size]}(...)" if is_any(kind, "ANY_INT") else ""
 
 
 def _meeting_hint(left: Type, right: Type) -> str:
