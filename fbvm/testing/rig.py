@@ -30,7 +30,7 @@ from fbvm.testing.reads import VariableReads
 from fbvm.testing.report import Report
 from fbvm.testing.subject import Stub, Subject, subject
 from fbvm.testing.value_types import for_writing
-from fbvm.testing.values import Values, value_of, write
+from fbvm.testing.values import Values, property_value, value_of, write
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.unit import Etn21
 from fbvm.watch.conditions import parse_condition
@@ -196,7 +196,11 @@ class Rig:
 
     def __getitem__(self, name: str) -> Any:
         __tracebackhide__ = True
-        return value_of(self.plc, self.find(name), self._reads.add)
+        try:
+            found = self.find(name)
+        except UnknownPlace as unknown:
+            return property_value(self.plc, self.subject.path(name.strip()), unknown)
+        return value_of(self.plc, found, self._reads.add)
 
     def __setattr__(self, name: str, value: object) -> None:
         __tracebackhide__ = True

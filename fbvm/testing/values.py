@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, SupportsIndex
+from weakref import WeakKeyDictionary
 
 from fbvm.base.types import ArrayType, StructType, base
 from fbvm.machine.plc import Plc
+from fbvm.step.facts import ProgramFacts
+from fbvm.step.properties import Properties
 from fbvm.testing.value_types import as_read, for_writing
 from fbvm.watch.names import element
 from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.scopes import Scope
 
 OnRead = Callable[[Place], None]
 """Called with the place of each variable that is read."""
+_properties: WeakKeyDictionary[Plc, Properties] = WeakKeyDictionary()
 
 
 def write(plc: Plc, place: Place | Span, value: object) -> None:
@@ -53,7 +58,11 @@ class Values:
             raise AttributeError(str(error)) from None
 
     def __getitem__(self, path: str) -> Any:
-        return value_of(self._plc, self._find(path), self._read)
+        try:
+            found = self._find(path)
+        except UnknownPlace as unknown:
+            return property_value(self._plc, f"{self._place.name}.{path}", unknown)
+        return value_of(self._plc, found, self._read)
 
     def __setitem__(self, path: str, value: object) -> None:
         write(self._plc, self._find(path), value)
@@ -110,6 +119,22 @@ def value_of(plc: Plc, found: Place | Span, read: OnRead) -> Any:
         value = as_read(found.type, plc.read(found))
         return Elements(plc, found, value, read) if isinstance(value, list) else value
     return plc.read(found)
+
+
+def property_value(plc: Plc, path: str, unknown: UnknownPlace) -> Any:
+    """The value of the property that a path such as `Main.pump.Starts` names, by its GET accessor.
+
+    Raises `unknown` if it names none, UnknownPlace for a method, ValueError if the accessor ends with a trap."""
+    if plc not in _properties:
+        _properties[plc] = Properties(ProgramFacts.of(plc))
+    properties, scope = _properties[plc], Scope(plc.find)
+    found = properties.read(path, scope, plc.memory)
+    if found is not None:
+        return as_read(found.place.type, found.value)
+    if properties.is_method(path, scope, plc.memory):
+        name = path.rpartition(".")[2]
+        raise UnknownPlace(f"{name} is a method: call it in a test in Structured Text")
+    raise unknown
 
 
 def as_dict(values: Values) -> dict[str, Any]:

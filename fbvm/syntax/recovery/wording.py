@@ -158,6 +158,10 @@ def _begins_test_outside(token: Token, kinds: set[str]) -> bool:
     return {"FUNCTION", "TYPE"} <= kinds and token.text.upper() in ("TEST", "TEST_PROGRAM", "TEST_FUNCTION_BLOCK", "SETUP")
 
 
+def _begins_part_of_block_outside(token: Token, kinds: set[str]) -> bool:
+    return {"FUNCTION", "TYPE"} <= kinds and token.text.upper() in ("METHOD", "PROPERTY", "ACTION", "TRANSITION")
+
+
 def _begins_structure_outside(token: Token, kinds: set[str]) -> bool:
     return token.type in ("STRUCT", "UNION") and {"FUNCTION", "TYPE"} <= kinds
 
@@ -179,6 +183,7 @@ def _is_number_without_digits(token: Token, kinds: set[str]) -> bool:
 _ADVICE: tuple[tuple[Callable[[Token, set[str]], bool], Callable[[Token], str]], ...] = (
     (_begins_type_or_value, lambda token: "a declaration has a type, and then its value: `x : INT := 5;`"),
     (_begins_test_outside, lambda token: f"{token.text} begins a test of STruC++ or truST: leave such files out"),
+    (_begins_part_of_block_outside, lambda token: f"{token.text.upper()} stands in its POU, in front of END_FUNCTION_BLOCK"),
     (_begins_statement_outside, lambda token: "statements stand in a POU: PROGRAM Main .. END_PROGRAM"),
     (_begins_structure_outside, lambda token: f"write TYPE Name : {token.type} .. END_{token.type} END_TYPE"),
     (_is_reserved_as_name, lambda token: f"{token.text} is a reserved word and cannot be a name"),

@@ -10,18 +10,16 @@ from expression_rows import NUMBERS, RUNS, STRINGS
 from hand_image import at, const, execute, image, load, power_on, store
 from rows import each_of
 from statement_rows import PROGRAMS
-from symbolic import held, term_value
+from symbolic import encoded_program, held, term_value
 
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import SIZES, Block, Node
-from fbvm.prove.encoding.cells import Cell, Contents, Partition, Reshape, constant_of
-from fbvm.prove.encoding.clocks import FixedCycle
+from fbvm.prove.encoding.cells import Cell
 from fbvm.prove.encoding.execution import Refused, Trapped
-from fbvm.prove.encoding.scan import Scanned, Signal, scan
-from fbvm.prove.encoding.terms import Term, Terms
+from fbvm.prove.encoding.scan import Scanned
+from fbvm.prove.encoding.terms import Term
 
-CYCLE_NS = 10_000_000
 NOT_ENCODED = {"raise", "mark", "count", "now", "store_bit with terms"}
 """Rows of what stands in no program that is proved (a trap that is raised again, marks and counters of tests), of the time, which
 the machine sets, and of a bit whose place is not known until the scan."""
@@ -29,32 +27,7 @@ the machine sets, and of a bit whose place is not known until the scan."""
 
 def encoded(code: Block, memory: bytes, budget: int, inputs: set[int]) -> tuple[Scanned, dict[Term, Cell]]:
     """The scan of a program that is this code, and the variables of the bytes `inputs`."""
-    terms, numbers, program = Terms(), frozenset[int](), image(code)
-    clock = FixedCycle(terms, program.tasks, CYCLE_NS)
-    variables: dict[Term, Cell] = {}
-
-    def initial(cell: Cell) -> Term:
-        if not inputs.issuperset(range(cell.offset, cell.offset + cell.size)):
-            return constant_of(terms, cell, memory[cell.offset : cell.offset + cell.size])
-        variable = terms.variable(cell, cell.width)
-        variables[variable] = cell
-        return variable
-
-    def signal(asked: Signal) -> Term:
-        known = clock.value(0, asked)
-        return terms.boolean(asked[0] == "fresh") if known is None else known
-
-    while True:
-        partition = Partition(numbers)
-        try:
-            while True:
-                before = len(partition.at)
-                variables.clear()
-                scanned = scan(program, Contents(terms, partition, initial), signal, budget)
-                if len(partition.at) == before:
-                    return scanned, variables
-        except Reshape as reshape:
-            numbers |= {reshape.offset}
+    return encoded_program(image(code), memory, budget, inputs)
 
 
 def compare(code: Block, before: dict[int, bytes], *, budget: int = 100_000, unknown: bool = False) -> None:

@@ -65,13 +65,18 @@ _PLAIN: dict[str, Any] = {
 
 def encoded(plc: Plc, inputs: Sequence[Place]) -> tuple[Scanned, dict[Term, Cell]]:
     """The first scan, and the variables of the cells that lie in the inputs."""
-    memory, terms, numbers = bytes(plc.memory.u8), Terms(), frozenset[int]()
-    clock = FixedCycle(terms, plc.image.tasks, CYCLE_NS)
     inside = {at for place in inputs for at in range(place.offset, place.offset + max(1, place.type.size))}
+    return encoded_program(plc.image, bytes(plc.memory.u8), BUDGET, inside)
+
+
+def encoded_program(program: Image, memory: bytes, budget: int, inputs: set[int]) -> tuple[Scanned, dict[Term, Cell]]:
+    """The first scan of a program in this memory, and the variables of the cells that lie in the bytes `inputs`."""
+    terms, numbers = Terms(), frozenset[int]()
+    clock = FixedCycle(terms, program.tasks, CYCLE_NS)
     variables: dict[Term, Cell] = {}
 
     def initial(cell: Cell) -> Term:
-        if not inside.issuperset(range(cell.offset, cell.offset + cell.size)):
+        if not inputs.issuperset(range(cell.offset, cell.offset + cell.size)):
             return constant_of(terms, cell, memory[cell.offset : cell.offset + cell.size])
         variable = terms.variable(cell, cell.width)
         variables[variable] = cell
@@ -87,7 +92,7 @@ def encoded(plc: Plc, inputs: Sequence[Place]) -> tuple[Scanned, dict[Term, Cell
             while True:
                 before = len(partition.at)
                 variables.clear()
-                scanned = scan(plc.image, Contents(terms, partition, initial), signal, BUDGET)
+                scanned = scan(program, Contents(terms, partition, initial), signal, budget)
                 if len(partition.at) == before:
                     return scanned, variables
         except Reshape as reshape:

@@ -132,6 +132,32 @@ def test_elements_of_an_array_are_read_and_written_in_place() -> None:
         rig.channels[2].Raw = 1
 
 
+WITH_PROPERTIES = """
+    FUNCTION_BLOCK Pump
+    VAR_INPUT Run : BOOL; END_VAR
+    VAR count, divisor : INT; END_VAR
+        IF Run THEN count := count + 1; END_IF
+    PROPERTY PUBLIC Starts : INT GET Starts := count * 2; END_GET END_PROPERTY
+    PROPERTY PUBLIC Share : INT GET Share := 100 / divisor; END_GET END_PROPERTY
+    METHOD PUBLIC Reset count := 0; END_METHOD
+    END_FUNCTION_BLOCK
+    """
+MAIN = "PROGRAM Main VAR pumps : ARRAY[1..2] OF Pump; END_VAR pumps[2](Run := TRUE); END_PROGRAM"
+
+
+def test_properties_are_read_as_variables_are() -> None:
+    block = Rig.of("Pump", text=WITH_PROPERTIES)
+    whole = Rig.of("Main", text=WITH_PROPERTIES + MAIN)
+    assert block.scan(Run=True).Starts == 2 and block["starts"] == 2
+    assert whole.scan()["pumps[2].Starts"] == 2 == whole.pumps[1].Starts
+    with pytest.raises(ValueError, match="Share cannot be computed: R0101"):
+        block["Share"]
+    with pytest.raises(AttributeError, match="Reset is a method: call it in a test in Structured Text"):
+        block.Reset()
+    with pytest.raises(AttributeError, match="has no Stops"):
+        block.Stops  # noqa: B018
+
+
 def test_variables_of_an_instance_are_attributes() -> None:
     rig = Rig.of("Main", text="PROGRAM Main VAR d : TON; END_VAR d(IN := TRUE, PT := T#30ms); END_PROGRAM")
     rig.scan()
