@@ -10,7 +10,7 @@ from lsprotocol import types
 from fbvm.lsp.projects import path_of
 from fbvm.lsp.server import Server
 
-WATCHED = ("**/*.st", "**/fbvm.toml", "**/*.{TcPOU,TcDUT,TcGVL,TcIO,TcTTO,plcproj,tsproj,cxp,cxt}")
+WATCHED = ("**/*.st", "**/fbvm.toml", "**/*.{TcPOU,TcDUT,TcTLEO,TcGVL,TcIO,TcTTO,plcproj,tsproj,cxp,cxt}")
 """Files whose changes on disk the editor tells of."""
 
 

@@ -47,6 +47,12 @@ def test_types_and_programs_need_no_more_than_they_say() -> None:
     assert code(MAIN)[-1] == "END_PROGRAM"
 
 
+def test_an_enumeration_with_a_text_list_is_a_type() -> None:
+    text = HEAD + """<EnumerationTextList Name="E" Id="{1}"><Declaration><![CDATA[TYPE E : (One, Two) BYTE; END_TYPE
+]]></Declaration><XmlArchive><Data><o><v n="TextID">"One"</v></o></Data></XmlArchive></EnumerationTextList></TcPlcObject>"""
+    assert code(text) == ["TYPE E : (One, Two) BYTE; END_TYPE"]
+
+
 def test_an_interface_has_prototypes() -> None:
     itf = HEAD + """<Itf Name="I_Count" Id="{1}"><Declaration><![CDATA[INTERFACE I_Count
 ]]></Declaration>

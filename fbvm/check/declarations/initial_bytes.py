@@ -50,6 +50,7 @@ def initial_bytes(scope: Scope, kind: Type, init: tree.Initial, default: bytes) 
         return bytes(8)
     if isinstance(kind, RefType) and starts(kind, init):
         scope.project.dependencies.repeatable = False
+        init = references.without_this(init)
         return references.placeholder(scope.facts, Start(references.named(init), init, kind, scope.source, scope.pou, scope.late))
     if isinstance(kind, ArrayType | StructType):
         return _whole(scope, kind, init, default)

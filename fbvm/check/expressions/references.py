@@ -27,6 +27,7 @@ from fbvm.check.expressions.values import MAKERS, is_null
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Facts, Holder, StandardCall, Start, Variable
 from fbvm.syntax import tree
+from fbvm.syntax.tree.node import changed
 
 _ROOM = 255
 """Characters that the place of a constant text has at least."""
@@ -152,6 +153,19 @@ def named(init: tree.Expr) -> tree.Expr:
         assert init.arguments[0].value is not None
         return init.arguments[0].value
     return init
+
+
+def without_this(init: tree.Expr) -> tree.Expr:
+    """The same initial value with the names alone of variables of the instance: x for THIS^.x, ADR(x) for ADR(THIS^.x)."""
+    if named(init) is not init and isinstance(init, tree.Call):
+        return changed(init, arguments=(changed(init.arguments[0], value=without_this(named(init))),))
+    if not isinstance(init, tree.Member | tree.Index):
+        return init
+    of = init.of.of if isinstance(init.of, tree.Deref) else init.of
+    if isinstance(init, tree.Member) and isinstance(of, tree.NameRef) and fold(of.text) == "THIS":
+        return tree.NameRef(init.name.start, init.name.end, init.name.text)
+    inner = without_this(init.of)
+    return init if inner is init.of else changed(init, of=inner)
 
 
 def placeholder(facts: Facts, start: Start) -> bytes:

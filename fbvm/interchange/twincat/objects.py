@@ -17,7 +17,7 @@ from fbvm.interchange.markup import Element, parse_markup
 from fbvm.interchange.twincat.drawings import LANGUAGES, Drawings, Owner
 
 ROOT = "TcPlcObject"
-_CHILDREN = {"POU": "", "Itf": "INTERFACE", "DUT": "", "GVL": "", "Task": ""}
+_CHILDREN = {"POU": "", "Itf": "INTERFACE", "DUT": "", "EnumerationTextList": "", "GVL": "", "Task": ""}
 """Children of the root, and what each of them declares where its text need not be asked."""
 _OTHERS = {"LADDER": "ladder", "SFC": "a sequential function chart"}
 _NO_CODE = re.compile(r"//[^\n]*|\(\*.*?\*\)|\{[^}]*\}|'(?:\$.|[^'$])*'", re.S)
