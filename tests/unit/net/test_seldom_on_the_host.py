@@ -116,7 +116,7 @@ def test_a_connection_that_breaks_while_it_is_read_is_told(error: OSError, wante
         real = made.sock
         made.sock = SimpleNamespace(recv=lambda *size: raised(error), fileno=real.fileno, close=lambda: None,
                                     getsockopt=lambda *what: 0, setsockopt=lambda *what: None)
-        made._receive(made.sock, 0)
+        made.fetch(0)
         assert list(host.link.pending) == wanted
         if not wanted:
             made.sock = real
