@@ -6,8 +6,11 @@ import random
 import re
 from itertools import combinations
 
+import pytest
+
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.code.operations import Address
+from fbvm.engine.native.emit import alias_scopes
 from fbvm.engine.native.emit.alias_scopes import FIRST_NUMBER, AliasScopes, resolved
 from fbvm.engine.ranges import with_temporaries
 
@@ -121,3 +124,14 @@ def test_a_checked_subscript_that_was_worked_out_before_stays_within_its_bounds(
         for access in (element, behind):
             scopes.mark(*access)
         assert claims(scopes) == wanted
+
+
+@pytest.mark.parametrize(("most", "apart"), [(3, 6), (2, 3), (16, 6)])
+def test_of_so_many_ranges_each_is_told_apart_and_of_more_they_are_one(monkeypatch: pytest.MonkeyPatch, most: int,
+                                                                       apart: int) -> None:
+    """Three arrays and a variable: six pairs, or three between the arrays as one and the variable."""
+    monkeypatch.setattr(alias_scopes, "MOST", most)
+    accesses: list[tuple[Address, int]] = [(("abs", AREA + 1000 * number, ((1, BYTE),)), 1) for number in range(3)]
+    found = claims(scopes_of([*accesses, (("abs", AREA + 5000, ()), 1)], (INSTANCES, INSTANCES + 1), INSTANCES))
+    pairs = {pair for pair in combinations(range(4), 2) if pair in found and pair[::-1] in found}
+    assert len(pairs) == apart and {(0, 3), (1, 3), (2, 3)} <= pairs
