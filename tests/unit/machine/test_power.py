@@ -229,6 +229,7 @@ VAR a, b, c, d : BOOL; n, i : INT; END_VAR
         d := NOT b;
     END_CASE;
     FOR i := 1 TO 3 DO d := a AND i > 2; END_FOR
+    d := b XOR c; a := NOT (b = (c XOR d));
     WHILE c DO c := d AND NOT c; END_WHILE
     REPEAT b := c; UNTIL TRUE END_REPEAT
 END_PROGRAM"""
