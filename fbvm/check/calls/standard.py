@@ -367,9 +367,9 @@ def _limited(scope: Scope, call: tree.Call, bound: Type, row: Signature) -> Type
         return string(functions.RESULT_STRING, bound.name == "WCHAR")
     if not good or is_block(bound):
         shown = " or ".join(_SHOWN.get(limit, limit) for limit in row.limits)
+        is_length = row.key == "LEN" and isinstance(bound, ArrayType | OpenArrayType)
         scope.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}",
-                    "an instance cannot be copied" if is_block(bound) else BOUNDS_HINT
-                    if isinstance(bound, ArrayType | OpenArrayType) else "")
+                    "an instance cannot be copied" if is_block(bound) else BOUNDS_HINT if is_length else "")
         return None
     return bound
 
