@@ -57,6 +57,17 @@ def test_names_of_files_are_those_of_msbuild_and_windows(tmp_path: Path, include
     assert made.errors == [] and Path(made.sources[0].name) == tmp_path / file
 
 
+def test_a_program_of_a_library_that_a_task_calls_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    path = write_project(tmp_path)
+    task = next(tmp_path.rglob("*.TcTTO"))
+    text = task.read_text(encoding="utf-8").replace("<PouCall>", "<PouCall><Name>VisuElems.Visu_Prg</Name></PouCall><PouCall>", 1)
+    task.write_text(text, encoding="utf-8")
+    made = read_project(path)
+    assert "VisuElems" not in made.sources[-1].text and "PROGRAM MAIN WITH PlcTask : MAIN;" in made.sources[-1].text
+    assert [found.message for found in made.diagnostics if "VisuElems" in found.message] == [
+        "the task PlcTask calls VisuElems.Visu_Prg, a program of a library, and that is left out"]
+
+
 def test_what_is_no_project(tmp_path: Path) -> None:
     path = tmp_path / "Plant.plcproj"
     path.write_text("<TcSmProject/>", encoding="utf-8")

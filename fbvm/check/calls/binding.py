@@ -115,6 +115,8 @@ def _named(scope: Scope, argument: tree.Argument, pou: Pou, bound: PouCall, give
     name = fold(argument.name.text)
     name = pou.other_names.get(name, name)
     if name in given:
+        if argument.kind == "=>" and argument.value is None:
+            return  # this says nothing, as TwinCAT's editor writes it
         scope.error("S0403", argument.name, f"{argument.name.text} is given twice")
         return
     given[name] = argument

@@ -56,6 +56,7 @@ def read_project(path: Path, settings: Mapping[str, TaskSettings] | None = None)
     if tasks:
         sources.append(task_source(str(path), tasks, _property(root, "Name"), settings))
         diagnostics += _other_settings(xml, root, tasks, settings or {})
+        diagnostics += _of_libraries(xml, root, tasks)
     return Imported({source.name: source.text for source in sources}, diagnostics, "twincat",
                     f"{path.name} is a project of TwinCAT", tuple(map(referred, references(root))),
                     uses=tuple(used_projects(path, root)), parameters=parameters(root))  # fmt: skip
@@ -80,6 +81,20 @@ def _other_settings(xml: Source, root: Element, tasks: list[Element],
             yield Diagnostic("X0292", xml, root.at, root.at + 1,
                              f"the system gives the task {name} {held.cycle_us} us and priority {held.priority}, its own file "
                              f"{own.cycle_us} us and {own.priority}", "the system's hold")  # fmt: skip
+
+
+def _of_libraries(xml: Source, root: Element, tasks: list[Element]) -> Iterator[Diagnostic]:
+    """What is said of programs of libraries that tasks call, such as the one of the visualisation."""
+    for task in tasks:
+        for call in (name for name in _called(task) if "." in name):
+            yield Diagnostic("X0190", xml, root.at, root.at + 1,
+                             f"the task {task.get('Name')} calls {call}, a program of a library, and that is left out")
+
+
+def _called(task: Element) -> list[str]:
+    """The programs that a task calls, in their order."""
+    calls = [named.text.strip() for call in task.all("PouCall") for named in call.all("Name")]
+    return [call for call in calls if _IDENTIFIER.fullmatch(call)]
 
 
 def _property(root: Element, name: str) -> str:
@@ -147,8 +162,7 @@ def configuration(tasks: list[Element], application: str = "", settings: Mapping
         name = task.get("Name") if _IDENTIFIER.fullmatch(task.get("Name")) else f"Task_{number + 1}"
         held = (settings or {}).get(task.get("Name"), _own(task))
         lines.append(f"    TASK {name}(INTERVAL := T#{held.cycle_us}us, PRIORITY := {held.priority});")
-        calls = [named.text.strip() for call in task.all("PouCall") for named in call.all("Name")]
-        programs += [f"    PROGRAM {call} WITH {name} : {call};" for call in calls if _IDENTIFIER.fullmatch(call)]
+        programs += [f"    PROGRAM {call} WITH {name} : {call};" for call in _called(task) if "." not in call]
     return "\n".join([*lines, *programs, "END_RESOURCE", "END_CONFIGURATION", ""])
 
 
