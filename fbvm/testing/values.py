@@ -11,8 +11,7 @@ from fbvm.machine.plc import Plc
 from fbvm.step.facts import ProgramFacts
 from fbvm.step.properties import Properties
 from fbvm.testing.value_types import as_read, for_writing
-from fbvm.watch.names import element
-from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.paths import Place, Span, UnknownPlace, element
 from fbvm.watch.scopes import Scope
 
 OnRead = Callable[[Place], None]

@@ -243,7 +243,10 @@ def _part(place: Place, offset: int) -> Place | None:
     """The element or member of a place that holds a byte; None for what lies between members."""
     kind = base(place.type)
     if isinstance(kind, ArrayType):
-        return element(place, kind, (offset - place.offset) // kind.element.size)
+        size = kind.element.size
+        number = (offset - place.offset) // size
+        name = f"{place.name}[{', '.join(map(str, _subscripts(kind, number)))}]"
+        return place.inner(name, kind.element, number * size)
     assert isinstance(kind, StructType)
     for field in kind.fields.values():
         size = 8 if field.reference else field.type.size
@@ -251,12 +254,6 @@ def _part(place: Place, offset: int) -> Place | None:
             inner = member(place, field.name)
             return replace(inner, type=_bound(field.type), hops=()) if inner.hops else inner
     return None
-
-
-def element(array: Place, kind: ArrayType, number: int) -> Place:
-    """The element of an array of that type by its number in memory, from 0 on."""
-    name = f"{array.name}[{', '.join(map(str, _subscripts(kind, number)))}]"
-    return array.inner(name, kind.element, number * kind.element.size)
 
 
 def _subscripts(kind: ArrayType, number: int) -> list[int]:

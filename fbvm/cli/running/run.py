@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ from fbvm.run import loop
 from fbvm.run.interactive import Control
 from fbvm.run.plant import ENDLESS
 from fbvm.run.running import EVENT, PACES, Running, TimedWrite
+from fbvm.watch.paths import Place, Span
 from fbvm.watch.places import parse_for
 
 NEVER_WITH_DEBUG = {"journal": "--journal", "trace": "--trace", "html": "--html", "rungs": "--ladder", "charts": "--sfc",
@@ -140,13 +142,14 @@ def command(
         for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
         try_doors(plc, network, options["mappings"], options["doors"])
+        prepared = _prepared(plc, **options)
         html = options["html"]
         with record_run(options, said, html is not None) as recorded, _drawn(plc, options["rungs"], options["charts"]):
             if recorded.recording:
                 text = program_text(files, libraries, program=program, drawn=drawn, e_banks=tuple(banks),
                                     **compile_options(files))  # fmt: skip
                 recorded.add(files[0].stem if files else "PLC", plc, described(plc, text, options, files, libraries))
-            result = _run(plc, as_json, capture, recorded, files=files, libraries=libraries, **options)
+            result = _run(prepared, as_json, capture, recorded, files=files, libraries=libraries, **options)
             recorded.only_last = result.reason == "interrupted"
         if html:
             write_page(recorded, html, statement_lines(image, files, libraries))
@@ -193,22 +196,48 @@ def _plc(image: Image, cycle_ns: int, engine: str) -> Plc:
         raise click.UsageError(str(error)) from None
 
 
-def _run(
-    plc: Plc, as_json: bool, capture: Capture | None, recorded: RunRecording, *,
-    settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
-    pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
-    scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], debug_port: int | None,
-    files: tuple[Path, ...], libraries: tuple[Path, ...], **_: Any,
-) -> RunResult:  # fmt: skip
-    """Runs to the end.  Raises UsageError for names, values and conditions that do not fit the program."""
-    for warning in plc.warnings:
-        say(warning, fg="yellow", err=True)
+@dataclass(frozen=True)
+class _Prepared:
+    """A run that can begin: its options fit the program."""
+
+    running: Running
+    writes: list[TimedWrite]
+    shown: dict[str, Place | Span]
+    recorder: Recorder | None
+
+
+def _prepared(
+    plc: Plc, *, settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...], pace: str, scans: int | None,
+    for_ns: int | None, until: str | None, max_ns: int | None, lines: tuple[str, ...], watched: tuple[str, ...],
+    conditions: tuple[str, ...], **_: Any,
+) -> _Prepared:  # fmt: skip
+    """The run with its names looked up, before any file is written.
+
+    Raises UsageError for names, values and conditions that do not fit the program."""
     try:
         writes = [_write(plc, given) for given in settings]
         places = {text: plc.find(text) for text in shown}
         names = charted_names(charted)
         recorder = Recorder(plc, names) if names else None
         set_breakpoints(plc, lines, watched, conditions)
+        most = ENDLESS if scans is None else scans
+        running = Running(plc, scans=most, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace)
+    except (LookupError, TypeError, ValueError) as error:
+        raise click.UsageError(str(error)) from None
+    return _Prepared(running, writes, places, recorder)
+
+
+def _run(
+    prepared: _Prepared, as_json: bool, capture: Capture | None, recorded: RunRecording, *,
+    settings: tuple[Setting, ...], scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
+    scan_time: bool, debug_port: int | None, files: tuple[Path, ...], libraries: tuple[Path, ...], **_: Any,
+) -> RunResult:  # fmt: skip
+    """Runs to the end.  Raises UsageError for values that do not fit the program when they are written."""
+    running = prepared.running
+    plc = running.plc
+    for warning in plc.warnings:
+        say(warning, fg="yellow", err=True)
+    try:
         with RunProgress(None if as_json else plc, scans, for_ns or max_ns) as shown_progress:
 
             def progress() -> None:
@@ -217,16 +246,14 @@ def _run(
                 if capture:  # of a quiet network a buffer would take minutes to fill
                     capture.flush()
 
-            most = ENDLESS if scans is None else scans
-            running = Running(plc, scans=most, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace)
             _execute(running, debug_port, files, libraries, progress)
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
-    for write, given in zip(writes, settings, strict=True):
+    for write, given in zip(prepared.writes, settings, strict=True):
         if not plc.scans or write.at_ns > plc.now_ns:
             say(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
     wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
-    return RunResult(plc, running.reason, places, recorder, as_json, until or "", wanted)
+    return RunResult(plc, running.reason, prepared.shown, prepared.recorder, as_json, until or "", wanted)
 
 
 @contextmanager

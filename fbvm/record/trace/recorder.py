@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, RefType, StringType, base
+from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, RefType, StringType, StructType, base
 from fbvm.machine.plc import Plc
 from fbvm.watch.names import Names
-from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.paths import Place, Span, UnknownPlace, element, member
 from fbvm.watch.values import Value, show
 
 HEXADECIMAL_AREAS = frozenset(("CIO", "W", "H", "A"))
@@ -147,8 +147,19 @@ def signal(place: Place, description: str = "", meanings: Mapping[int, str] | No
     """The signal of one place.  Raises TypeError for an array or a structure."""
     if not is_charted(place) and not isinstance(place.type, RefType):
         whole = "elements" if isinstance(base(place.type), ArrayType) else "members"
-        raise TypeError(f"{place.name} is {place.type.name}, which is no single value; name its {whole}")
+        said = f"; name its {whole}, such as {example}" if (example := _first_value(place)) else ""
+        raise TypeError(f"{place.name} is {place.type.name}, which is no single value{said}")
     return Signal(place, place.name.replace("CIO ", "CIO"), description, tuple((meanings or {}).items()))
+
+
+def _first_value(place: Place) -> str:
+    """The name of the first single value in an array or a structure, "" if it has none."""
+    kind = base(place.type)
+    if isinstance(kind, ArrayType):
+        return _first_value(element(place, kind, 0))
+    if not isinstance(kind, StructType):
+        return place.name
+    return next((name for field in kind.fields.values() if (name := _first_value(member(place, field.name)))), "")
 
 
 def is_charted(place: Place) -> bool:

@@ -161,6 +161,11 @@ def test_a_chart_is_drawn(counter: str) -> None:
     """
 
 
+def test_a_chart_that_cannot_be_drawn_leaves_no_file(counter: str) -> None:
+    result = run("--scans", "1", "--chart", "Main.list", "--trace", "wrong.fbtrace", "--html", "wrong.html")
+    assert (result.exit_code, [*Path.cwd().glob("wrong.*")]) == (2, [])
+
+
 @pytest.mark.slow
 def test_quiet_in_a_pipe(counter: str) -> None:
     assert run("--scans", "5000").output == ""
@@ -185,7 +190,7 @@ def test_quiet_in_a_pipe(counter: str) -> None:
     (["--scans", "1", "--set", "D5..D7=1"], "D5..D7 takes 3 values parted by commas, 1 given"),
     (["--scans", "1", "--show", "n"], "did you mean Main.n?"),
     (["--scans", "1", "--show", "D99999"], "D ends at 32767; 99999 does not exist"),
-    (["--scans", "1", "--chart", "Main.list"], "which is no single value; name its elements"),
+    (["--scans", "1", "--chart", "Main.list"], "which is no single value; name its elements, such as Main.list["),
     (["--scans", "1", "--map", "1.2.3.4:502"], "is not IP:PORT=HOST:PORT or IP:PORT=peer"),
     (["--scans", "1", "--map", "server:502=peer"], "'server' is no IPv4 address"),
     (["--scans", "1", "--map", "1.2.3.4:502=host"], "'host' is not an address and a port"),
