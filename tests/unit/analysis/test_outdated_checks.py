@@ -28,3 +28,18 @@ def test_each_check_frees_what_the_ones_before_the_last_knew(
         counts.append(len(gone))
         known.append(program.checked.project)
     assert counts == freed and all(one is other for one, other in zip(gone, known, strict=False)), "the oldest first"
+
+
+def test_a_file_that_is_removed_is_missed_by_the_next_check() -> None:
+    program = Program()
+    program.replace("main.st", "PROGRAM Main\nVAR p : Pump; END_VAR\n    p();\nEND_PROGRAM\n")
+    program.replace("Pump.st", "FUNCTION_BLOCK Pump\nEND_FUNCTION_BLOCK\n")
+    program.check_all()
+    before = program.revision
+    program.remove("nowhere.st")
+    assert program.is_current and program.revision == before, "nothing has changed"
+    program.remove("Pump.st")
+    assert not program.is_current and program.revision == before + 1 and list(program.files) == ["main.st"]
+    assert not program.check_changes(), "others may see what is gone"
+    program.check_all()
+    assert [each.code for each in program.diagnostics("main.st")] == ["S0204"]
