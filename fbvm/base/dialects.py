@@ -119,6 +119,7 @@ class Dialect:
     functions_have_inputs: bool = False
     plain_names: bool = False
     locals_hide_results: bool = False
+    selects_at_first: bool = False
     dynamic_memory: str = ""
     """Whether there are __NEW and __DELETE: "marked" if they want an attribute at what is made, "free" if they do not."""
     offered: bool = True
@@ -296,6 +297,8 @@ QUESTIONS = {
                     "Init is the variable, Init.X and Init.T are the flags of the step, with a warning (S0193)"),
     "locals_hide_results": ("FUNCTION Test with VAR Test: a local variable named as the function", "an error",
                             "the variable, and the function returns the first value of its type, with a warning (S0193)"),
+    "selects_at_first": ("SEL(p <> 0, 0, p^.n): the input that is not chosen", "worked out, too: a null pointer stops it",
+                         "not worked out"),
     "dynamic_memory": ("p := __NEW(Motor); __DELETE(p);", "an error (S0903)",
                        "make and end variables while the program runs: with {attribute 'enable_dynamic_creation'} at blocks "
                        "and types of no library, under strucpp without it"),
@@ -328,7 +331,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True,
                    assignments_are_values=True, signs_are_lost=True, generic_constants=True,
                    short_addresses=True,
-                   dates_take_durations=True, dynamic_memory="marked")
+                   dates_take_durations=True, dynamic_memory="marked", selects_at_first=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

@@ -17,7 +17,8 @@ from fbvm.syntax import tree
 
 _PARAMETERS = {"SIZEOF": ["IN"], "XSIZEOF": ["IN"], "LOWER_BOUND": ["ARR", "DIM"], "UPPER_BOUND": ["ARR", "DIM"],
                "__ISVALIDREF": ["REF"], "__POUNAME": [], "__POSITION": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"],
-               "__QUERYINTERFACE": ["ITFOBJECT", "ITFDST"], "__QUERYPOINTER": ["ITFOBJECT", "PDST"]}
+               "__QUERYINTERFACE": ["ITFOBJECT", "ITFDST"], "__QUERYPOINTER": ["ITFOBJECT", "PDST"],
+               "__ISDYNAMIC": ["POINTER"]}
 REFUSED = {
     "INDEXOF": ("S0901", "gives the number of a POU in the runtime system of CODESYS", "no program here needs it"),
     "ADRINST": ("S0901", "gives the place of the own instance", "pass the instance as VAR_IN_OUT"),
@@ -52,6 +53,8 @@ def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | str | None:
         return _position(scope, call)
     if name == "__ISVALIDREF":
         return _is_bound(scope, call, values[0])
+    if name == "__ISDYNAMIC":
+        return _is_dynamic(scope, call, values[0])
     if name in ("__QUERYINTERFACE", "__QUERYPOINTER"):
         return _query(scope, call, name, values[0], values[1])
     if name == "BITADR":
@@ -86,6 +89,18 @@ def _is_bound(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
         scope.error("S0405", value, "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
         return None
     scope.facts.calls[call] = StandardCall("__ISVALIDREF", [(value, kind)])
+    return BOOL
+
+
+def _is_dynamic(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
+    """__ISDYNAMIC(p): TRUE if a pointer is one to what __NEW has made."""
+    kind = scope.infer(value)
+    if kind is None:
+        return None
+    if not isinstance(kind, RefType) or not kind.moves:
+        scope.error("S0405", value, f"__ISDYNAMIC asks a POINTER TO, this is {kind}")
+        return None
+    scope.facts.calls[call] = StandardCall("__ISDYNAMIC", [(value, kind)])
     return BOOL
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
-from fbvm.base.types import ANY_SIZE, BOOL, NULL, Type, machine
+from fbvm.base.types import ANY_SIZE, BOOL, NULL, Type, base, machine
 from fbvm.check.calls.dynamic_memory import DELETE, NEW
 from fbvm.check.symbols.facts import Guard, PouCall, StandardCall
 from fbvm.code.builder.constants import TRUE, zero
@@ -115,10 +116,31 @@ def _standard(body: BodyContext, called: StandardCall, call: tree.Call) -> Node:
         return intrinsic(body, called)
     if called.key == NEW:
         return dynamic_memory.new(body, call)
+    if called.key == "SEL" and body.dialect.selects_at_first and any(map(partial(_is_work, body), called.arguments[1:])):
+        return _selected(body, called)
     arguments, site = body.operands(*called.arguments), body.site(call)
     if called.key == "__PLC_WORDS":
         return plc_addresses.words_from(body, arguments[0])
     return FUNCTIONS[called.key](body, arguments, called, site)
+
+
+def _is_work(body: BodyContext, argument: tuple[tree.Expr, Type]) -> bool:
+    """True if an argument is more than a constant or a variable."""
+    return argument[0] not in body.facts.constants and not isinstance(argument[0], tree.NameRef)
+
+
+def _selected(body: BodyContext, called: StandardCall) -> Node:
+    """SEL in a dialect that works out only the input that is chosen."""
+    (chooser, wanted), first, second = called.arguments
+    condition, form = body.value(chooser, wanted), machine(base(first[1]))
+    result = body.to_temporary(zero(form), always=True)
+    blocks = []
+    for expr, kind in (second, first):
+        with body.block() as inner:
+            inner.append(("let", result[2], form, body.value(expr, kind)))
+        blocks.append(tuple(inner))
+    body.emit(("if", ((condition, blocks[0]),), blocks[1]))
+    return result
 
 
 def _bound(body: BodyContext, called: StandardCall) -> Node:
@@ -127,6 +149,7 @@ def _bound(body: BodyContext, called: StandardCall) -> Node:
 
 _INTRINSICS: dict[str, Callable[[BodyContext, StandardCall], Node]] = {
     "REF": lambda body, called: pointers.reference_to(body, called.arguments[0][0]),
+    "__ISDYNAMIC": lambda body, called: dynamic_memory.is_made(body, called.arguments[0][0]),
     "__ISVALIDREF": lambda body, called: pointers.is_valid(body, called.arguments[0][0]),
     "SIZEOF": lambda body, called: (
         "convert", "u32", "i64", any_parameters.number(body, called.arguments[0][0], ANY_SIZE)),

@@ -19,7 +19,7 @@ from fbvm.code.layout.objects import headers
 from fbvm.code.lowering import pointers, pou_calls
 from fbvm.code.lowering.context import BodyContext
 from fbvm.code.lowering.step_costs import UNITS_A_STEP
-from fbvm.code.operations import HEAP_TRAPS, OBJECT_SHIFT, Block, Node
+from fbvm.code.operations import HEAP_TRAPS, LEASED, OBJECT_SHIFT, Block, Node
 from fbvm.syntax import tree
 
 _CHARGED = 8
@@ -79,6 +79,17 @@ def delete(body: BodyContext, call: tree.Call) -> None:
             body.write(place, _NULL, site)
         body.emit(_execute(body, "__DELETE of it", heap.giving, site))
     body.emit(("if", ((("ne", "b", "ref", reference, _NULL), tuple(ending)),), ()))
+
+
+def is_made(body: BodyContext, pointer: tree.Expr) -> Node:
+    """Whether a pointer is one to what __NEW has made."""
+    reference = body.value(pointer)
+    if not body.program.has_heap:
+        body.to_temporary(reference)
+        return ("const", "b", 0)
+    objects = body.program.objects
+    first = LEASED + (objects.heap_row << objects.held_bits)
+    return ("ge", "b", "u64", ("bits", "u64", "ref", reference), ("const", "u64", first << OBJECT_SHIFT))
 
 
 def _run(body: BodyContext, calls: list[tree.Call]) -> None:
