@@ -32,7 +32,9 @@ Row = tuple[str, str, str]
 PYTHON = {"logic": 130, "pid": 400, "crc": 220, "mtcp": 760}
 MACHINE = {"logic": 0.8, "pid": 1.5, "crc": 1.4, "mtcp": 2.5}
 """The limits of a scan of the four programs, as multiples of C by hand."""
-MANY = (("logic", 1_000), ("logic", 10_000), ("polling", 1_000))
+MOST = 10_000
+"""The memory of each is promised of so many: with 1,000 the compiler's 50 MiB, which are there once, are more than their own."""
+MANY = (("logic", 1_000), ("logic", MOST), ("polling", 1_000))
 AT_ONCE = 8
 ROUNDS = 9
 """In how many rounds two servers take turns."""
@@ -103,7 +105,7 @@ def many() -> Iterator[Row]:
     for name, count in MANY:
         told = subprocess.check_output([sys.executable, str(BENCH / "many.py"), name, str(count), "cyclic", "100"], text=True)
         _, _, _, _, kib, core, _, each, _, _, missed, *_ = told.split()
-        limits = "<= 25 %, 0, 50 KiB" if name == "logic" else "<= 100 %, 0"
+        limits = "<= 100 %, 0" if name != "logic" else "<= 25 %, 0, 50 KiB" if count == MOST else "<= 25 %, 0"
         yield f"{count:,} PLCs at 100 ms, {name}: of a core, missed, each", f"{core} %, {missed}, {kib} KiB", limits
         yield "  a scan of one, with the start", f"{each} us", ""
 
