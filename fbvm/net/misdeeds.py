@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import random
-from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from weakref import WeakSet
 
@@ -236,13 +235,13 @@ class _Deaf(Station):
     deaf = True
 
 
-def _previous(kept: int, change: Callable[[bytes, bytes], bytes]) -> Reply:
-    """Replies made of the right one and the one `kept` requests before."""
-    said: deque[bytes] = deque(maxlen=kept + 1)
+def _with_previous(combine: Callable[[bytes, bytes], bytes]) -> Reply:
+    """Replies that `combine` makes of the reply to the request before, b"" for the first one, and the right reply."""
+    previous = b""
 
     def reply(frame: bytes) -> Actions:
-        said.append(frame)
-        data = change(said[0] if len(said) > kept else b"", frame)
+        nonlocal previous
+        data, previous = combine(previous, frame), frame
         return (Say(data),) if data else ()
 
     return reply
@@ -280,9 +279,9 @@ RUDE_PEERS: dict[str, Callable[[ModbusServer], Station]] = {
     "resets in mid-request": lambda server: RudePeer(server, on_bytes=[Reset()]),
     "hears every second request": lambda server: RudePeer(server, _every_second()),
     # Replies.
-    "previous reply instead": lambda server: RudePeer(server, _previous(1, lambda before, now: before)),
-    "previous reply first": lambda server: RudePeer(server, _previous(1, lambda before, now: before + now)),
-    "previous reply behind": lambda server: RudePeer(server, _previous(1, lambda before, now: now + before)),
+    "previous reply instead": lambda server: RudePeer(server, _with_previous(lambda before, now: before)),
+    "previous reply first": lambda server: RudePeer(server, _with_previous(lambda before, now: before + now)),
+    "previous reply behind": lambda server: RudePeer(server, _with_previous(lambda before, now: now + before)),
     "speaks first": lambda server: RudePeer(server, greeting=[Say(STRANGE)]),
     "speaks first, garbage": lambda server: RudePeer(server, greeting=[Say(GARBAGE)]),
     "drips for ever": lambda server: RudePeer(server, _dripping),

@@ -8,7 +8,7 @@ from typing import Any
 
 from fbvm.net.addresses import fits
 from fbvm.net.faults import FOREVER, NAMED, NO_FAULT, Fault
-from fbvm.run.project_reader import Key, Keys, Reading, endpoint, flag, kind_of_text, moment_ns, one_of, time_ns, whole
+from fbvm.run.project_reader import Key, Keys, Kind, Reading, endpoint, flag, moment_ns, one_of, time_ns, whole
 from fbvm.watch.values import show_time
 from fbvm.wire.link import Peer
 
@@ -39,7 +39,7 @@ FAULT: Keys = {
     "reset_after_bytes": Key(whole(1, MOST_SCANS), "Connections break when so many bytes have passed, both ways together.", None),
     "silent": Key(flag, "Nothing passes: a dead host, a pulled cable.", None),
     "reset": Key(flag, "What is open breaks.", None),
-    "error": Key(kind_of_text("an errno name", _errno_name), "Opening fails at once with this errno name, such as ECONNREFUSED.",
+    "error": Key(Kind("an errno name", _errno_name), "Opening fails at once with this errno name, such as ECONNREFUSED.",
                  None),
 }  # fmt: skip
 FIELDS = {

@@ -233,11 +233,6 @@ def one_of(names: Sequence[str]) -> Kind:
     return Kind(" or ".join(f'"{name}"' for name in names), value_of)
 
 
-def kind_of_text(called: str, value: Callable[[object], str]) -> Kind:
-    """A text of which `value` says what is wrong by ValueError."""
-    return Kind(called, value)
-
-
 def one_or_more(kind: Kind) -> Kind:
     """A value of a kind, or a list of such values; it becomes a tuple."""
 

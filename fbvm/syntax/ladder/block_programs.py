@@ -341,7 +341,7 @@ class BlockPrograms:
         if self.program.loop is not None:
             raise StepRefused("LOOP stands in another LOOP", "loops of a block program stand behind one another")
         self.program.loop = len(self.program.branches)
-        self.spans.begin_repeat("LOOP", self.context.name("again"))
+        self.spans.begin_repeat(self.context.name("again"))
 
     def end_loop(self) -> None:
         """LEND: unless the condition is ON, goes back to LOOP."""

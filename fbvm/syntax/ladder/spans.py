@@ -297,10 +297,10 @@ class Spans:
                               f"numbers are 0 to {numbers - 1}")
         return number
 
-    def begin_repeat(self, what: str, again: str) -> None:
-        """The rungs behind the one at work are repeated, up to the one of `end_repeat`; `again` names the variable that says
+    def begin_repeat(self, again: str) -> None:
+        """LOOP: repeats the rungs behind the one at work, up to the one of `end_repeat`; `again` names the variable that says
         whether."""
-        self._opening = Span(what, again=self.context.temporary(again))
+        self._opening = Span("LOOP", again=self.context.temporary(again))
 
     def end_repeat(self) -> NameRef:
         """The variable to be set behind the last rung that is repeated; the rung at work is that rung."""
