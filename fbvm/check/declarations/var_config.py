@@ -26,7 +26,7 @@ from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
 
-_WIDTHS: dict[int, Type] = {1: BOOL, 8: BYTE, 32: DWORD, 64: LWORD}
+_WIDTHS: dict[int, Type] = {8: BYTE, 32: DWORD, 64: LWORD}
 _UNREACHED = ("VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL")
 
 
