@@ -124,6 +124,7 @@ def property_value(plc: Plc, path: str, unknown: UnknownPlace) -> Any:
     """The value of the property that a path such as `Main.pump.Starts` names, by its GET accessor.
 
     Raises `unknown` if it names none, UnknownPlace for a method, ValueError if the accessor ends with a trap."""
+    __tracebackhide__ = True
     if plc not in _properties:
         _properties[plc] = Properties(ProgramFacts.of(plc))
     properties, scope = _properties[plc], Scope(plc.find)
@@ -132,7 +133,7 @@ def property_value(plc: Plc, path: str, unknown: UnknownPlace) -> Any:
         return as_read(found.place.type, found.value)
     if properties.is_method(path, scope, plc.memory):
         name = path.rpartition(".")[2]
-        raise UnknownPlace(f"{name} is a method: call it in a test in Structured Text")
+        raise UnknownPlace(f"{name} is a method: call it in a test in Structured Text") from None
     raise unknown
 
 
