@@ -58,6 +58,16 @@ def test_of_many_values_so_many_are_held_and_the_others_read_again(monkeypatch: 
     assert [rig.slot("i16", offset) for offset in (4, 6, 8, 10)] == [1, 2, 1, 2]
 
 
+def test_the_range_of_a_temporary_is_known_behind_it() -> None:
+    """A sum that its type holds for sure is not wrapped."""
+    summed = store("i16", 0, plus(("tmp", "i16", 1), 1))
+    known = source_of((("let", 1, "i16", ("convert", "i16", "u8", load("u8", 8))), summed))
+    unknown = source_of((("let", 1, "i16", load("i16", 8)), summed))
+    assert "t1 + 1" in known and "t1 + 1" in unknown and len(known.splitlines()) == len(unknown.splitlines())
+    line = next(line for line in known.splitlines() if "t1 + 1" in line)
+    assert line.strip().endswith("= t1 + 1") and line not in unknown
+
+
 FORGETTING: dict[str, tuple[Block, int]] = {
     "another type": ((store("u8", 1, const("u8", 1)),), 256 + 5),
     "an array": ((("store", "u8", at(0, (1, ("check", "i64", ("convert", "i64", "u8", load("u8", 20)), 0, 3, "R0102", 1))),
