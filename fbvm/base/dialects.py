@@ -85,6 +85,7 @@ class Dialect:
     bits_by_name: bool = False
     generic_functions: bool = False
     generic_constants: bool = False
+    outputs_are_passed: bool = False
     own_in_outs: bool = False
     places_for_all: bool = False
     wrong_bcd_is_zero: bool = False
@@ -236,6 +237,8 @@ QUESTIONS = {
     "generic_functions": ("FUNCTION f<T : ANY_NUM> : T", "an error (S0901)", "T is ANY_NUM in the function"),
     "generic_constants": ("VAR_GENERIC CONSTANT size : INT of a FUNCTION_BLOCK, b : Buffer<100>", "an error (S0901)",
                           "a block of its own for each size; behind VAR_GENERIC may stand EXTENDS and IMPLEMENTS"),
+    "outputs_are_passed": ("move(target := axis.position), where position is an output of axis and target is an in-out",
+                           "an error (S0501)", "taken, with a warning (S0193): the output is read and written where it lies"),
     "own_in_outs": ("VAR_IN_OUT of a PROGRAM to which nothing is connected", "an error",
                     "a variable of the program, with a warning (S0193)"),
     "places_for_all": ("VAR_CONFIG p.count AT %MW0 : INT, where count is not declared AT %M*", "an error",
@@ -319,18 +322,16 @@ OBJECTS = frozenset(("CLASS", "INTERFACE", "METHOD", "PROPERTY", "EXTENDS", "IMP
 STANDARD = Dialect("standard", "the third edition, and CODESYS's answer where it is silent")
 _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made of it", ("codesys/blocks",), last_of_mux=True,
                    lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
-                   integers_and_bits=True, numbers_of_enumerations=True, members_as_numbers=True,
-                   number_times_duration=True, mixed_arguments=True, bare_actions=True, locals_are_read=True,
-                   programs_are_written=True, lenient_texts="leading",
-                   initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True,
-                   instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True, idle_statements=True,
-                   idle_constants=True, names_of_edition_2=True, joined_words=True, subranges_unchecked=True,
-                   padding_is_written=True, steps_apart=True, locals_hide_results=True, any_width_at=True,
-                   own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True, exceptions=True,
-                   conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
-                   bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True,
-                   assignments_are_values=True, signs_are_lost=True, generic_constants=True,
-                   short_addresses=True,
+                   integers_and_bits=True, numbers_of_enumerations=True, members_as_numbers=True, number_times_duration=True,
+                   mixed_arguments=True, bare_actions=True, locals_are_read=True, programs_are_written=True,
+                   lenient_texts="leading", initial_variables=True, reals_wrap=True, ties_away=True, whole_powers=True,
+                   no_open_inputs=True, instances_are_values=True, action_inputs=True, empty_bodies=True, zero_durations=True,
+                   idle_statements=True, idle_constants=True, names_of_edition_2=True, joined_words=True,
+                   subranges_unchecked=True, padding_is_written=True, steps_apart=True, locals_hide_results=True,
+                   any_width_at=True, own_time=True, bits_of_words=True, short_circuit_words=True, jumps_in_text=True,
+                   exceptions=True, conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
+                   bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True, assignments_are_values=True,
+                   signs_are_lost=True, generic_constants=True, outputs_are_passed=True, short_addresses=True,
                    dates_take_durations=True, dynamic_memory="marked", selects_at_first=True)
 _ROWS = (
     STANDARD,
@@ -342,7 +343,7 @@ _ROWS = (
             large_memory=True, bits_of_words=False),
     replace(_CODESYS, name="codesys2", for_whom="programs for CODESYS 2.3 and TwinCAT 2",
             libraries=("codesys/blocks", "codesys/version2"), offered=False, narrowing=True, callables_apart=True,
-            glued_words=True, dynamic_memory="", generic_constants=False),
+            glued_words=True, dynamic_memory="", generic_constants=False, outputs_are_passed=False),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks", "matiec/additional", "matiec/beremiz"),
             seconds=True, hexadecimal_bits=True, real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading",
             no_open_inputs=True, instances_are_values=True, in_outs_are_read=True, in_outs_are_written=True, locals_are_read=True,
@@ -357,8 +358,7 @@ _ROWS = (
             constants_wrap=True, short_names=True, locals_are_read=True, locals_are_written=True,
             sizes_apart=True, short_references=True, doubled_quotes=True, dynamic_memory="free"),
     Dialect("rusty", "programs for RuSTy", ("rusty",), reals_of_other_widths=True, loop_ends_each_pass=True,
-            integers_are_conditions=True,
-            loop_counters_wrap=True,
+            integers_are_conditions=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,

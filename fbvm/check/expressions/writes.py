@@ -17,6 +17,9 @@ Path = tuple[object, ...]
 """A variable or address, and the steps from it to a part."""
 
 
+_PASSED = "be passed to the in-out"
+
+
 def writable(scope: Scope, expr: tree.Expr, purpose: str, rebinds: bool = False) -> bool:
     """True if the place may be written here; else a diagnostic with the reason.
 
@@ -47,9 +50,15 @@ def _is_writable_member(scope: Scope, expr: tree.Expr, inner: tree.Expr, purpose
     member = scope.facts.fields[inner]
     if not (member.constant or member.kind in _WRITTEN_BY_OWN_BODY) or _is_written_by_others(scope, inner, member):
         return True
+    if member.kind == "VAR_OUTPUT" and purpose.startswith(_PASSED) and scope.dialect.outputs_are_passed:
+        scope.error("S0193", expr, f"the output {member.name} is passed to an in-out, which may write it",
+                    "pass a variable, and give it the value of the output first")
+        return True
     what = "a constant" if member.constant else _WRITTEN_BY_OWN_BODY[member.kind]
     scope.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here",
-                _hint(scope, inner) if member.kind == "VAR" and not member.constant else "")
+                _hint(scope, inner) if member.kind == "VAR" and not member.constant else
+                f"pass a variable, or take {takers('outputs_are_passed', other='locals_are_written')}"
+                if purpose.startswith(_PASSED) else "")
     return False
 
 
