@@ -6,6 +6,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic
+from fbvm.interchange.cx.compression import _codes
 from fbvm.interchange.cx.markup import DEEPEST, CxText, Value, read_markup
 
 HEAD = 'CXProgVer:="1.8";\r\n'
@@ -117,3 +118,9 @@ def test_a_text_keeps_its_encoding_and_its_mark(data: bytes, encoding: str, mark
     assert isinstance(made, CxText)
     assert (made.encoding, made.mark, made.compressed, made.root.string("A")) == (encoding, mark, False, text)
     assert made.encoded(made.text) == data
+
+
+def test_codes_of_compression_are_complete() -> None:
+    for code in _codes():
+        assert code.counts[0] == 0
+        assert sum(count << 16 - bits for bits, count in enumerate(code.counts)) == 1 << 16

@@ -37,8 +37,8 @@ HEAD, END = ["RESOURCE PLC ON fbvm"], ["END_RESOURCE", "END_CONFIGURATION"]
       "    PROGRAM MAIN WITH Fast : MAIN;", "    PROGRAM Other WITH Task_2 : Other;"]),
     ([task("T", "9" * 15)], "a.b", ["CONFIGURATION TwinCAT", *HEAD, f"    TASK T(INTERVAL := T#{'9' * 15}us, PRIORITY := 3);"]),
     ([task("T", "9" * 16)], "my line", ["CONFIGURATION TwinCAT", *HEAD, "    TASK T(INTERVAL := T#10000us, PRIORITY := 3);"]),
-    ([task("T", "5", "", "Lib.MAIN")], "x",
-     ["CONFIGURATION x", *HEAD, "    TASK T(INTERVAL := T#5us, PRIORITY := 20);", "    PROGRAM Lib.MAIN WITH T : Lib.MAIN;"]),
+    ([task("T", "5", "", "Lib.MAIN")], "x",  # a library's, which is left out
+     ["CONFIGURATION x", *HEAD, "    TASK T(INTERVAL := T#5us, PRIORITY := 20);"]),
     (['<Task Name="T"/>'], "x", ["CONFIGURATION x", *HEAD, "    TASK T(INTERVAL := T#10000us, PRIORITY := 20);"])))  # fmt: skip
 def test_tasks_are_a_configuration(given: list[str], application: str, lines: list[str]) -> None:
     assert configuration(tasks(*given), application) == "\n".join([*lines, *END, ""])
