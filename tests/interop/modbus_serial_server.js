@@ -21,6 +21,8 @@ const vector = {
     setCoil: (address, value) => { coils[address] = value; },
     setRegister: (address, value) => { holdingRegisters[address] = value; },
 };
-const server = new ModbusRTU.ServerTCP(vector, { host: "127.0.0.1", port: 0, unitID: 255 });
+// The number 0 would be taken as 502: modbus-serial asks only whether a port is given.
+const server = new ModbusRTU.ServerTCP(vector, { host: "127.0.0.1", port: "0", unitID: 255 });
+server.on("serverError", (error) => { console.error(error); process.exit(1); });
 server.on("socketError", () => {});
 server.on("initialized", () => console.log(server._server.address().port));
