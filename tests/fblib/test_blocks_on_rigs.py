@@ -25,8 +25,8 @@ ANY = [path for path in BLOCKS if re.search(r": ANY;", path.read_text(encoding="
 
 
 DIALECTS = {"matiec": [data_folder("fblib") / "matiec" / folder for folder in ("additional", "beremiz")],
-            "twincat": [data_folder("fblib") / "twincat" / folder for folder in ("tcunit", "motion")]}
-"""By dialect the folders of blocks that only this one has, or has in another way."""
+            "twincat": [data_folder("fblib") / "twincat" / part for part in ("tcunit", "motion", "blocks/RTC.st")]}
+"""By dialect the folders and files of blocks that only this one has, or has in another way."""
 NEEDED = {name: {"Socket": 1} for name in ("ETN_Modbus_Line", "ETN_Modbus_Session")}
 """Parts of other blocks that are never without these."""
 
@@ -36,7 +36,7 @@ NEEDED = {name: {"Socket": 1} for name in ("ETN_Modbus_Line", "ETN_Modbus_Sessio
 ])
 def test_it_stands_on_a_rig_without_inputs(fb: Fb, path: Path) -> None:
     """100 ms with every input at its initial value: no trap, and twice the same memory."""
-    dialect = next((name for name, folders in DIALECTS.items() if path.parent in folders), "")
+    dialect = next((name for name, places in DIALECTS.items() if {path, path.parent} & set(places)), "")
     one, two = fb(path.stem, dialect=dialect), fb(path.stem, dialect=dialect)
     for rig in (one, two):
         rig.write(**NEEDED.get(path.stem, {}))

@@ -38,7 +38,8 @@ TYPES = {
 }
 """Names of elementary types, and ours."""
 _BY_DIALECT = (
-    (r"PID|DERIVATIVE|RAMP|RTC|SEMA", "a block of Beremiz and OpenPLC: --dialect matiec or strucpp brings it"),
+    (r"PID|DERIVATIVE|RAMP|SEMA", "a block of Beremiz and OpenPLC: --dialect matiec or strucpp brings it"),
+    (r"RTC", "a block of Beremiz, OpenPLC and TwinCAT: --dialect matiec, strucpp or twincat brings it"),
     (r"LOGGER|LOGLEVEL|HMI_(?:NODE|BOOL|[US]?INT|U?[DL]INT|REAL|STRING)|python_(?:eval|poll|gear)|csv_read_by_(?:string|int)|"
      r"csv_reload", "a block of Beremiz and OpenPLC: --dialect matiec brings it"),
     (r"(?:LEFT|RIGHT|MID|INSERT|DELETE|REPLACE|CONCAT)_EXT", "a function of RuSTy: --dialect rusty brings it"),
