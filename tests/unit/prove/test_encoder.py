@@ -48,6 +48,8 @@ def test_classics_with_random_inputs(path: Path) -> None:
 ENCODED = [p for p in lang_corpus.programs() if p.runs]
 REFUSED_AT_MOST = 20
 """Programs of the corpus with pointers to variables that end with their call."""
+DYNAMIC_MEMORY = "what __NEW has made cannot be followed"
+"""Why programs that call __NEW, and no others, may be refused."""
 
 
 def compare_program(program: lang_corpus.Program, refused: Counter[str]) -> None:
@@ -63,7 +65,8 @@ def compare_program(program: lang_corpus.Program, refused: Counter[str]) -> None
     try:
         compare_scans(image, program.cycle_ns, program.scans, BUDGET, write)
     except Refused as reason:
-        refused[reason.reason] += 1
+        if reason.reason != DYNAMIC_MEMORY or "__NEW" not in program.text:
+            refused[reason.reason] += 1
 
 
 @pytest.mark.slow
