@@ -88,11 +88,11 @@ class _Statements:
         if node.op == "?=":
             self._attempt(node, kinds)
             return
+        if isinstance(node.value, tree.Call):
+            self.facts.assigned.add(node.value)
         if last is None:
             self.scope.infer(node.value)
             return
-        if isinstance(node.value, tree.Call):
-            self.facts.assigned.add(node.value)
         if len(node.targets) > 1 and any(target in self.facts.sets for target in node.targets):
             self.error("S1008", node.targets[0], "one of several targets is a property", "assign to it by itself")
         if node.targets[-1] in self.facts.sets and isinstance(last, RefType) and last.follows:

@@ -13,7 +13,9 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import LARGEST_HEAP, USUAL_HEAP, Image
 from fbvm.code.listing import listing
 from fbvm.code.operations import OFFSET_MASK, OFFSET_SHIFT
+from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Plc
+from fbvm.step.session import Session
 
 COUNT, HEAD = 12, 8
 TEXT = f"""
@@ -121,8 +123,11 @@ def test_a_listing_says_where_the_heap_is() -> None:
     assert f"heap      {image.layout.heap_at}       1048576 bytes for __NEW" in listing(image)
 
 
-def test_power_on_empties_the_heap() -> None:
-    plc = Plc(image_of(FILLED, 200), engine="python")
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["python", pytest.param("native", marks=pytest.mark.skipif(
+    not native.available(), reason="llvmlite is not installed"))])  # fmt: skip
+def test_power_on_empties_the_heap(engine: str) -> None:
+    plc = Plc(image_of(FILLED, 200), engine=engine)
     for _ in range(3):
         plc.scan()
     before = plc.read("Main.p")
@@ -130,6 +135,27 @@ def test_power_on_empties_the_heap() -> None:
     assert plc.read("Main.p") is None
     plc.scan()
     assert plc.read("Main.p") == before and plc.read("Main.n") == 1
+
+
+def test_stepping_back_finds_the_heap_as_it_was() -> None:
+    image = image_of(FILLED, 200)
+    session = Session.of(lambda: Plc(image))
+    heap = slice(image.layout.heap_at, image.layout.heap_at + 200)
+
+    def at(scan: int) -> tuple[bytes, bytes]:
+        session.goto(scan)
+        memory = bytes(session.plc.memory.u8)
+        return memory, memory[heap]
+
+    forward = [at(scan) for scan in range(5)]
+    assert len({part for _, part in forward}) == 5
+    assert [at(scan) for scan in (3, 1, 4, 0, 2)] == [forward[scan] for scan in (3, 1, 4, 0, 2)]
+    for _ in range(4):
+        session.step()
+    assert bytes(session.plc.memory.u8)[heap] != forward[2][1]
+    for _ in range(4):
+        session.back()
+    assert bytes(session.plc.memory.u8) == forward[2][0]
 
 
 @pytest.fixture
