@@ -64,6 +64,24 @@ class SourcePath(ExistingPath):
         return path
 
 
+class LibraryFolder(ExistingPath):
+    """A folder of libraries; a file, and a folder that has none, are told what makes one of them."""
+
+    def __init__(self) -> None:
+        super().__init__(file_okay=False)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path.  Raises BadParameter."""
+        if os.path.isfile(value):
+            other = "give its folder" if str(value).endswith(".st") else f"make a folder of it by `fbvm import {value} -o DIR`"
+            self.fail(f"{str(value)!r} is a file, and libraries are folders; name it among the sources, or {other}", param, ctx)
+        path = Path(super().convert(value, param, ctx))
+        if not any(name.endswith(".st") or name == "library.toml" for _, _, names in os.walk(path) for name in names):
+            self.fail(f"there is no library in {str(path)!r}: it holds no .st and no library.toml; `fbvm import FILE -o DIR` "
+                      "makes them of other tools' libraries", param, ctx)
+        return path
+
+
 PROJECTS = ("fbvm.toml", "campaign.toml")
 """Files that make a folder a project or a campaign."""
 

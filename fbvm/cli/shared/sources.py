@@ -14,7 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.cli.shared import status
 from fbvm.cli.shared.given_sources import families, inputs, sources_of
-from fbvm.cli.shared.paths import ExistingPath, SourcePath, taken_folders
+from fbvm.cli.shared.paths import LibraryFolder, SourcePath, taken_folders
 from fbvm.cli.shared.terminal import say, say_json
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import LARGEST_HEAP, Image
@@ -60,8 +60,7 @@ def compile_options(files: Sequence[Path]) -> dict[str, Any]:
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """--program, --resource, --memory, --dialect, --heap, --library and --no-cache."""
     for decorate in (
-        click.option("--library", "libraries", multiple=True, metavar="DIR",
-                     type=ExistingPath(file_okay=False),
+        click.option("--library", "libraries", multiple=True, metavar="DIR", type=LibraryFolder(),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
         click.option("--no-cache", is_flag=True, expose_value=False, callback=_switch_cache_off,
                      help="Compile anew, prove anew, and keep nothing of it on disk."),

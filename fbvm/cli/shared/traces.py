@@ -13,7 +13,7 @@ import fbvm
 from fbvm.base.digits import whole_number
 from fbvm.base.files import open_file, reason
 from fbvm.cli.shared.given_sources import given_sources
-from fbvm.cli.shared.paths import ExistingPath
+from fbvm.cli.shared.paths import ExistingPath, LibraryFolder
 from fbvm.cli.shared.terminal import named, say
 from fbvm.code.image import Image
 from fbvm.record.recording import container
@@ -63,7 +63,7 @@ def trace_argument(function: Callable[..., Any]) -> Callable[..., Any]:
 def trace_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """--plc and --library, about the file of a recording."""
     for decorate in (
-        click.option("--library", "libraries", multiple=True, metavar="DIR", type=ExistingPath(file_okay=False),
+        click.option("--library", "libraries", multiple=True, metavar="DIR", type=LibraryFolder(),
                      help="A folder of libraries to use in place of those that the recording holds; may be repeated."),
         click.option("--plc", metavar="NAME", help="Which PLC of a recording that has several."),
     ):

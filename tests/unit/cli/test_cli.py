@@ -335,6 +335,20 @@ def test_own_libraries_are_found(counter: str) -> None:
     assert (result.exit_code, result.stdout) == (0, "Main.n = 42\n")
 
 
+def test_what_is_no_folder_of_libraries_is_told_what_makes_one(counter: str) -> None:
+    Path("own").mkdir()
+    Path("own/BASIC.lib").write_bytes(b"CoDeSys+")
+    for given, said in (
+        ("own", "there is no library in 'own': it holds no .st and no library.toml; `fbvm import FILE -o DIR` makes"),
+        ("own/BASIC.lib", "'own/BASIC.lib' is a file, and libraries are folders; name it among the sources, or make a folder of "
+         "it by `fbvm import own/BASIC.lib -o DIR`"),
+        (counter, "'counter.st' is a file, and libraries are folders; name it among the sources, or give its folder"),
+        ("owm", "Directory 'owm' does not exist; did you mean own?"),
+    ):  # fmt: skip
+        result = fbvm("check", counter, "--library", given)
+        assert result.exit_code == 2 and said in " ".join(result.stderr.split()), given
+
+
 def test_list_prints_the_image(counter: str) -> None:
     result = fbvm("list", counter)
     assert result.exit_code == 0
