@@ -23,12 +23,13 @@ REQUIRED = object()
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of value: what people call it, and the function that makes the value of what is written.
+    """A kind of value: what people call it, and the functions that make the value of what is written, and the other way.
 
-    The function raises ValueError with what to write instead."""
+    `value` raises ValueError with what to write instead."""
 
     called: str
     value: Callable[[object], Any]
+    written: Callable[[Any], str] = str
 
 
 @dataclass(frozen=True)
@@ -45,13 +46,9 @@ class Key:
     @property
     def usual(self) -> str:
         """The default as people write it; "" for a key that has none, or none that can be written."""
-        if not isinstance(self.default, str | int) or self.default == FOREVER:
+        if not isinstance(self.kind, Kind) or not isinstance(self.default, str | int) or self.default == FOREVER:
             return ""
-        if isinstance(self.default, bool):
-            return str(self.default).lower()
-        if isinstance(self.kind, Kind) and "time" in self.kind.called and isinstance(self.default, int):
-            return show_time(self.default).removeprefix("T#")
-        return str(self.default)
+        return self.kind.written(self.default)
 
 
 Keys = Mapping[str, Key]
@@ -171,6 +168,10 @@ def _time_ns(value: object) -> int:
     return passed_ns
 
 
+def _written_time(passed_ns: int) -> str:
+    return show_time(passed_ns).removeprefix("T#")
+
+
 def _moment_ns(value: object) -> int:
     if not isinstance(value, str):
         raise ValueError(f'{value!r} is no time; write it with its unit in quotes: "10ms"')
@@ -219,7 +220,7 @@ def time_between(shortest_ns: int, longest_ns: int, spoken: str) -> Kind:
             raise ValueError(f"{value!r} is no time {spoken}")
         return found
 
-    return Kind(f"a time {spoken}", value_of)
+    return Kind(f"a time {spoken}", value_of, _written_time)
 
 
 def one_of(names: Sequence[str]) -> Kind:
@@ -259,10 +260,10 @@ def first_and_last(kind: Kind) -> Kind:
 text = Kind("a text", _text)
 texts = Kind("a list of texts", _texts)
 texts_by_name = Kind("a table of texts", _texts_by_name)
-flag = Kind("true or false", _flag)
+flag = Kind("true or false", _flag, lambda on: str(on).lower())
 anything = Kind("a value", lambda value: value)
-time_ns = Kind('a time above 0, such as "10ms"', _time_ns)
-moment_ns = Kind('a time, such as "2s" or "0s"', _moment_ns)
+time_ns = Kind('a time above 0, such as "10ms"', _time_ns, _written_time)
+moment_ns = Kind('a time, such as "2s" or "0s"', _moment_ns, _written_time)
 ip = Kind('an IPv4 address, such as "192.168.250.21"', _ip)
 endpoint = Kind('an IPv4 address and a port, such as "192.168.250.1:502"', _endpoint)
 host = Kind('an address or a name of the host and a port, such as "127.0.0.1:15020"',
