@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,13 +99,11 @@ class Workbench:
 
     def _checked(self, name: str) -> str:
         """The name of a place as PLCs know it.  Raises UnknownPlace if no PLC has it."""
-        for number, live in enumerate(self.plcs.values(), 1):
-            try:
+        *others, last = self.plcs.values()
+        for live in others:
+            with suppress(UnknownPlace):
                 return live.plc.find(name).name
-            except UnknownPlace:
-                if number == len(self.plcs):
-                    raise
-        return name
+        return last.plc.find(name).name
 
     def plc(self, name: str) -> LivePlc:
         """The PLC of that name.  Raises MessageError."""

@@ -296,8 +296,6 @@ def _convert(x: Execution, state: State, machine: str, source: str, a: Node) -> 
     if machine in FLOATS or source in FLOATS:
         return x.value(state, a) if machine == source else folded(x, state, "convert", machine, [a], before=(source,))
     value = x.value(state, a)
-    if machine == "b":
-        return x.terms.is_set(value)
     if value.width == 0:
         return x.terms.of_boolean(value, width(machine))
     return x.terms.resized(value, width(machine), is_signed(source))
@@ -310,11 +308,7 @@ def _to_integer(name: str) -> Row:
 def _bits(x: Execution, state: State, machine: str, source: str, a: Node) -> Term:
     if machine in FLOATS or source in FLOATS:
         return x.value(state, a) if machine == source else folded(x, state, "bits", machine, [a], before=(source,))
-    value, wanted = x.value(state, a), term_width(machine)
-    if wanted == value.width:
-        return value
-    return x.terms.is_set(value) if wanted == 0 else x.terms.of_boolean(value, wanted) if value.width == 0 else \
-        x.terms.resized(value, wanted, is_signed(source))  # fmt: skip
+    return x.value(state, a)
 
 
 def _is_set(x: Execution, state: State, machine: str, kind: str, a: Node) -> Term:

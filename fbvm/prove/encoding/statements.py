@@ -12,6 +12,7 @@ from typing import Any
 from fbvm.code.image import Body
 from fbvm.code.operations import SIZES, TEXT_UNITS, WHOLE_BYTES, Address, Block, Node, detail_size
 from fbvm.prove.encoding.addresses import Target, targets
+from fbvm.prove.encoding.cells import BIT
 from fbvm.prove.encoding.execution import UNWOUND, Attempt, Execution, Held, Refused, Row, State, Trapped
 from fbvm.prove.encoding.expressions import is_signed
 from fbvm.prove.encoding.terms import Term
@@ -277,7 +278,7 @@ def _fill(x: Execution, state: State, address: Address, pattern: bytes) -> None:
             number = int.from_bytes(pattern[first : first + cell.size], "little")
             if cell.width:
                 state.contents.write(cell.offset, cell.size, x.terms.constant(cell.width, number), target.condition)
-            elif cell in partition.at[cell.offset] and len(partition.at[cell.offset]) > 1:
+            elif cell.kind == BIT:
                 state.contents.write_bit(cell.offset, cell.bit, x.terms.boolean(number >> cell.bit & 1), target.condition)
             else:
                 state.contents.write(cell.offset, 1, x.terms.constant(8, number), target.condition)

@@ -219,3 +219,35 @@ def test_a_modbus_server_leaves_whoever_does_not_speak_modbus() -> None:
     assert isinstance(events[1], Received) and events[1].data == bytes.fromhex("0001 0000 0005 01 03 02 0000")
     assert len(peer.received) == 2
     link.submit([Close(1)], 50 * MS)
+
+
+def test_a_connection_that_breaks_while_bytes_wait_loses_them(host: Host) -> None:
+    host.open()
+    made: Any = host.link.channels[1]
+    real, answers = made.sock, [2, OSError(errno.EPIPE, "broken pipe")]
+
+    def send(data: bytes) -> int:
+        answer = answers.pop(0)
+        if isinstance(answer, OSError):
+            raise answer
+        return answer
+
+    tapped: list[TapKind] = []
+    host.network.tap = lambda now_ns, unit, event: tapped.append(event.kind)
+    made.sock = SimpleNamespace(send=send, fileno=real.fileno, close=real.close, getsockopt=lambda *what: 0,
+                                setsockopt=lambda *what: None)  # fmt: skip
+    assert host.network.connections == 1
+    host.scan(Send(1, b"abcde"), Send(1, b"f"))
+    found = host.settle(1)
+    assert found == [Failed(1, "send", "EPIPE"), Broken(1, "ECONNRESET"), Failed(1, "send", "EPIPE")]
+    assert tapped == [TapKind.DATA, TapKind.RST] and host.network.connections == 0
+    made.fetch(0)
+    assert made.sock is None and host.settle(1) == []
+
+
+def test_a_station_that_hears_no_datagrams_and_takes_no_connections_answers_nothing() -> None:
+    network = LoopNetwork()
+    network.place(SERVER, Station())
+    link = network.attach(UNIT)
+    link.submit([Bind(2, 9600), SendTo(2, SERVER, b"?"), Connect(1, SERVER)], 0)
+    assert link.events(0) == [Opened(2, 9600, Peer("0.0.0.0", 0)), Sent(2, 1), Failed(1, "open", "ECONNREFUSED")]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import pytest
@@ -117,3 +118,15 @@ def test_a_library_that_brings_another_mailbox() -> None:
         Mailbox(made, "TXP", "MSTR_Lines")
     with pytest.raises(ContractError, match="MSTR_Module has no module"):
         Mailbox(made, "NOC", "MSTR_Modules")
+
+
+@pytest.mark.slow
+def test_lines_that_do_not_fill_the_slots_of_the_mailbox_are_refused() -> None:
+    made = contract("PROGRAM P VAR b : MBP_MSTR; END_VAR b(); END_PROGRAM")
+    box = made.image.layout.mailboxes[0]
+    for field, more in (("head_words", 1), ("slots", 1), ("slot_words", -1)):
+        changed = replace(box, **{field: getattr(box, field) + more})
+        layout = SimpleNamespace(mailboxes=(changed,), areas=made.image.layout.areas)
+        other = SimpleNamespace(image=SimpleNamespace(layout=layout), place=made.place, record=made.record, array=made.array)
+        with pytest.raises(ContractError, match="MSTR_Lines has not the slots of the mailbox NOC"):
+            Mailbox(other, "NOC", "MSTR_Lines")  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from dataclasses import replace
 
+import pytest
 from rows import each_of
 
 from fbvm.units.port.line import Line
@@ -198,3 +199,13 @@ def test_a_port_asks_its_own_lines_and_those_with_a_connection_that_carry_anothe
     assert port.exchange(words) == [Connect(0, PEER)]
     assert port.reset(words) == [Close(0, True), Close(2, True)]
     assert [(line[AT.command], line[AT.state]) for line in lines] == [(0, 0), (CONNECT, OPEN), (0, 0)]
+
+
+def test_on_a_host_that_keeps_the_high_byte_first_bytes_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.byteorder", "big")
+    rig = Rig().opened()
+    rig.words[AT.outgoing] = 0x0201
+    rig.words[AT.sending] = 2
+    assert rig.ask() == [Send(3, b"\x01\x02")]
+    rig.hear(Received(3, b"\x01\x02", PEER))
+    assert rig.incoming(1) == ["0201"]
