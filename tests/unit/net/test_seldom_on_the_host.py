@@ -25,6 +25,7 @@ from fbvm.wire.link import (
     Bind,
     Broken,
     Close,
+    Closed,
     Connect,
     Failed,
     Grant,
@@ -240,9 +241,11 @@ def test_a_connection_that_breaks_while_bytes_wait_loses_them(host: Host) -> Non
     host.scan(Send(1, b"abcde"), Send(1, b"f"))
     found = host.settle(1)
     assert found == [Failed(1, "send", "EPIPE"), Broken(1, "ECONNRESET"), Failed(1, "send", "EPIPE")]
-    assert tapped == [TapKind.DATA, TapKind.RST] and host.network.connections == 0
+    assert tapped == [TapKind.DATA, TapKind.RST]
     made.fetch(0)
     assert made.sock is None and host.settle(1) == []
+    host.scan(Close(1))
+    assert host.settle(1) == [Closed(1)] and host.network.connections == 0
 
 
 def test_a_station_that_hears_no_datagrams_and_takes_no_connections_answers_nothing() -> None:
