@@ -43,8 +43,8 @@ class Behind(NamedTuple):
     names: tuple[NamedType, ...]
 
 
-Section = VarSection | Refused | Settings | Behind
-Element = Action | Step | Transition | Refused | Members
+Section = VarSection | Settings | Behind
+Element = Action | Step | Transition | Members
 
 
 class Head(NamedTuple):
@@ -151,10 +151,8 @@ class SourceBuilder(SfcElements):
     def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None, usings: list[Using] | None,
                  sections: list[Section], items: Items, elements: list[Element], end: Token) -> Pou:
         head, sections = head.with_more(sections)
-        refused: list[Refused] = []
         accesses = tuple(each for each in sections if isinstance(each, AccessVars) and word.type == "PROGRAM")
-        refused += [_out_of_place(part) for part in (*sections, *elements)
-                    if part not in accesses and not isinstance(part, VarSection | Behind | Action | Step | Transition | Members)]
+        refused = tuple(_out_of_place(each) for each in sections if isinstance(each, Settings) and each not in accesses)
         methods = [method for each in (*items, *elements) if isinstance(each, Members) for method in each.methods]
         body = self.block([each for each in items if not isinstance(each, Members)])
         declared = [each for each in sections if isinstance(each, VarSection)]
@@ -168,7 +166,7 @@ class SourceBuilder(SfcElements):
             body, actions = self._charts(word, body, elements, actions, declared)
         self.generic_types = {}
         kind = "FUNCTION_BLOCK" if word.type == "FUNCTION_BLOCK" else word.text.upper()
-        return Pou(word.start, end.end, kind, head.name, result, tuple(declared), body, tuple(refused),
+        return Pou(word.start, end.end, kind, head.name, result, tuple(declared), body, refused,
                    tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods),
                    head.with_usings(usings))
 
@@ -262,7 +260,7 @@ class SourceBuilder(SfcElements):
         from fbvm.syntax.sfc.charts import Charts
 
         charts = Charts(self, actions, declared)
-        body = charts.body(word, body, [each for each in elements if not isinstance(each, Refused | Members)])
+        body = charts.body(word, body, [each for each in elements if not isinstance(each, Members)])
         declared += charts.sections
         return body, charts.actions
 
@@ -306,7 +304,7 @@ class SourceBuilder(SfcElements):
         for part in (each for each in actions if isinstance(each, Step | Transition)):
             self.report("S0111", part.start, part.end, "a chart stands in its POU, not in ACTIONS", "")
         return Actions(word.start, end.end, self.name(owner) if owner else None,
-                       tuple(a for a in actions if isinstance(a, Action)), tuple(a for a in actions if isinstance(a, Refused)))
+                       tuple(each for each in actions if isinstance(each, Action)))
 
 
 _ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
@@ -319,8 +317,6 @@ def _is_program(declaration: Declaration) -> bool:
     return isinstance(declaration, Pou) and declaration.kind == "PROGRAM"
 
 
-def _out_of_place(item: Refused | Settings) -> Refused:
+def _out_of_place(item: Settings) -> Refused:
     """The refusal of a part that a POU cannot have."""
-    if isinstance(item, Refused):
-        return item
     return Refused(item.start, item.end, f"{'VAR_ACCESS' if isinstance(item, AccessVars) else 'VAR_CONFIG'} of a POU")

@@ -59,7 +59,8 @@ END_PROGRAM
 """
 DOCUMENTS = sorted((HERE / "documents").glob("*.xml"))
 """A document is compared if it has a text; an empty one takes it in."""
-SOURCES = {"declared": DECLARED, "words": f"{HEAD}{WORDS}END_LADDER\nEND_PROGRAM\n", "rungs": RUNGS, "chart": CHART}
+SOURCES = {"declared": DECLARED, "words": f"{HEAD}{WORDS}END_LADDER\nEND_PROGRAM\n", "rungs": RUNGS, "chart": CHART,
+           **{path.stem: path.read_text(encoding="utf-8") for path in sorted((HERE / "texts").glob("*.st"))}}
 
 
 def check(path: Path, text: str) -> None:

@@ -128,14 +128,10 @@ class Configurations:
                              tree.NameRef(node.start, node.end, made.name))
 
     def _configuration(self, configuration: tree.Configuration, source: Source) -> None:
-        for refused in configuration.refused:
-            self.report.refuse(source, refused)
         if self.context.resource is not None:
             self._resource(self.context.resource, source)
 
     def _resource(self, resource: tree.Resource, source: Source) -> None:
-        for refused in resource.refused:
-            self.report.refuse(source, refused)
         tasks: dict[str, TaskFact] = {}
         for declared in resource.tasks:
             if fold(declared.name.text) in tasks:

@@ -155,8 +155,6 @@ class SymbolTable:
             elif isinstance(declaration, tree.Action):
                 self._add_action(declaration, source, declaration.owner, last)
             elif isinstance(declaration, tree.Actions):
-                for refused in declaration.refused:
-                    self.report.refuse(source, refused)
                 for action in declaration.actions:
                     self._add_action(action, source, declaration.owner, last)
             elif isinstance(declaration, tree.TypeDecl):

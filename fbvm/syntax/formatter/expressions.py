@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from fbvm.syntax.formatter.comments import Comments
-from fbvm.syntax.formatter.layout import SPACE, Doc, Fill, Group, Hang, Indent, Leaf, Verbatim
+from fbvm.syntax.formatter.layout import SPACE, Doc, Fill, Group, Hang, Indent, Leaf
 from fbvm.syntax.recovery.frames import LEVELS
 from fbvm.syntax.st.lexer import Token, lexis
 from fbvm.syntax.st.literals import ELEMENTARY
@@ -65,11 +65,6 @@ class ExpressionLayout:
         """A sign or word directly behind the text that it closes; a comment between them goes behind the sign."""
         self.comments.draw(token)
         return self.leaf(token, text)
-
-    def refused(self, token: Token) -> Phrase:
-        """A refused text, such as a METHOD: it stays as it is."""
-        inside = Verbatim(token.text, self.comments.column(token.start))
-        return Phrase(token.start, Leaf("", token.start, -1), inside, Leaf("", -1, token.end), level="refused")
 
     # --- lists ---
 

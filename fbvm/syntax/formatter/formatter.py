@@ -33,27 +33,13 @@ def formatted(source: Source, outside: Outside = NOTHING, notation: Notation | N
     if "\r\n" in source.text:
         source = Source(source.name, source.text.replace("\r\n", "\n"), source.library)
         tree, _ = parse(source)
-    try:
-        text = _printed(source, Spelling(tree, outside), notation)
-    except _NeedsMending:
-        return source.text, errors(diagnostics)
+    text = _printed(source, Spelling(tree, outside), notation)
     return text.replace("\n", "\r\n") if windows else text, []
-
-
-class _NeedsMending(Exception):
-    """The text is understood only with a repair."""
 
 
 def _printed(source: Source, spelling: Spelling, notation: Notation | None) -> str:
     """The canonical text of a text without errors."""
-    said: list[Diagnostic] = []
-
-    def report(code: str, start: int, end: int, message: str, *more: object) -> None:
-        said.append(Diagnostic(code, source, start, end, message))
-
-    tokens = list(Lexer(source.text, report).tokens())
-    if errors(said):  # within what the parser has passed over
-        raise _NeedsMending
+    tokens = list(Lexer(source.text, lambda *message: None).tokens())
     comments = Comments(source.text, tokens)
     layout = DeclarationLayout(comments, spelling)
     layout.notation = notation
@@ -62,4 +48,4 @@ def _printed(source: Source, spelling: Spelling, notation: Notation | None) -> s
 
 
 def _no_mender(stuck: Automaton) -> ErrorRecovery:
-    raise _NeedsMending
+    raise AssertionError("a text without errors needs no repair")

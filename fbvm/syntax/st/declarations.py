@@ -26,7 +26,6 @@ from fbvm.syntax.tree import (
     NamedType,
     Node,
     ProgramInstance,
-    Refused,
     Resource,
     Task,
     TypeSpec,
@@ -39,7 +38,7 @@ SET_BY = {"S": {"RS"}, "R": {"SR", "CTU", "CTUD"}}
 """Operator of instruction lists -> standard blocks that have an input of that name (a counter may have its type in the name): in
 front of an instance of these the operator gives the input, table 70."""
 _LATCHING = frozenset().union(*SET_BY.values())
-ConfigItem = VarSection | Task | ProgramInstance | Refused | Settings
+ConfigItem = VarSection | Task | ProgramInstance | Settings
 
 
 class Declarations(Types):
@@ -118,7 +117,7 @@ class Declarations(Types):
             resources.append(_resource(loose[0].start, loose[-1].end, None, None, loose))
         return Configuration(
             word.start, end.end, self.declared(token), tuple(i for i in items if isinstance(i, VarSection)),
-            tuple(resources), tuple(i for i in items if isinstance(i, Refused)), _settings(items))
+            tuple(resources), _settings(items))
 
     def resource(self, word: Token, token: Token, on: Token | None, processor: Token | None, items: list[ConfigItem],
                  end: Token) -> Resource:
@@ -179,7 +178,7 @@ def _resource(start: int, end: int, name: Name | None, processor: Name | None,
     return Resource(
         start, end, name, processor, tuple(i for i in items if isinstance(i, VarSection)),
         tuple(i for i in items if isinstance(i, Task)), tuple(i for i in items if isinstance(i, ProgramInstance)),
-        tuple(i for i in items if isinstance(i, Refused)), _settings(items))
+        _settings(items))
 
 
 def _settings(items: Sequence[Node]) -> tuple[Settings, ...]:

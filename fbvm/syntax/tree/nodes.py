@@ -316,7 +316,6 @@ class Actions(Declaration):
 
     owner: Name | None
     actions: tuple[Action, ...]
-    refused: tuple[Refused, ...] = ()
 
 
 @_node
@@ -397,7 +396,6 @@ class Resource(Node):
     sections: tuple[VarSection, ...]
     tasks: tuple[Task, ...]
     programs: tuple[ProgramInstance, ...]
-    refused: tuple[Refused, ...] = ()
     settings: tuple[AccessVars | ConfigVars, ...] = ()
 
 
@@ -406,7 +404,6 @@ class Configuration(Declaration):
     name: Name
     sections: tuple[VarSection, ...]
     resources: tuple[Resource, ...]
-    refused: tuple[Refused, ...] = ()
     settings: tuple[AccessVars | ConfigVars, ...] = ()
 
 

@@ -82,8 +82,8 @@ def _shown(network: Network) -> int:
     return shown if shown <= LARGEST else 0
 
 
-def _place(item: Object, flat: bool) -> tuple[float, float, int]:
-    return (0, 0, item.place) if flat else (item.y, item.x, item.place)
+def _place(item: Object, flat: bool) -> tuple[float, ...]:
+    return (item.place,) if flat else (item.y, item.x, item.place)
 
 
 def _by_number(made: list[Network]) -> list[Network] | None:
@@ -232,7 +232,7 @@ class _Joined:
         return item
 
 
-def _key(item: Object, flat: bool) -> tuple[float, float, float, int]:
+def _key(item: Object, flat: bool) -> tuple[float, ...]:
     return (item.order or inf, *_place(item, flat))
 
 
@@ -285,7 +285,7 @@ def _back(left: list[Object], inside: set[Object], cut: set[tuple[Object, Wire]]
     loop = _loops(left, inside, cut)
     wires = [(item, wire) for item in left for wire in _feeds(item, inside, cut) if loop.get(wire.source, -1) == loop[item]]
 
-    def late(found: tuple[Object, Wire]) -> tuple[bool, bool, tuple[float, float, float, int]]:
+    def late(found: tuple[Object, Wire]) -> tuple[bool, bool, tuple[float, ...]]:
         item, wire = found
         return wire.source.kind != "inOutVariable", item.kind != "block", _key(item, flat)
 

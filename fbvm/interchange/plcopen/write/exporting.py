@@ -165,8 +165,6 @@ def _matters(pragma: str) -> bool:
 
 
 def _configuration(types: Types, declared: tree.Configuration) -> Element:
-    for unsaid in declared.refused:
-        raise NotExportable(unsaid, "this part of a CONFIGURATION is not exported", "")
     resources = [_resource(types, resource) for resource in declared.resources]
     lists = [types.section(section) for section in declared.sections]
     return element("configuration", *resources, *lists, *_settings(types, declared.settings), name=declared.name.text)
@@ -197,7 +195,7 @@ def _given(types: Types, given: tree.ConfigVar) -> Element:
 
 
 def _resource(types: Types, resource: tree.Resource) -> Element:
-    for unsaid in (*resource.refused, *resource.settings):
+    for unsaid in resource.settings:
         raise NotExportable(unsaid, "this part of a RESOURCE is not exported", "")
     instances: dict[str, list[Element]] = {}
     for program in resource.programs:

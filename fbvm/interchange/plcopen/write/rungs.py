@@ -19,7 +19,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.ladder.drawing.diagram import WIRE
 from fbvm.syntax.ladder.instructions.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder.mnemonics import Symbol, read_rungs
-from fbvm.syntax.ladder.operands import SYMBOLS, OperandError, Operands
+from fbvm.syntax.ladder.operands import SYMBOLS, Operands
 from fbvm.syntax.ladder.symbols import is_own, number
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
 
@@ -195,10 +195,7 @@ class RungWriter:
     def _symbol(self, name: str) -> str:
         """The variable of a contact or coil; an address is noted as one that other tools cannot name."""
         name = self.numbered.get(name.upper(), name)
-        try:
-            meant = Operands().expression(name, "b", self.step.start, self.step.end)
-        except OperandError as wrong:
-            raise NotExportable(self.step, wrong.args[0], "") from None
+        meant = Operands().expression(name, "b", self.step.start, self.step.end)
         if not isinstance(meant, tree.NameRef | tree.Member | tree.Index) or name.upper() in SYMBOLS:
             self.foreign(self.step, f"{name} is an address, for which other tools have no name; declare a variable AT it")
         return name
@@ -374,7 +371,7 @@ class RungWriter:
             if sign == ":=":
                 inputs.append((name, self._operand(text)))
             else:
-                outputs.append((name, self._symbol(text)))
+                outputs.append((name, self._operand(text)))
         made = self.drawing.block(kind, instance, inputs, outputs, column + 1, row)
         self.rows = max(self.rows, row + len(inputs) // 2 + 1)
         self.columns = max(self.columns, column + 4)
