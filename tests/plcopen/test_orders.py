@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from drawings import NAMESPACE, RAIL, block, coil, contact, document, plc, pou, result, states, value, variable, wires
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.imported import Imported
+from fbvm.interchange.plcopen.read import networks
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.read.producer import ORDERS
 from fbvm.interchange.plcopen.write.exporting import export_xml
@@ -124,6 +126,15 @@ def test_a_loop_is_cut_where_the_generator_comes_back_to_the_block_it_met_first(
     machine.scan()
     assert machine.read("Main.t.IN") is first
     assert [d.code for d in made.diagnostics if d.code.startswith("X02")] == ["X0290"]
+
+
+@each_of(("limit", "most", "is_refused"), [("LARGEST", 4, False), ("LARGEST", 3, True), ("MOST_LOOPS", 1, False),
+                                             ("MOST_LOOPS", 0, True)])  # fmt: skip
+def test_a_network_with_too_many_elements_or_loops_is_refused(limit: str, most: int, is_refused: bool,
+                                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(networks, limit, most)
+    made = import_xml(flashing("3"), order="document")
+    assert [found.code for found in made.errors] == ["X0202"] * is_refused
 
 
 def test_a_function_that_feeds_itself_counts() -> None:
