@@ -132,8 +132,9 @@ def test_a_loop_is_cut_where_the_generator_comes_back_to_the_block_it_met_first(
                                              ("MOST_LOOPS", 0, True)])  # fmt: skip
 def test_a_network_with_too_many_elements_or_loops_is_refused(limit: str, most: int, is_refused: bool,
                                                               monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(networks, limit, most)
-    made = import_xml(flashing("3"), order="document")
+    with monkeypatch.context() as patched:
+        patched.setattr(networks, limit, most)
+        made = import_xml(flashing("3"), order="document")
     assert [found.code for found in made.errors] == ["X0202"] * is_refused
 
 
