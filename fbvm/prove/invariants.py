@@ -39,9 +39,9 @@ class Guess(Protocol):
 
     def term(self, terms: Terms, state: dict[Term, Term], now: Term) -> Term:
         """The guess about a state, behind the scan of a time."""
-        ...
 
-    def holds(self, sample: Sample) -> bool: ...
+    def holds(self, sample: Sample) -> bool:
+        """Whether the guess holds of a state that was seen."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ it is played (`ScanStops`).  So a stop at full speed and a step back stand at th
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Generator, Mapping, Sequence
 from typing import Protocol
 
@@ -46,7 +47,7 @@ class Scene(Protocol):
         """Plays such a scan.  Returns True if a breakpoint is reached in it, and what breakpoints have seen at its end."""
 
 
-class Runner:
+class Runner(ABC):
     """Executes scans of a PLC until one of its breakpoints is reached.  `passes` is how often each was passed before."""
 
     def __init__(self, plc: Plc, scene: Scene, breakpoints: Sequence[Breakpoint], state: State | None,
@@ -86,13 +87,13 @@ class Runner:
         self.execute()
         return self.plc.halted is not None
 
+    @abstractmethod
     def execute(self) -> None:
         """Executes one scan or the rest of one."""
-        raise TypeError("a runner says how it executes a scan")
 
+    @abstractmethod
     def many(self, scan: int) -> bool:
         """Executes scans in machine code at once, up to `scan` or to one that stops; False if that cannot be."""
-        return False
 
     def stops_behind(self) -> bool:
         """True if something stops the run behind the scan that was executed last."""

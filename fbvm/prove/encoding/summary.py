@@ -205,8 +205,6 @@ class _Fixpoint:
         made = Summary(self.image, terms, scanned.contents, self.before, inputs=self.inputs, traps=x.traps, reached=x.reached,
                        unknowns=x.unknowns, writes=x.writes)  # fmt: skip
         for cell in sorted(self.variable):
-            if self.is_input(cell):
-                continue
             term = terms.variable(("state", cell), cell.width)
             made.cells[term] = cell
             made.initial[term] = constant_of(terms, cell, self.power_on(cell.offset, cell.size))

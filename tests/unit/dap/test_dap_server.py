@@ -6,15 +6,18 @@ import errno
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import pytest
 
+from fbvm.cli.running.dap import open_target
 from fbvm.dap.framing import Framer, FramingError, encode
-from fbvm.dap.server import DebugDoor, pass_on, serve
+from fbvm.dap.server import DebugDoor, pass_on, serve, serve_until_ended
 from fbvm.dap.target import LaunchError, Target
 from fbvm.net.streams import Listener, connect
 
@@ -88,6 +91,29 @@ def test_over_stdin_and_stdout(file: Path) -> None:
         output, pipe = process.stdout, process.stdin
         a_session(Wire(lambda: output.read(65536), pipe.write), file)
         assert process.wait(timeout=20) == 0 and output.read() == b""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("looks", [False, True])
+def test_in_this_process(file: Path, looks: bool) -> None:
+    asked, answers = SimpleQueue[bytes](), SimpleQueue[bytes]()
+    told: list[tuple[str, bool]] = []
+    counts = [0]
+
+    def meanwhile() -> bool:
+        counts[0] += 1
+        return False
+
+    serving = threading.Thread(target=lambda: told.append(serve_until_ended(
+        open_target, asked.get, answers.put, meanwhile if looks else None)))  # fmt: skip
+    serving.start()
+    wire = Wire(lambda: answers.get(timeout=20), asked.put)
+    while looks and counts[0] < 3:  # it looks as long as nobody asks for anything
+        time.sleep(0.005)
+    a_session(wire, file)
+    asked.put(b"")
+    serving.join(20)
+    assert told == [("", False)] and not serving.is_alive()
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from fbvm.live import host as host_module
 from fbvm.live.connection import MOST_REQUEST_BYTES, Connection
 from fbvm.live.guard import Guard
 from fbvm.live.host import LOOK_TICKS, LiveHost
+from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import plant_text
 from fbvm.live.updates import UPDATE_NS
 
@@ -82,6 +83,33 @@ def test_a_request_that_does_not_end_is_left_when_it_is_too_long() -> None:
         assert not made.ends, told
     made.receive(line)
     assert made.ends and not made.has_output
+
+
+def test_a_request_may_be_as_long_as_is_said_and_no_longer() -> None:
+    for more in (0, 1):
+        made = Connection(Guard(PORT, token=TOKEN))
+        made.receive(b"GET / HTTP/1.1\r\n")
+        lines, rest = divmod(MOST_REQUEST_BYTES - 16 + more, 1000)
+        for size in [1000] * lines + [rest]:
+            made.receive(b"X: " + b"x" * (size - 5) + b"\r\n")
+        assert made.ends is bool(more)
+
+
+@each_of(("wants", "armed", "halted", "real", "held", "views"), [
+    (True, True, False, False, True, True), (False, True, False, False, True, False), (True, False, False, False, True, False),
+    (True, True, True, False, True, False), (True, True, False, True, True, False), (True, True, False, False, False, False),
+    (False, False, False, False, True, False),
+])  # fmt: skip
+def test_a_scan_with_breakpoints_is_executed_again_for_who_wants_to_see_it(
+    wants: bool, armed: bool, halted: bool, real: bool, held: bool, views: bool
+) -> None:
+    plc = SimpleNamespace(halted=halted, breakpoints=SimpleNamespace(armed=armed), scans=5)
+    closed: list[int] = []
+    live: Any = SimpleNamespace(plc=plc, _observing=SimpleNamespace(close=lambda: closed.append(1)), is_real=real,
+                                wants_view=wants, view=None, past_view=lambda scan: scan,
+                                recorded=SimpleNamespace(scans=range(5 if held else 4)))
+    LivePlc.after_scan(live)
+    assert (live.view, live.wants_view, closed) == (4 if views else None, wants and not views, [1])
 
 
 def test_messages_of_an_open_page_do_not_count_as_a_request() -> None:

@@ -76,6 +76,21 @@ def test_the_head_of_a_long_source_is_found_in_steps() -> None:
         next(source_of(page.plc.image, page.plc.memory.areas, page.live.texts, "Main.n"))
 
 
+def test_where_no_line_has_the_head_of_a_program_its_source_is_shown_from_the_first_on() -> None:
+    text = "\n" * (2 * SITES) + "PROGRAM\n    Main\nVAR n : INT; END_VAR\n    n := n + 1;\nEND_PROGRAM\n"
+    page = Page(text)
+    steps, count = source_of(page.plc.image, page.plc.memory.areas, page.live.texts, "Main"), 0
+    try:
+        while True:
+            next(steps)
+            count += 1
+    except StopIteration as ended:
+        found = ended.value
+    assert (found["first"], len(found["lines"]), found["lines"][-2:]) == (1, 2 * SITES + 5, [
+        {"text": "    n := n + 1;", "names": ["Main.n"]}, {"text": "END_PROGRAM", "names": []}])  # fmt: skip
+    assert count == 1 + 1 + 3 + (2 * SITES + 5) // 2, "sites, the text, rows upwards, two rows each"
+
+
 def test_questions_whose_replies_are_under_way_are_so_many_at_most() -> None:
     page = Page()
     page.done("hello", version=1)
@@ -99,7 +114,7 @@ def test_a_step_lets_the_next_scan_be_observed_where_an_instance_is_looked_at() 
 
 
 def test_a_search_ends_where_enough_is_found_and_rests_between_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    many = " ".join(f"v{number} : INT;" for number in range(40))
+    many = " ".join(f"v{number} : INT;" for number in range(120))
     page = Page(f"PROGRAM Main VAR {many} END_VAR v1 := 1; END_PROGRAM")
 
     def searched(text: str) -> tuple[int, list[str]]:
@@ -113,7 +128,7 @@ def test_a_search_ends_where_enough_is_found_and_rests_between_steps(monkeypatch
 
     assert searched("other") == (searched("nothing")[0], ["CIO 1501"])
     rests, names = searched("v")
-    assert names[0] == "Main.v0" and "CIO 1500" in names and len(names) == 41 and rests == 42 // symbols.STEP
+    assert names[0] == "Main.v0" and "CIO 1500" in names and len(names) == 121 and rests == 121 // symbols.STEP == 2
     monkeypatch.setattr(symbols, "MOST_FOUND", 5)
     assert searched("v")[1] == [f"Main.v{number}" for number in range(5)]
     assert searched("D7")[1][:1] == ["D7"]

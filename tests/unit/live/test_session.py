@@ -12,7 +12,7 @@ from browsers import PUMP, Page
 
 from fbvm.live.futures import Future, run_again
 from fbvm.live.groups import WatchGroups
-from fbvm.live.messages import dump, dump_in_steps
+from fbvm.live.messages import PIECE, dump, dump_in_steps
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import pytest_text
 from fbvm.live.session import Session
@@ -545,13 +545,20 @@ def test_what_is_looked_at_changes_in_the_order_of_the_questions(page: Page) -> 
 
 def test_a_message_that_is_written_in_steps_reads_the_same() -> None:
     long = {str(number): [number] for number in range(200)}
-    for message in ({}, {"re": 1, "ok": {}}, {"re": None, "ok": {"a": [*range(200)], "b": "\u00e4", "c": long,
-                                                                     "d": {"e": [[]] * 60}}}, long):  # fmt: skip
-        steps = dump_in_steps(message)
+    rows: list[tuple[dict[str, Any], int]] = [
+        ({}, 0), ({"re": 1, "ok": {}}, 0), ({"a": [*range(PIECE)]}, 0), ({"a": [*range(PIECE + 1)]}, 2),
+        ({"a": long}, -(-200 // PIECE)),
+        ({"a": {"b": {"c": long}}}, 0), (long, 0),
+        ({"re": None, "ok": {"a": [*range(200)], "b": "\u00e4", "c": long, "d": {"e": [[]] * 60}}},
+         2 * -(-200 // PIECE) - (-60 // PIECE)),
+    ]  # fmt: skip
+    for message, wanted in rows:
+        steps, count = dump_in_steps(message), 0
         with pytest.raises(StopIteration) as ended:
             while True:
                 next(steps)
-        assert ended.value.value == dump(message)
+                count += 1
+        assert (ended.value.value, count) == (dump(message), wanted), message
 
 
 @pytest.mark.slow

@@ -47,8 +47,10 @@ class Selector:
     def __init__(self) -> None:
         self.rows: list[tuple[str, Any, int]] = []
         self.ready: list[tuple[Any, int]] = []
+        self.waited_s: list[float] = []
 
     def select(self, timeout_s: float) -> list[tuple[Any, int]]:
+        self.waited_s.append(timeout_s)
         return [(SimpleNamespace(data=browser), events) for browser, events in self.ready]
 
     def modify(self, sock: Any, wanted: int, browser: Any) -> None:
@@ -122,6 +124,22 @@ def test_events_of_a_browser_that_is_gone_are_left_alone_and_those_who_say_nothi
     assert one.sock.pieces, "it may be written to only"
     server._selector.ready = []  # type: ignore[attr-defined]
     assert not server.serve(0) and one.rounds == 2
+
+
+def test_nobody_is_waited_for_longer_than_was_said(server: LiveServer) -> None:
+    for wait_ns in (-5, 0, 20_000_000):
+        server.serve(wait_ns)
+    assert server._selector.waited_s == [0, 0, 0.02]  # type: ignore[attr-defined]
+
+
+def test_pages_that_are_open_get_new_sessions_and_the_old_ones_are_ended(server: LiveServer) -> None:
+    told: list[str] = []
+    page, file = browser(server, Sock()), browser(server, Sock())
+    page.session = SimpleNamespace(end=lambda: told.append("end"))
+    server._new_session = lambda: SimpleNamespace(begin_again=lambda: told.append("begin again"), end=lambda: None)  # type: ignore
+    old = page.session
+    server.renew_sessions()
+    assert told == ["end", "begin again"] and page.session is not old and file.session is None
 
 
 def test_pages_without_a_session_or_with_something_unsent_get_no_update(server: LiveServer) -> None:

@@ -12,7 +12,7 @@ from fbvm.code.image import Image
 from fbvm.engine.choice import tiers
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
-from fbvm.machine.breakpoints import Halt
+from fbvm.machine.breakpoints import Halt, _of_instance
 from fbvm.machine.plc import Mode, Phase
 from fbvm.watch.conditions import ConditionError
 
@@ -431,3 +431,11 @@ def test_breakpoints_are_set_again_on_another_plc_and_removed() -> None:
     assert not second.breakpoints.armed and second.run(scans=2) == "scans"
     with pytest.raises(KeyError):
         second.breakpoints.remove(made[0])
+
+
+@each_of(("held", "here", "wanted"), [
+    (None, 5, True), (None, 6, False), (None, None, None), (True, 5, True), (False, 5, False), (True, 6, False),
+    (True, None, None), (None, 0, False)])
+def test_a_line_of_one_instance_stops_there_alone(held: bool | None, here: int | None, wanted: bool | None) -> None:
+    test = _of_instance(5, None if held is None else lambda base: held)
+    assert test(here) is wanted

@@ -165,6 +165,25 @@ def test_a_fault_that_counts_scans_needs_every_scan(row: Fault, quiet: bool) -> 
         host.close()
 
 
+def test_a_link_with_events_of_a_connection_under_faults_is_not_quiet() -> None:
+    host = Host(fault("slow", latency_ns=MS))
+    try:
+        host.network.driven = True
+        link = host.link
+        link.submit([Connect(1, SERVER)], 0)
+        said = []
+        for now_ns in range(0, 200 * MS, MS):
+            link.is_quiet = True
+            said += [link.is_quiet for woken in host.network.serve(now_ns) if woken is link]
+            if link.pending:
+                break
+            time.sleep(0.0005)
+        assert said == [False] and [type(event) for event in link.events(0)] == [Opened]
+        assert link.is_quiet
+    finally:
+        host.close()
+
+
 def test_an_open_may_be_the_first_thing_of_all() -> None:
     host = Host(fault("refused"))
     try:

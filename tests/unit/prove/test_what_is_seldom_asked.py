@@ -17,8 +17,9 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import STEP_BUDGET
 from fbvm.prove import prover as prover_module
 from fbvm.prove.bounded import BoundedSearch, Inputs
-from fbvm.prove.encoding import execution
+from fbvm.prove.encoding import execution, summary
 from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.encoding.summary import summarize
 from fbvm.prove.encoding.terms import Terms
 from fbvm.prove.invariants import Invariants
 from fbvm.prove.prover import Limits, Prover, SpuriousRun, prove
@@ -42,10 +43,14 @@ END_PROGRAM"""
 OVERWRITTEN = "PROGRAM Main VAR_INPUT a : INT; END_VAR VAR n : INT; END_VAR a := a MOD 3; n := a; END_PROGRAM"
 
 
-def asked(text: str, question: Question, dialect: str = "standard", **limits: Any) -> Verdict:
+def compiled(text: str, dialect: str = "codesys") -> Image:
     image = compile_text(text, dialect=dialect, lint=False).image
     assert image is not None
-    return prove(image, question, Limits(**{**FEW, **limits}))
+    return image
+
+
+def asked(text: str, question: Question, dialect: str = "standard", **limits: Any) -> Verdict:
+    return prove(compiled(text, dialect), question, Limits(**{**FEW, **limits}))
 
 
 def shown(verdict: Verdict) -> tuple[str, list[dict[str, object]]]:
@@ -91,7 +96,7 @@ def test_what_is_taken_for_any_value_is_said(text: str, dialect: str, unknown: l
     assert head == "taken for any value" and [row.partition(" (")[0] for row in rows.split("), ")] == unknown
 
 
-REALS = "PROGRAM Main VAR_INPUT i : INT; END_VAR VAR r : REAL; s : STRING; n : INT; END_VAR n := i; END_PROGRAM"
+REALS = "PROGRAM Main VAR_INPUT i : INT; END_VAR VAR r : REAL; s : STRING; t : TIME; n : INT; END_VAR n := i; END_PROGRAM"
 PLACES = """PROGRAM Main VAR_INPUT i, j, k : INT(0..40); END_VAR VAR a : ARRAY[0..40, 0..40, 0..40] OF INT; n : INT; END_VAR
     a[i, j, k] := 1; END_PROGRAM"""
 FEW_PLACES = """PROGRAM Main VAR_INPUT i : DINT(0..3); END_VAR VAR a : ARRAY[0..3] OF INT; p : POINTER TO INT; n : INT; END_VAR
@@ -104,6 +109,8 @@ NO_WHOLE = "cannot be followed: compare whole numbers with a whole number"
     (REALS, "Main.r + 1.0 > 2.0", "standard", f"Main.r + 1.0 > 2.0 {NO_WHOLE}"),
     (REALS, "Main.n > Main.r + 1", "standard", f"Main.n > Main.r + 1 {NO_WHOLE}"),
     (REALS, "Main.n > 1.5", "standard", f"Main.n > 1.5 {NO_WHOLE}"),
+    (REALS, "Main.t * Main.r > T#1s", "standard", "Main.r is REAL, which cannot be followed"),
+    (REALS, "Main.t * (Main.r + 1.0) > T#1s", "standard", "Main.r + 1.0 is arithmetic of REAL, of which nothing is known"),
     (REALS, "Main.s = 'a'", "standard", "Main.s is STRING[80], and texts cannot be followed"),
     (REALS, "Main.n + 1.5 > 2", "standard", "1.5 is no whole number, and only whole numbers can be followed"),
     (REALS, "Main.r = Main.n", "standard", "Main.n cannot be followed: compare a REAL with one of its type, or with a number"),
@@ -114,6 +121,9 @@ NO_WHOLE = "cannot be followed: compare whole numbers with a whole number"
     ("FUNCTION F : INT VAR_INPUT a : INT; END_VAR WHILE TRUE DO F := a; END_WHILE END_FUNCTION "
      "PROGRAM Main VAR_INPUT i : INT; END_VAR VAR n : INT; END_VAR n := F(i); END_PROGRAM", "Main.n > 4", "standard",
      "each run ends in a trap"),
+    ("FUNCTION F : INT VAR_INPUT a : INT; END_VAR WHILE TRUE DO F := a; END_WHILE END_FUNCTION "
+     "PROGRAM Main VAR_INPUT i : BOOL; END_VAR VAR n : INT; END_VAR IF i THEN n := F(n); END_IF END_PROGRAM", "Main.n > 4",
+     "standard", "a call never ends"),
 ])  # fmt: skip
 def test_what_cannot_be_followed_is_refused_in_words(text: str, condition: str, dialect: str, said: str) -> None:
     with pytest.raises(Refused) as refused:
@@ -244,6 +254,36 @@ def test_a_handshake_is_asked_of_an_instance() -> None:
     for path in ("Main.n", "D0..D1"):
         with pytest.raises(UnknownPlace, match=f"{path} is no instance of a function block"):
             handshake(names, path)
+
+
+BYTES = """PROGRAM Main VAR_INPUT In : BYTE; END_VAR VAR b, c : BOOL; p : POINTER TO BYTE; n : INT; END_VAR
+    p := ADR(b); c := b; p^ := In; IF b THEN n := 1; ELSE n := 2; END_IF END_PROGRAM"""
+
+
+@pytest.mark.slow
+def test_a_boolean_in_which_another_number_may_lie_is_a_byte() -> None:
+    verdict = asked(BYTES, Question(REACH, "Main.n = 1"), "codesys")
+    assert shown(verdict)[0] == "REACHED after 1 scan, by the shortest run"
+    assert shown(asked(BYTES, Question(NEVER, "Main.n = 0"), "codesys"))[0].startswith("PROVED")
+
+
+@pytest.mark.slow
+def test_how_often_a_program_is_encoded_has_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    for rounds in range(1, 12):
+        monkeypatch.setattr(summary, "MOST_ROUNDS", rounds)
+        try:
+            summarize(compiled(BYTES), STEP_BUDGET)
+        except Refused as refused:
+            said.append(refused.reason)
+    assert said == ["its memory is used in too many shapes", "what is state cannot be told"]
+
+
+@pytest.mark.slow
+def test_lemmas_that_the_solver_does_not_decide_are_no_help(monkeypatch: pytest.MonkeyPatch) -> None:
+    prover = prover_of(Question(NEVER, "Main.n > 2000", lemmas=("Main.n >= 0",)))
+    monkeypatch.setattr(Solver, "ask", lambda self, *some: UNKNOWN)
+    assert prover._with_lemmas() is None and prover.notes == []
 
 
 SOCKET = """PROGRAM Main VAR status AT CIO 1505 : WORD; switches AT CIO 1519 : WORD; code AT D30027 : WORD; n : INT; END_VAR

@@ -128,7 +128,7 @@ class CommonUnitTests:
 
     def test_has_a_name_and_an_address(self) -> None:
         unit = self.new_unit()
-        assert unit.name
+        assert unit.name and unit.changed_words is False
         assert len(unit.address.split(".")) == 4
 
     def test_says_how_it_was_made_and_set(self) -> None:

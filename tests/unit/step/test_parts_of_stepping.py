@@ -15,10 +15,12 @@ from fbvm.step import commands as step_commands
 from fbvm.step.commands import Commands
 from fbvm.step.filters import BetweenScans
 from fbvm.step.position import Position
+from fbvm.step.properties import Properties
+from fbvm.step.scan_replay import ScanReplay
 from fbvm.step.session import Session
 from fbvm.step.statement_ends import StatementEnds
 from fbvm.step.stop_report import StopReport
-from fbvm.step.world import World
+from fbvm.step.world import Debugged, World
 
 MS = 1_000_000
 MOTORS = """\
@@ -188,3 +190,50 @@ def test_what_was_done_inside_a_scan() -> None:
     world: Any = SimpleNamespace(_live={"a": SimpleNamespace(actions=[Position(3), Position(4, 2), Position(6, 1)])})
     asked = range(9), range(5, 9), range(4), range(7, 9)
     assert [World.unchanged_until(world, "a", scans) for scans in asked] == [4, 6, 4, 9]
+
+
+def test_a_reference_stands_for_the_instance_behind_it() -> None:
+    made = session()
+    read = Properties(made.facts)
+    found, none = made.find("Main.found"), made.find("Main.none")
+    assert [read._instance(place, made.memory) for place in (found, none)] == ["Main.one", ""]  # type: ignore[arg-type]
+
+
+def test_a_program_that_has_ended_executes_no_more_scans() -> None:
+    image = compile_text("PROGRAM Main VAR n, k : INT; END_VAR n := n + 1; k := 10 / (2 - n); END_PROGRAM").image
+    assert image is not None
+    made = Session.of(lambda: Plc(image))
+    assert not made.run(lambda statement: False, 5) and made.trap is not None and made.here.scan == 1
+    made.world.advance(made.name, 9)
+    plc = made.world[made.name]
+    scans = plc.scans
+    made.world.scan(made.name)
+    assert plc.scans == scans and plc.trap is not None
+    replay = ScanReplay(plc)
+    assert not replay.play(plc.snapshot(), {}, lambda number, statement: True) and replay.count == 0
+
+
+class Pace:
+    """Real time, as far as a world asks for it."""
+
+    def __init__(self) -> None:
+        self.said: list[object] = []
+
+    def begin(self) -> None:
+        self.said.append("begin")
+
+    def wait(self, elapsed_ns: int) -> int:
+        self.said.append(elapsed_ns)
+        return elapsed_ns + 7
+
+
+def test_scans_in_real_time_wait_for_their_time_and_have_the_time_that_it_is() -> None:
+    image = compile_text(MOTORS, lint=False).image
+    assert image is not None
+    pace: Any = Pace()
+    world = World(lambda: [Debugged("plc", Plc(image))], is_fixed=True, pace=pace)
+    world.begin()
+    for _ in range(2):
+        world.scan("plc")
+    assert pace.said == ["begin", 0, world["plc"].cycle_ns + 7] and world["plc"].now_ns == world["plc"].cycle_ns + 14
+    World(lambda: [Debugged("plc", Plc(image))]).begin()

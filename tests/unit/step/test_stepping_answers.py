@@ -174,3 +174,15 @@ def test_events_are_those_of_the_scans_that_are_asked_for(make: Callable[[], Ste
     del seen[-len(scan):]
     assert events.scans == range(3) and [row for row in seen if row[1] == 0] == [(name, 0) for name in scan] and len(seen) == 19
     assert events.line(session.facts.sites[0]) == TEXT.splitlines()[session.facts.sites[0].line - 1].strip()
+
+
+def test_where_a_place_may_have_changed_is_told_of_a_session() -> None:
+    text = "PROGRAM Main VAR n, k : INT; END_VAR n := n + 1; IF n = 30 THEN k := 1; END_IF END_PROGRAM"
+    made = compile_text(text).image
+    assert made is not None
+    session = Session.of(lambda: Plc(made))
+    session.goto(90)
+    events = SessionEvents(session, StopReport(session, {"text.st": text}))
+    found = events.may_change([session.find("Main.k")], range(80))  # type: ignore[list-item]
+    assert 0 < found.stop < 80 and 29 in found and events.may_change([session.find("Main.k")], range(40, 80)) == range(40, 40)  # type: ignore[list-item]
+    assert events.scans == range(91)

@@ -102,6 +102,8 @@ def test_literals_are_those_of_a_program(text: str) -> None:
     ("D200 = -1", "D200: -1 is out of range of WORD, which holds 0..65535; for these bits write 65535 or 16#FFFF"),
     ("D200 = TRUE", "D200 is WORD and takes a whole number, not TRUE"),
     ("tenth = 1e39", "out of range of REAL"),
+    (" * ".join(["1" + "0" * 39] * 9) + " * 1.5 = 1", "* 1.5 cannot be computed: int too large"),
+    ("tenth + 1e39 = 1", "1e39 is out of range of REAL"), ("REAL#1e38 * 10 = 1", "REAL#1e38 * 10 cannot be computed: "),
     ("n / 0 = 1", "division by zero"),
     ("n MOD (1 - 1) = 1", "division by zero"),
     ("1 / 0 = 1", "division by zero"),
@@ -155,3 +157,8 @@ def test_what_is_no_condition_says_why(text: str, message: str) -> None:
     with pytest.raises(ConditionError) as error:
         parse_condition(text, resolve)
     assert message in str(error.value)
+
+
+def test_arithmetic_behind_a_null_reference_holds_for_nothing() -> None:
+    for text in ("n + 1 < 99", "1 + n < 99", "n = n", "done AND done"):
+        assert not parse_condition(text, resolve).holds(lambda place: None), text

@@ -235,8 +235,6 @@ class FinsService:
         """A connection of which this unit is the client is gone: it is opened again, one to another server at once."""
         if self.state.dialled.pop(channel, None) == self._server(channel):
             self.state.retry_ns[channel] = self._now_ns + RECONNECT_NS
-        else:
-            self.state.retry_ns.pop(channel, None)
 
     def _free_number(self) -> int:
         used = {found.number for found in self.state.connections.values()} | set(self._clients.values())
