@@ -6,11 +6,12 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
+from rows import each_of
 
 from fbvm.net.faults import Fault
 from fbvm.net.relays import Relay, RelayedPort
 from fbvm.net.stream import WINDOW_BYTES, End
-from fbvm.wire.link import Close, Peer, Received, Request, Send, SendTo, Sent
+from fbvm.wire.link import Broken, Close, Event, Failed, Grant, Peer, PeerClosed, Received, Request, Send, SendTo, Sent
 from fbvm.wire.tap import TapKind
 
 CLIENT, SERVER = Peer("192.168.250.2", 1024), Peer("192.168.250.1", 502)
@@ -146,3 +147,73 @@ def test_a_port_under_faults_that_was_closed_sends_and_hears_nothing_more() -> N
         deliver(3)
     port.told(Received(7, b"unit", unit), 3)
     assert len(asked) == 2 and len(link.pending) == 3
+
+
+class Relayed:
+    """A relay between a unit's end and a connection 7 of the host, and all that each side is told, in order."""
+
+    def __init__(self) -> None:
+        self.said: list[object] = []
+        self.carrier, self.owner = Carrier(), Owner()
+        self.owner.told = self.said  # type: ignore[assignment]
+        self.unit = End(self.carrier, CLIENT, SERVER, None, self.owner)
+        behind = SimpleNamespace(submit=lambda requests, now_ns: self.said.extend(requests))
+        self.relay = Relay(self.carrier, behind, 7, self.unit)  # type: ignore[arg-type]
+
+    def do(self, act: Callable[[], object]) -> list[object]:
+        """What is told when something is done, and all that follows from it."""
+        self.said.clear()
+        act()
+        self.carrier.run()
+        return list(self.said)
+
+    def tell(self, *events: Event) -> list[object]:
+        return self.do(lambda: [self.relay.told(event, 0) for event in events])
+
+    def refresh(self) -> list[object]:
+        return self.do(lambda: self.relay.refresh(0))
+
+
+def test_a_relay_grants_what_the_unit_has_room_for() -> None:
+    rig = Relayed()
+    assert rig.relay.endpoints == (CLIENT, SERVER) and not rig.relay.is_over
+    assert rig.refresh() == [Grant(7, WINDOW_BYTES)]
+    assert rig.tell(Received(7, b"abc"), Received(7, b"de")) == ["readable", "readable"]
+    assert rig.unit.take(1, 0) == b"a"
+    waiting = rig.relay._end.waiting_bytes
+    assert rig.refresh() == [Grant(7, WINDOW_BYTES - waiting)] and waiting == 0
+    rig.tell(Received(7, bytes(3 * WINDOW_BYTES)))
+    assert rig.relay._end.waiting_bytes > WINDOW_BYTES and rig.refresh() == [Grant(7, 0)]
+
+
+def test_the_answers_that_are_owed_to_a_unit_are_told_and_others_are_the_relays() -> None:
+    rig, answered = Relayed(), list[object]()
+    connection = SimpleNamespace(answer=answered.append)
+    rig.relay.owe(2, connection)  # type: ignore[arg-type]
+    assert rig.do(lambda: rig.unit.send(b"xyz", 0)) == ["sent 3", Send(7, b"xyz")]
+    assert rig.tell(Sent(7, 5), Failed(7, "send", "EPIPE")) == [] and answered == [Sent(7, 5), Failed(7, "send", "EPIPE")]
+    assert rig.relay._unsent_bytes == 3
+    assert rig.tell(Sent(7, 3), Failed(7, "send", "EPIPE")) == [] and len(answered) == 2 and rig.relay._unsent_bytes == 0
+
+
+@each_of(("error", "wanted"), [
+    ("host", [Close(7, True), "ECONNRESET 0"]), ("peer", ["finished"]), ("fault", ["ECONNRESET 0", Close(7, True)]),
+    ("no fault", []), ("unit", [Close(7, False)]), ("unit breaks", [Close(7, True)])])
+def test_how_a_relay_ends(error: str, wanted: list[object]) -> None:
+    rig = Relayed()
+    acts: dict[str, Callable[[], object]] = {
+        "host": lambda: rig.relay.told(Broken(7, "ETIMEDOUT"), 0), "peer": lambda: rig.relay.told(PeerClosed(7), 0),
+        "fault": lambda: rig.relay.break_if(True, 0), "no fault": lambda: rig.relay.break_if(False, 0),
+        "unit": lambda: rig.unit.leave(0), "unit breaks": lambda: rig.unit.reset(0),
+    }  # fmt: skip
+    assert rig.do(acts[error]) == wanted
+    is_closed = any(isinstance(each, Close) for each in wanted)
+    assert (rig.relay.closed, rig.refresh()) == (is_closed, [] if is_closed else [Grant(7, WINDOW_BYTES)])
+    if error == "host":
+        assert rig.do(acts[error]) == [] and rig.relay.is_over, "nothing is closed twice"
+
+
+def test_a_relay_whose_unit_hears_nothing_any_more_gives_its_connection_up() -> None:
+    rig = Relayed()
+    rig.unit._break("ETIMEDOUT", 0)
+    assert rig.refresh() == [Close(7, True)] and rig.refresh() == []
