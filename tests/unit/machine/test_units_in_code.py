@@ -15,7 +15,7 @@ from rows import first_quick
 from toy_unit import Echoing, Toy
 
 from fbvm import Etn21, LoopNetwork, Plc, compile_text
-from fbvm.base.areas import NOW
+from fbvm.base.areas import NEVER, NOW
 from fbvm.code.image import Image
 from fbvm.engine.clock import Clock
 from fbvm.engine.native import engine as native
@@ -307,6 +307,27 @@ def test_a_unit_that_is_attached_goes_over_to_the_engine_of_its_plc() -> None:
 
 
 # --- bursts -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_plc_whose_units_have_something_to_hear_or_to_ask_enters_no_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig(image(every=1000, slow=False))
+    rig.plc.run(scans=3)
+    path = way(rig)
+    assert isinstance(path, WithUnits)
+    path._parameters.events_collected = 1
+    assert path.enter_batch(rig.plc.now_ns, 77) == (path._scans, NEVER)
+    assert (path._parameters.scan_budget, path._parameters.events_collected) == (77, 0)
+    path._parameters.unfinished = 1
+    assert path.enter_batch(rig.plc.now_ns, 88) is None
+    path._parameters.unfinished = 0
+    monkeypatch.setattr(path, "_has_pending_events", lambda: True)
+    assert path.enter_batch(rig.plc.now_ns, 88) is None and path._parameters.scan_budget == 77
+    monkeypatch.undo()
+    skipped, path._io.changed_words = path._io.skipped, True
+    path.leave_batch(5)
+    assert (path._io.skipped, path._io.changed_words) == (skipped + 5, False)
+    assert path.enter_batch(rig.plc.now_ns, 88) is not None
 
 
 def bursts(rig: Rig, count: int, most: int, pause_ns: int, stop: int = 0) -> list[list[int]]:

@@ -35,3 +35,15 @@ def test_a_port_in_use_is_refused() -> None:
     with pytest.raises(OSError, match=r".+"):
         Listener("127.0.0.1", door.port)
     door.close()
+
+
+def test_a_stream_that_is_closed_has_ended_for_the_other_side_whoever_holds_its_socket() -> None:
+    listener = Listener("127.0.0.1", 0)
+    try:
+        stream = connect("127.0.0.1", listener.port)
+        with listener.accept() as other, stream._connection.dup():
+            other._connection.settimeout(5)
+            stream.close()
+            assert other.receive() == b""
+    finally:
+        listener.close()

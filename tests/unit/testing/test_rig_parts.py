@@ -20,8 +20,8 @@ from fbvm.testing.coverage import FileCoverage
 from fbvm.testing.coverage_plugin import CoveragePlugin
 from fbvm.testing.reads import VariableReads
 from fbvm.testing.recorded import Recorded
-from fbvm.testing.session import library_folders, search_folders
-from fbvm.testing.st_items import StFile, StItem
+from fbvm.testing.session import UNEXPLAINED, library_folders, search_folders
+from fbvm.testing.st_items import AssertFailed, StFile, StItem
 from fbvm.testing.subject import LIBRARY, SubjectError, subject
 from fbvm.testing.suites import results
 from fbvm.testing.warning_plugin import WarningPlugin, add_options
@@ -450,3 +450,17 @@ def test_values_of_a_structure_are_those_of_its_members_but_constants() -> None:
     kind = t.StructType("S", 8, 4, {"A": t.Field("a", t.BOOL, 0), "K": t.Field("k", t.INT, 2, constant=True),
                                     "B": t.Field("b", t.UINT, 4)})
     assert repr(strategies.values(kind)) == "fixed_dictionaries({'a': booleans(), 'b': integers(min_value=0, max_value=65535)})"
+
+
+def test_of_a_failure_that_nobody_reads_no_page_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages: list[str] = []
+    monkeypatch.setattr("fbvm.testing.st_items.failure_page", lambda item, suffix, write: pages.append(item.name) or "page")
+    file = tmp_path / "tests" / "test_it.st"
+    file.parent.mkdir()
+    file.write_text("PROGRAM Wrong VAR n : INT; END_VAR n := n + 1; ASSERT(n < 1); END_PROGRAM", encoding="utf-8")
+    for unexplained in (False, True):
+        item = st_item(file, "Wrong")
+        item.config.stash[UNEXPLAINED] = unexplained
+        with pytest.raises(AssertFailed) as failed:
+            item.runtest()
+        assert (failed.value.page, pages) == ("" if unexplained else "page", ["Wrong"])

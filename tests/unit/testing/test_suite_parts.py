@@ -16,6 +16,7 @@ from fbvm.record.trace.events import Call, Frame, Return
 from fbvm.testing.subject import SubjectError
 from fbvm.testing.suites import items, program, results
 from fbvm.testing.suites.items import SuiteItem, SuitesFile, SuiteTestFailed
+from fbvm.testing.suites.plugin import pytest_sessionfinish
 from fbvm.testing.suites.program import FoundTest, find_suites
 from fbvm.testing.suites.results import Failure, SuiteRun, SuiteTestResult
 from fbvm.watch.paths import UnknownPlace
@@ -354,3 +355,18 @@ def test_a_program_that_runs_no_suites_has_none() -> None:
     assert len(find_suites([Source("tests.st", TESTS.format("", "RUN_IN_SEQUENCE();"))])) == 3
     circle = "FUNCTION_BLOCK A EXTENDS B END_FUNCTION_BLOCK FUNCTION_BLOCK B EXTENDS A END_FUNCTION_BLOCK\n"
     assert find_suites([Source("a.st", circle + "PROGRAM Main VAR a : A; END_VAR RUN(); END_PROGRAM")]) == []
+
+
+def test_the_results_of_the_suites_that_ran_are_written_where_the_option_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrote: list[tuple[Path, list[Any]]] = []
+    monkeypatch.setattr("fbvm.testing.suites.xunit.write_xunit", lambda path, runs: wrote.append((path, runs)))
+    session: Any = SimpleNamespace(stash=pytest.Stash(), config=SimpleNamespace(getoption=lambda name: options[name]))
+    for said in ("", "out.xml"):
+        options = {"fbvm_xunit": said}
+        pytest_sessionfinish(session)
+        session.stash[items.FILES] = [SimpleNamespace(run="one"), SimpleNamespace(run=None), SimpleNamespace(run="two")]
+    pytest_sessionfinish(session)
+    assert wrote == [(Path("out.xml"), ["one", "two"])] * 2
+    del session.stash[items.FILES]
+    pytest_sessionfinish(session)
+    assert wrote[2] == (Path("out.xml"), [])
