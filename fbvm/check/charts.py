@@ -80,8 +80,7 @@ class _Rules:
                        nearest or f"write ACTION {name.text}: .. END_ACTION")
             return False
         target = tree.NameRef(name.start, name.end, name.text)
-        if self.scope.infer(target) is None:
-            return False
+        self.scope.infer(target)
         if base(variable.type) != BOOL:
             self.error("S0112", name, f"{name.text} is {variable.type}: a variable that is an action is BOOL")
             return False

@@ -29,14 +29,13 @@ def check_body(context: Context, pou: Pou) -> None:
 def _is_enclosed(text: str, node: tree.Return) -> bool:
     """True for `RETURN(condition);`, whose value stands in parentheses as a whole."""
     assert node.value is not None
-    start = node.start + len("RETURN")
-    if "(" not in text[start:node.value.start]:
-        return False
     depth = 0
-    for found in re.finditer(r"'[^']*'|[();]", text[start:]):
+    for found in _PARENTHESES.finditer(text, node.start + len("RETURN")):
+        if depth == 0 and found.start() >= node.value.start:
+            return False
         depth += {"(": 1, ")": -1}.get(found[0], 0)
-        if depth == 0:
-            return start + found.end() > node.value.end and not text[start + found.end():].lstrip()[:1].strip(";")
+        if depth == 0 and found[0] == ")":
+            return found.end() > node.value.end
     return False
 
 
@@ -361,6 +360,8 @@ _CHECK: dict[type, Callable[..., None]] = {
 }
 
 
+_PARENTHESES = re.compile(r"""\(\*.*?\*\)|//[^\n]*|'(?:\$.|[^$'])*'|"(?:\$.|[^$"])*"|[();]""", re.S)
+"""Parentheses and ends of statements, and comments and texts as wholes, in which these say nothing."""
 _CONDITIONAL = re.compile(r"(?im)^(?:[ \t]*\w+[ \t]*:)?[ \t]*((?:JMP|CAL|RET)CN?)\b")
 """An instruction that is executed if the current result is TRUE or FALSE."""
 

@@ -184,8 +184,7 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
     if kind is None:
         return False
     if _takes_copy(scope, value, kind, variable):
-        if not scope.fit(value, variable.type, "S0405", variable.name):
-            return False
+        scope.fit(value, variable.type, "S0405", variable.name)
         scope.facts.copies[value] = aggregates.in_frame(scope, value, variable.type, "copy of a text")
         return True
     if isinstance(kind, AnyType) and not isinstance(variable.type, AnyType) and scope.describes(value, variable.type):

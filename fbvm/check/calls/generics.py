@@ -111,8 +111,7 @@ def function(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> Pou 
     if key not in scope.project.instantiated:
         made = Pou(pou.name, pou.kind, pou.source, _with_wide_texts(copied(pou.tree), types), types=types, as_written=False)
         scope.project.instantiated[key] = made
-        if not scope.context.interface(made, pou.source, call):
-            return None
+        scope.context.interface(made, pou.source, call)
         scope.context.check_body(made)
     return scope.project.instantiated[key]
 

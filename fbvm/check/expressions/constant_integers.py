@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from fbvm.base.codes import CODES
 from fbvm.base.types import DINT, LINT, fold
 from fbvm.check.expressions.scope import Scope
+from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import walk
@@ -25,7 +26,7 @@ def integer(scope: Scope, expr: tree.Expr, known: Mapping[str, int] | None = Non
     value = scope.facts.constants.get(expr)
     if isinstance(value, float) and scope.takes_power(expr, LINT):
         return int(value)
-    if isinstance(value, bool) or not isinstance(value, int):
+    if isinstance(value, bool) or not isinstance(value, int) or is_any(kind, "ANY_DURATION", "ANY_DATE"):
         what = f"{kind}" if value is not None else "not known before the program runs"
         if value is None and is_undefined(scope, expr):
             return None
@@ -33,19 +34,17 @@ def integer(scope: Scope, expr: tree.Expr, known: Mapping[str, int] | None = Non
                     scope.power_hint(expr, DINT) or "write a number" if value is not None else
                     "write a literal, or declare the name in a VAR CONSTANT section")
         return None
-    exact = _exact(scope, expr)
-    return value if exact is None else exact
+    return _exact(scope, expr)
 
 
-def _exact(scope: Scope, expr: tree.Expr) -> int | None:
+def _exact(scope: Scope, expr: tree.Expr) -> int:
     """The value of a constant with sums and products of any width: ARRAY[1..n * 40] of a UINT n never wraps."""
     if isinstance(expr, tree.Binary) and expr.op in ("+", "-", "*"):
         left, right = _exact(scope, expr.left), _exact(scope, expr.right)
-        if left is None or right is None:
-            return None
         return left + right if expr.op == "+" else left - right if expr.op == "-" else left * right
-    value = scope.facts.constants.get(expr)
-    return value if isinstance(value, int) and not isinstance(value, bool) else None
+    value = scope.facts.constants[expr]
+    assert isinstance(value, int), "only integers make one"
+    return value
 
 
 def is_undefined(scope: Scope, expr: tree.Expr) -> bool:

@@ -294,15 +294,12 @@ def _chained(scope: Scope, expr: tree.Binary, right: Type) -> bool:
     if expr.op not in COMPARISONS[2:] or not isinstance(first, tree.Binary) or first.op not in COMPARISONS or right == BOOL:
         return False
     text = scope.text
-    if scope.source.text[first.start:first.start + 1] != "(":
-        if scope.dialect.narrowing:
-            scope.error("S0193", expr, f"this compares a BOOL, 0 or 1, with {right}",
-                        f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}")
-            return False
-        scope.error("S0302", expr, f"{expr.op} is not defined for BOOL and {right}",
-                    f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}")
-        return True
-    return False
+    meant = f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}"
+    if scope.dialect.narrowing:
+        scope.error("S0193", expr, f"this compares a BOOL, 0 or 1, with {right}", meant)
+        return False
+    scope.error("S0302", expr, f"{expr.op} is not defined for BOOL and {right}", meant)
+    return True
 
 
 def _operand_type(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
@@ -403,8 +400,8 @@ def _power(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
     if single and want is not None and base(want) == REAL:
         kind = REAL
     for side, side_kind in ((expr.left, left), (expr.right, right)):
-        if is_untyped(side_kind) and scope.adopt(side, kind) is None:
-            return None
+        if is_untyped(side_kind):
+            scope.adopt(side, kind)
     return _folded(scope, expr, kind, kind)
 
 

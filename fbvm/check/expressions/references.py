@@ -92,7 +92,6 @@ def _held(scope: Scope, expr: tree.Expr, variable: Variable) -> Holder:
         assert variable.owner is not None
         row = variable.owner.referred
     if variable not in row:
-        variable.object = len(row)
         row.append(variable)
     return Holder(expr, variable)
 
