@@ -77,15 +77,12 @@ MIDDLE = {"THEN", "DO", "OF", "TO", "BY", "AND", "OR", "XOR", "MOD"}
 
 def sign(kind: str) -> str:
     """How a terminal is written in a program."""
-    for terminal in tables("st").terminals:
-        if terminal.name == kind:
-            return terminal.pattern if terminal.literal else kind
-    return "the end of the text" if kind == "$END" else kind
+    return next((terminal.pattern for terminal in tables("st").terminals if terminal.name == kind and terminal.literal), kind)
 
 
 def quoted(kind: str) -> str:
     """How a terminal is written in a message."""
-    return sign(kind) if kind == "$END" else f"`{sign(kind)}`"
+    return f"`{sign(kind)}`"
 
 
 def wanted(kinds: set[str]) -> str:

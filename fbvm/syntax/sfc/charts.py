@@ -35,11 +35,9 @@ class Charts:
         """All associations of the POU, with the action whose chart they stand in."""
 
     def body(self, word: Token, body: Block, elements: Sequence[Action | Part]) -> Block:
-        """The body of the POU that begins with `word`: the chart if the POU has steps, else `body` as it is."""
+        """The body of a POU with steps, which begins with `word`: the chart, or `body` as it is if only actions have steps."""
         parts = [part for part in elements if isinstance(part, Step | Transition)]
         charted, self.builder.charted = self.builder.charted, {}
-        if not parts and not charted:
-            return body
         first = parts[0] if parts else next(iter(charted))
         if word.type == "FUNCTION":
             self.builder.report("S0111", word.start, word.end, "a FUNCTION has no steps: it remembers nothing",

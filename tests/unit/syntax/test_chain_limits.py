@@ -6,10 +6,13 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.il import lowering
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st import builder
+from fbvm.syntax.st.automaton import STACK_LIMIT
 from fbvm.syntax.tree import Pou
 from fbvm.syntax.tree.il import InstructionList
+from fbvm.syntax.tree.outline import dump
 
 
 def codes(statement: str) -> list[str]:
@@ -36,3 +39,30 @@ def test_a_list_does_not_know_the_instances_of_the_pou_before() -> None:
         assert isinstance(pou, Pou) and isinstance(pou.body[0], InstructionList)
         made.append(type(pou.body[0].body[-1]).__name__)
     assert made == ["CallStatement", "Assign"]
+
+
+DEEP, NO_OPERAND = "this is nested too deep", "an operand is a variable or a constant, not an expression"
+
+
+@each_of(("operand", "said"), (
+    ("-" * 19 + "n", NO_OPERAND), ("-" * 20 + "n", DEEP), ("n" + ".a" * 19, ""), ("n" + ".a" * 20, DEEP), ("a[" * 201 + "1", DEEP)))
+def test_an_operand_of_a_list_is_as_deep_as_it_may_be(operand: str, said: str) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(builder, "CHAIN_LIMIT", 20)
+        found = parse(Source("x", f"PROGRAM p\nLD {operand}\nST n\nEND_PROGRAM\n"))[1]
+    assert [(each.code, each.message) for each in found] == ([("S0114", said)] if said else [])
+
+
+def test_signs_without_end_are_nested_too_deep() -> None:
+    assert codes(f"a := {'-' * (STACK_LIMIT + 1)}(1);") == ["S0106"]
+
+
+def test_a_long_current_result_of_a_list_is_kept_in_a_temporary() -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lowering, "LONGEST", 3)
+        tree, errors = parse(Source("x", "PROGRAM p\nLD 1\n" + "ADD 2\n" * 6 + "ST n\nEND_PROGRAM\n"))
+    assert not errors and isinstance(tree.declarations[0], Pou)
+    made = " ".join(dump(tree.declarations[0].body[0]).partition("temporaries")[0].split())
+    assert made == ("InstructionList body: - Assign targets=[$CR1] op=:= value: Binary + int:2 left: Binary + int:2 left: "
+                    "Binary + int:1 int:2 Assign targets=[n] op=:= value: Binary + int:2 left: Binary + int:2 left: "
+                    "Binary + $CR1 int:2")

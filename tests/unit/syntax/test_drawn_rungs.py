@@ -43,6 +43,13 @@ RUNGS = {
     "a condition for nothing": "LD a; AND b", "blocks of inputs too few": "LD a; CNT 1 #10",
     "too many blocks": "LD a; LD b; OUT x",
     "conditions that meet": "LD a; OUT TR0; AND b; LD TR0; ANDNOT c; ORLD; OUT x",
+    "a block that is missing": "LD a; ANDLD; OUT x", "AND of a branch": "LD a; OUT TR0; LD b; LD TR0; AND c; ANDLD; OUT x",
+    "OR behind an output": "LD a; OUT x; LD b; ORLD; OUT y", "OR of nothing": "LD a; OUT TR0; LD TR0; ORLD; OUT x",
+    "a block program": "LD a; BPRG 1; OUT x; BEND; LD b; OUT y",
+    "an input that is missing": "LD a; LD b; LD c; CNT 1 #10; CNT 2 #10",
+    "inputs that begin at two points": "LD a; OUT TR0; AND b; OUT TR1; AND c; LD TR0; AND d; LD TR1; AND e; SFT D0 D1",
+    "an input beside the rail": "LD a; OUT TR0; OUT x; LD b; LD TR0; AND c; CNT 1 #10",
+    "an output below a box of two inputs": "LD a; OUT TR0; AND b; LD TR0; AND c; CNT 5 #10; LD TR0; AND d; OUT x",
     "an interlock": "LD a; IL; LD b; OUT c; ILC",
     "seven in series": "LD a; AND b; AND c; AND d; AND e; AND f; AND g; OUT x; MOV #1 D0",
 }  # fmt: skip

@@ -19,7 +19,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.ladder.drawing.diagram import WIRE
 from fbvm.syntax.ladder.instructions.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder.mnemonics import Symbol, read_rungs
-from fbvm.syntax.ladder.operands import SYMBOLS, Operands
+from fbvm.syntax.ladder.operands import SYMBOLS, OperandError, Operands
 from fbvm.syntax.ladder.symbols import is_own, number
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
 
@@ -195,7 +195,10 @@ class RungWriter:
     def _symbol(self, name: str) -> str:
         """The variable of a contact or coil; an address is noted as one that other tools cannot name."""
         name = self.numbered.get(name.upper(), name)
-        meant = Operands().expression(name, "b", self.step.start, self.step.end)
+        try:
+            meant = Operands().expression(name, "b", self.step.start, self.step.end)
+        except OperandError as wrong:
+            raise NotExportable(self.step, wrong.args[0], "") from None
         if not isinstance(meant, tree.NameRef | tree.Member | tree.Index) or name.upper() in SYMBOLS:
             self.foreign(self.step, f"{name} is an address, for which other tools have no name; declare a variable AT it")
         return name
