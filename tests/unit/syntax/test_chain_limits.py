@@ -1,4 +1,4 @@
-"""How deep an expression may be, to the operator; and what a POU's parser keeps of the one before: nothing."""
+"""How deep an expression may be, to the operator; pins that are texts; and what a POU's parser keeps of the one before: nothing."""
 
 from __future__ import annotations
 
@@ -66,3 +66,11 @@ def test_a_long_current_result_of_a_list_is_kept_in_a_temporary() -> None:
     assert made == ("InstructionList body: - Assign targets=[$CR1] op=:= value: Binary + int:2 left: Binary + int:2 left: "
                     "Binary + int:1 int:2 Assign targets=[n] op=:= value: Binary + int:2 left: Binary + int:2 left: "
                     "Binary + $CR1 int:2")
+
+
+def test_a_pin_of_a_block_in_a_rung_may_be_a_text() -> None:
+    text = "PROGRAM p\nLADDER\nLD a\nFBCALL Shown s IN:='one' T:=\"two\" Q=>b\nEND_LADDER\nEND_PROGRAM\n"
+    tree, errors = parse(Source("x", text))
+    assert not errors
+    assert [" ".join(line.split()[2:]) for line in dump(tree).split("\n") if "Argument" in line][1:3] == [
+        "name=IN value=string:'one'", "name=T value=wstring:'two'"]

@@ -40,6 +40,14 @@ def test_names_are_spelt_as_other_files_declare_them() -> None:
         "q.North := p.Place.East + Twice(Value := 2); m := Mode#Auto; END_PROGRAM")
 
 
+def test_a_sign_behind_rungs_and_types_that_name_each_other_are_formatted() -> None:
+    text = ("TYPE a : b; B : A; END_TYPE\nPROGRAM P VAR x : a := (M := 1); Y : b; END_VAR\nLADDER\nLD x\nOUT y\nEND_LADDER\n;\n"
+            "X.m := y.m;\nEND_PROGRAM\n")
+    assert formatted(Source("m.st", text)) == (
+        "TYPE\n    a : B;\n    B : a;\nEND_TYPE\n\nPROGRAM P\nVAR\n    x : a := (M := 1);\n    Y : B;\nEND_VAR\n    LADDER\n"
+        "        LD      x\n        OUT     y\n    END_LADDER;\n    x.m := Y.m;\nEND_PROGRAM\n", [])
+
+
 @pytest.mark.slow
 def test_what_a_source_is_formatted_to() -> None:
     ugly = (TEXTS / "ugly.st").read_text(encoding="utf-8")
