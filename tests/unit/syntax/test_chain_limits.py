@@ -1,4 +1,4 @@
-"""How deep an expression may be, to the operator; pins that are texts; and what a POU's parser keeps of the one before: nothing."""
+"""How deep an expression may be, to the operator; what a POU's parser keeps of the one before: nothing; texts at pins."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ DEEP, NO_OPERAND = "this is nested too deep", "an operand is a variable or a con
 
 
 @each_of(("operand", "said"), (
-    ("-" * 19 + "n", NO_OPERAND), ("-" * 20 + "n", DEEP), ("n" + ".a" * 19, ""), ("n" + ".a" * 20, DEEP), ("a[" * 201 + "1", DEEP)))
+    ("-" * 19 + "n", NO_OPERAND), ("-" * 20 + "n", DEEP), ("n" + ".a" * 19, ""), ("n" + ".a" * 20, DEEP),
+    ("a[" * 201 + "1", DEEP)))
 def test_an_operand_of_a_list_is_as_deep_as_it_may_be(operand: str, said: str) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(builder, "CHAIN_LIMIT", 20)
