@@ -9,7 +9,7 @@ import pytest
 from rows import each_of
 
 from fbvm.net.faults import Fault
-from fbvm.net.relays import Relay, RelayedPort
+from fbvm.net.relays import Relay, RelayedPort, Relays
 from fbvm.net.stream import WINDOW_BYTES, End
 from fbvm.wire.link import Broken, Close, Event, Failed, Grant, Peer, PeerClosed, Received, Request, Send, SendTo, Sent
 from fbvm.wire.tap import TapKind
@@ -218,3 +218,11 @@ def test_a_relay_whose_unit_hears_nothing_any_more_gives_its_connection_up() -> 
     rig = Relayed()
     rig.unit._break("ETIMEDOUT", 0)
     assert rig.refresh() == [Close(7, True)] and rig.refresh() == []
+
+
+@each_of(("links", "before", "scan"), [
+    ({}, False, 0), ({CLIENT.host: 0}, False, 0), ({CLIENT.host: 0}, True, 0), ({CLIENT.host: 1}, False, 0),
+    ({CLIENT.host: 1}, True, 1), ({SERVER.host: 5}, False, 4), ({SERVER.host: 5, CLIENT.host: 7}, True, 7)])
+def test_of_which_scan_a_fault_between_two_is(links: dict[str, int], before: bool, scan: int) -> None:
+    made = {host: SimpleNamespace(refreshes=refreshes) for host, refreshes in links.items()}
+    assert Relays.scan_of(SimpleNamespace(_links=made, _before_refresh=before), CLIENT, SERVER) == scan  # type: ignore[arg-type]
