@@ -323,11 +323,10 @@ class Commands:
             if start_ns <= row.now_ns < end_ns:
                 yield f"  {row}"
 
-    def _expect(self, rest: str) -> Iterator[str]:
+    def _expect(self, rest: str) -> None:
         condition = parse_condition(rest, self.session.find)
         if not condition.holds(self.session.read):
             raise ExpectationError(f"{rest} does not hold in {self.report.place()}")
-        return iter(())
 
     def _help(self, rest: str) -> Iterator[str]:
         if rest and rest not in COMMANDS_BY_WORD:

@@ -7,13 +7,16 @@ from typing import Any
 
 import pytest
 import test_noc as noc
+from common_unit_tests import FakeMemory
 from fins_rig import FinsRig, TcpClient
+from rows import each_of
 from test_fins_connections import ClientRig
 from test_noc import COMMAND as LINE_COMMAND
 from test_noc import LINE, STATE, ScriptedPeer
 
 from fbvm.base.areas import NEVER
 from fbvm.units.etn21 import data
+from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.faults import Fault
 from fbvm.units.etn21.fins.service import FinsService
 from fbvm.units.etn21.fins.state import (
@@ -418,8 +421,8 @@ def test_people_see_the_peer_of_a_line_or_whom_it_is_to_reach(
     rig = noc.Rig()
     words = noc.slot(rig.memory, 2)
     words[LINE.module], words[LINE.state], words[LINE.error], words[LINE.received] = 8, STATE.failed, 0x36, 3
-    for at, values in ((LINE.peer_ip, peer[:2]), (LINE.remote_ip, remote[:2])):
-        words[at], words[at + 1] = values
+    for first, values in ((LINE.peer_ip, peer[:2]), (LINE.remote_ip, remote[:2])):
+        words[first], words[first + 1] = values
     words[LINE.peer_port], words[LINE.remote_port] = peer[2], remote[2]
     [socket] = rig.noc.front(rig.memory).sockets
     assert (socket.name, socket.state, socket.peer, socket.result) == ("line 2", "FAILED", shown, "ECONNRESET")
@@ -438,3 +441,22 @@ def test_lamps_and_counters_of_a_module_are_read_from_its_head() -> None:
     front = rig.noc.front(rig.memory)
     assert [(lamp.name, lamp.said) for lamp in front.lamps] == [("RUN", "off"), ("LINK", "off"), ("100 MB", "on")]
     assert ("sent", "0") in front.settings and ("slot", "7") in front.settings
+
+
+N, M = 1500, 30_000
+
+
+@pytest.mark.slow
+@each_of(("area", "word", "value", "left"), [
+    ("CIO", 0, 0, None), ("A", at.RESTART, 1, 0), ("A", at.INITIALIZING, 1, 0), ("CIO", N + 5, 7, 0),
+    ("CIO", N + at.SWITCHES, 8, 0), ("CIO", N, at.FORCE_CLOSE, 0), ("CIO", N + at.SERVICE_STATUS, 9, 0x4000), ("D", M + 1, 5, 0),
+    ("D", M, 5, None), ("D", M + at.PARAMETERS, 3, None), ("A", at.RESTART, 2, None), ("A", at.INITIALIZING, 2, None),
+])  # fmt: skip
+def test_at_power_on_a_word_that_was_left_is_cleared(area: str, word: int, value: int, left: int | None) -> None:
+    """Only a unit that finds something to clear is switched on for it; words of the user, and bits of others, stay."""
+    unit, memory = Etn21(), FakeMemory()
+    memory.words(area)[word] = value
+    assert unit.reset(memory) == []
+    is_on = unit.exchanged is not None
+    assert (memory.words(area)[word], is_on, unit.changed_words) == (value if left is None else left, left is not None, is_on)
+    assert memory.words("CIO")[N + at.SERVICE_STATUS] == 0x4000
