@@ -6,6 +6,7 @@ import pytest
 from browsers import Page
 
 from fbvm.live.lesson import TRIES, LiveLesson
+from fbvm.live.messages import MessageError
 
 
 @pytest.fixture
@@ -45,3 +46,26 @@ def test_a_page_without_a_lesson_says_so() -> None:
     page = Page()
     assert page.done("hello", version=1)["lesson"] is None
     assert "fbvm learn --live" in page.ask("solution")["error"]
+
+
+def test_tries_are_counted_down_to_none_and_what_is_wrong_later_has_to_be_predicted_again() -> None:
+    wrong, mistakes = ["wrong"], list[str]()
+    made = LiveLesson("T", "# T", lambda: [("a", "?", ""), ("b", "?", "1")], lambda values: wrong[0] + values.get("b", ""),
+                      lambda: mistakes, lambda: "s")  # fmt: skip
+    for left in (TRIES - 1, TRIES - 2, 0, 0):
+        assert made.take_prediction(["a", "b"], ["x", "!"]) == {"mistake": "wrong!", "tries_left": left}
+    assert made.take_prediction(["b", "a"], ["x", " "]) == {"mistake": "a is still empty; predict first", "tries_left": 0}
+    assert made.about() == {"title": "T", "text": "# T", "questions": [["a", "?", ""], ["b", "?", "1"]], "predicted": False,
+                            "tries_left": 0} and made.tries == 4  # fmt: skip
+    made.tries, wrong[0] = 0, ""
+    assert made.take_prediction(["a"], ["4"]) == {"mistake": "", "tries_left": TRIES} and made.about()["predicted"] is True
+    for said, left in (([], TRIES), (["one", "two"], TRIES - 1), (["one"], TRIES - 2)):
+        mistakes[:] = said
+        assert made.take_check() == {"mistakes": said, "tries_left": left}
+    wrong[0] = "no"
+    assert made.take_prediction(["a"], ["3"]) == {"mistake": "no", "tries_left": 0} and not made.is_predicted
+    for names, values in ((["c"], ["1"]), (["a"], ["1", "2"]), (["a", "c"], ["1", "2"])):
+        with pytest.raises(MessageError, match="a prediction has one value for each of a, b"):
+            made.take_prediction(names, values)
+    with pytest.raises(MessageError, match="predict first"):
+        made.take_check()

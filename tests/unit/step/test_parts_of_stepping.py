@@ -17,6 +17,7 @@ from fbvm.step.filters import BetweenScans
 from fbvm.step.position import Position
 from fbvm.step.properties import Properties
 from fbvm.step.scan_replay import ScanReplay
+from fbvm.step.search import MOST_AT_ONCE, LiveRunner, PastRunner
 from fbvm.step.session import Session
 from fbvm.step.statement_ends import StatementEnds
 from fbvm.step.stop_report import StopReport
@@ -237,3 +238,26 @@ def test_scans_in_real_time_wait_for_their_time_and_have_the_time_that_it_is() -
         world.scan("plc")
     assert pace.said == ["begin", 0, world["plc"].cycle_ns + 7] and world["plc"].now_ns == world["plc"].cycle_ns + 14
     World(lambda: [Debugged("plc", Plc(image))]).begin()
+
+
+@each_of(("quiet", "checks", "moved", "asked"), [
+    (10, False, True, [8]), (10, True, False, []), (3, False, False, []), (4, False, True, [2]), (2, False, False, []),
+    (9999, False, True, [MOST_AT_ONCE])])
+def test_scans_that_nobody_looks_into_are_executed_at_once(quiet: int, checks: bool, moved: bool, asked: list[int]) -> None:
+    found: list[int] = []
+    plc = SimpleNamespace(scans=2, scan_many=lambda left: found.append(left) or True)
+    runner: Any = SimpleNamespace(check=object() if checks else None, plc=plc, _name="a",
+                                  _world=SimpleNamespace(quiet_until=lambda name, scan: quiet))
+    assert bool(LiveRunner.many(runner, 9999)) is moved and found == asked
+    scene = SimpleNamespace(unchanged_until=lambda scans: (scans.start, scans.stop))
+    past: Any = SimpleNamespace(check=runner.check, plc=plc, _scene=scene, _again=SimpleNamespace(many=lambda end: end))
+    for scan, end in ((7, 7), (9999, 2 + MOST_AT_ONCE)):
+        assert PastRunner.many(past, scan) == (False if checks else (2, end))  # type: ignore[comparison-overlap]
+
+
+def test_only_a_scan_that_stands_is_taken_back() -> None:
+    told: list[str] = []
+    world = SimpleNamespace(undo=told.append)
+    for halted in (None, object()):
+        LiveRunner.undo(SimpleNamespace(_world=world, _name="a", plc=SimpleNamespace(halted=halted)))  # type: ignore[arg-type]
+    assert told == ["a"]

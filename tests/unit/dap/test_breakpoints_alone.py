@@ -1,0 +1,88 @@
+"""Breakpoints of a client as they are kept: their numbers, what another program has of them, and when all are taken away."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from rows import each_of
+
+from fbvm.dap.breakpoints import BreakpointRequests, Wanted
+from fbvm.machine.breakpoints import Breakpoint
+
+ROWS = {name: Breakpoint("line", name, "", "") for name in ("a", "b", "c", "gone")}
+
+
+class Debugged:
+    """Two PLCs, what was set on each, and what the client was told."""
+
+    def __init__(self) -> None:
+        self.put: list[tuple[str, list[str]]] = []
+        self.sent: list[tuple[str, Any]] = []
+        self.checks: dict[str, object] = {"one": object()}
+        self.running = SimpleNamespace(plcs={name: SimpleNamespace(put=lambda rows, name=name: self.put.append(
+            (name, [row.where for row in rows]))) for name in ("one", "two")}, checks={"one": object()})  # fmt: skip
+
+    def send_event(self, name: str, body: object) -> None:
+        self.sent.append((name, body))
+
+    def plc(self, name: str) -> Any:
+        return SimpleNamespace(source=None, facts=SimpleNamespace(described={}))
+
+
+def wanted(number: int, *rows: tuple[str, str]) -> Wanted:
+    return Wanted(number, tuple((plc, ROWS[row]) for plc, row in rows))
+
+
+def requests(*groups: list[Wanted]) -> tuple[Any, Debugged]:
+    debugged = Debugged()
+    made = BreakpointRequests(debugged, {str(number): group for number, group in enumerate(groups)}, {"late": ""}, 7)  # type: ignore
+    return made, debugged
+
+
+def test_each_plc_gets_its_own_rows_of_all_groups() -> None:
+    made, debugged = requests([wanted(1, ("one", "a"), ("two", "a"))], [wanted(2, ("two", "b")), wanted(3)])
+    made.apply()
+    assert debugged.put == [("one", ["a"]), ("two", ["a", "b"])] and list(debugged.running.checks) == ["one", "two"]
+    assert not made.is_empty and made.is_on("late")
+    made.clear()
+    assert debugged.put[2:] == [("one", []), ("two", [])] and debugged.running.checks == {}
+    assert made.is_empty and not made.is_on("late")
+
+
+def test_another_program_has_what_it_can_have_and_the_client_hears_of_the_rest() -> None:
+    first = [wanted(1, ("one", "a"), ("gone", "a")), wanted(2, ("one", "gone")), wanted(3), wanted(4, ("gone", "b"))]
+    made, debugged = requests(first, [wanted(5, ("two", "c"))])
+    made._try = lambda rows: ([(plc, row) for plc, row in rows if row.where != "gone"], "there is no line gone")
+    made.renew()
+    assert made._groups == {"0": [wanted(1, ("one", "a")), wanted(2), wanted(3), wanted(4)], "1": [wanted(5, ("two", "c"))]}
+    assert debugged.put == [("one", ["a"]), ("two", ["c"])]
+    assert debugged.sent == [("breakpoint", {"reason": "changed", "breakpoint": {
+        "id": number, "verified": False, "reason": "failed", "message": "there is no line gone"}}) for number in (2, 4)]
+
+
+def test_numbers_count_on_and_are_kept_where_the_client_knows_them() -> None:
+    made, _ = requests([wanted(1, ("one", "a")), wanted(2, ("one", "b"))])
+    pending = made.pending(2)["breakpoints"]
+    assert pending == [{"id": number, "verified": False, "reason": "pending", "message": "the program is not loaded yet"}
+                       for number in (7, 8)] and made.pending(1)["breakpoints"][0]["id"] == 9
+    assert made._answer("x", [([("two", ROWS["c"])], {"line": 3}), ([], {"message": "no"})]) == {"breakpoints": [
+        {"id": 10, "verified": True, "line": 3}, {"id": 11, "verified": False, "message": "no"}]}
+    made.keep_numbers({10: 7, 1: 5})
+    assert made._groups == {"0": [wanted(5, ("one", "a")), wanted(2, ("one", "b"))], "x": [wanted(7, ("two", "c")), wanted(11)]}
+    for plc, reached, numbers in (("one", "a", [5]), ("two", "a", []), ("two", "c", [7]), ("one", "gone", [])):
+        assert made.numbers(plc, [ROWS[reached]]) == numbers
+
+
+@each_of(("name", "when", "row"), [
+    ("Main.Walk", "", ("condition", "Main.Walk.X", "")), ("main.walk", "n > 1", ("condition", "main.walk.X AND (n > 1)", "")),
+    ("Main.Other", "", ("line", "Main.Other", "")), ("Walk", "n > 1", ("line", "Walk", "n > 1")),
+    ("Nobody.Walk", "", ("line", "Nobody.Walk", "")),
+])  # fmt: skip
+def test_a_step_of_a_chart_is_a_condition(name: str, when: str, row: tuple[str, str, str]) -> None:
+    debugged = Debugged()
+    chart = SimpleNamespace(steps=[("Start",), ("Walk",)], body=0)
+    facts = SimpleNamespace(charts=[chart], body_name=lambda body: "Main", symbols={})
+    debugged.plc = lambda name: SimpleNamespace(facts=facts)  # type: ignore[method-assign]
+    made = BreakpointRequests(debugged)._function("one", name, when, "3")  # type: ignore[arg-type]
+    assert (made.kind, made.where, made.when, made.hits) == (*row, "3")
