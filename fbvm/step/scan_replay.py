@@ -79,16 +79,8 @@ class Player(ABC):
 
     def __init__(self, facts: ProgramFacts) -> None:
         self.facts = facts
-        self.statement: Statement | None = None
-        self.count = 0
-        """Statements of the scan that have been executed."""
         self.values = RungValues(facts.image, facts.areas)
-        self.power = PowerFlow(facts.rungs, lambda scan: True, self.values.keep)
-        """The rungs that the scan has executed, with their power."""
-        self.chart_recorder = ChartRecorder(facts.charts, lambda scan: True)
-        """The charts that the scan has executed."""
-        self._stop: Stop = lambda number, statement: False
-        self._listener: MomentListener | None = None
+        self._begin(lambda number, statement: False, None)
 
     memory: Memory
     """The memory at this moment."""
@@ -117,9 +109,13 @@ class Player(ABC):
         return places.read_found(self.memory, self.find(where) if isinstance(where, str) else where)
 
     def _begin(self, stop: Stop, listener: MomentListener | None) -> None:
-        self.statement, self.count = None, 0
+        self.statement: Statement | None = None
+        self.count = 0
+        """Statements of the scan that have been executed."""
         self.power = PowerFlow(self.facts.rungs, lambda scan: True, self.values.keep)
+        """The rungs that the scan has executed, with their power."""
         self.chart_recorder = ChartRecorder(self.facts.charts, lambda scan: True)
+        """The charts that the scan has executed."""
         self._stop, self._listener = stop, listener
 
     def _over(self, phase: Phase) -> None:
