@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,10 +10,10 @@ import pytest
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
-from fbvm.code.image import Site
+from fbvm.code.image import Image, Site
 from fbvm.machine.plc import Plc
 from fbvm.step import commands as step_commands
-from fbvm.step.commands import Commands
+from fbvm.step.commands import CommandError, Commands
 from fbvm.step.filters import BetweenScans
 from fbvm.step.position import Position
 from fbvm.step.properties import Properties
@@ -53,10 +54,15 @@ END_PROGRAM
 """
 
 
-def session() -> Session:
+@cache
+def motors() -> Image:
     image = compile_text(MOTORS, lint=False).image
     assert image is not None
-    made = Session.of(lambda: Plc(image))
+    return image
+
+
+def session() -> Session:
+    made = Session.of(lambda: Plc(motors()))
     made.goto(1)
     return made
 
@@ -261,3 +267,31 @@ def test_only_a_scan_that_stands_is_taken_back() -> None:
     for halted in (None, object()):
         LiveRunner.undo(SimpleNamespace(_world=world, _name="a", plc=SimpleNamespace(halted=halted)))  # type: ignore[arg-type]
     assert told == ["a"]
+
+
+@pytest.mark.slow
+@each_of(("where", "shown"), [
+    ("Main.n", "change of Main.n"), ("Main.n = 10", "Main.n = 10"), ("main", "text.st:24"), ("Main.one", "change of Main.one"),
+    ("Twice", "text.st:3"), ("24", "text.st:24"), ("text.st:7", "text.st:7"), ("D0..D3", "change of D0..D3"),
+    ("Main.one.Speed", "Main.one.Speed"), ("Motor.Speed.Get", "text.st:13"),
+])  # fmt: skip
+def test_what_a_breakpoint_is_follows_from_how_its_place_is_written(where: str, shown: str) -> None:
+    made = session()
+    assert list(Commands(made, StopReport(made, {"text.st": MOTORS})).run(f"break {where}")) == [f"  1  {shown}"]
+
+
+@pytest.mark.slow
+@each_of(("where", "said"), [
+    ("Nobody", "there is no Nobody; known here: Main"), ("Main.n >", "'Main.n >' ends too early"),
+    ("Main.n + 1", "'Main.n + 1' is no condition: it is not BOOL; compare it with something"),
+    ("D99999", "D ends at 32767; 99999 does not exist"),
+    ("text.st:27", "text.st:27: the last statement of text.st is on line 24"),
+    ("Main#3", "'Main#3' is no rung; 'Main' has no rungs"),
+    ("Motor", "'Motor' is neither FILE:LINE nor a POU with statements; POUs are "
+              "Again, Main, Motor.Bad.Get, Motor.Deep.Get, Motor.Speed.Get, Twice"),
+])  # fmt: skip
+def test_a_breakpoint_that_cannot_be_says_why(where: str, said: str) -> None:
+    made = session()
+    with pytest.raises(CommandError) as error:
+        list(Commands(made, StopReport(made, {"text.st": MOTORS})).run(f"break {where}"))
+    assert str(error.value) == said
