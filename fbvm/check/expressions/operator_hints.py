@@ -95,7 +95,8 @@ def _number_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> st
         return "compare or combine the members"
     if expr.op in ("+", "-", "*", "/", "MOD") and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
         number = UNSIGNED.get(left.name, "INT")
-        return f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
+        others = f", or take {takers('arithmetic_of_bits')}" if left.name in UNSIGNED else ""
+        return f"{left} has no arithmetic: convert with {left}_TO_{number}(...){others}"
     if left == right and isinstance(left, EnumType):
         numbers = (f"TO_{left.base}({scope.text(side)})" for side in (expr.left, expr.right))
         return f"write {f' {expr.op} '.join(numbers)}, or take {takers('numbers_of_enumerations')}"

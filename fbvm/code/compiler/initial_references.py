@@ -78,12 +78,10 @@ class InitialReferences:
         return (name, form, *(self._at_power_on(part, instance) if is_expression(part) else part for part in operands))
 
     def _read(self, form: str, offset: int) -> int:
-        """What lies in the buffer at power-on."""
-        for start, data in reversed(self._initial):
-            if start <= offset and offset + STRUCTS[form].size <= start + len(data):
-                value: int = STRUCTS[form].unpack_from(data, offset - start)[0]
-                return value
-        return 0
+        """What lies in the buffer at power-on: a field behind the beginning of an instance."""
+        start, data = next((start, data) for start, data in reversed(self._initial) if start < offset < start + len(data))
+        value: int = STRUCTS[form].unpack_from(data, offset - start)[0]
+        return value
 
 
 def _offset(address: Address, instance: int) -> int:

@@ -212,8 +212,6 @@ class _Reader:
             both = [Series([*self._contacts(expr.left, first).parts, *self._contacts(expr.right, first != unequal).parts])
                     for first in (False, True)]
             return _branches(*both)
-        if expr.op not in COMPARISONS:
-            raise NoRung("this expression")
         mark = COMPARISONS[expr.op] if negated else expr.op
         return self._leaf(expr, mark, (self.written(expr.left), self.written(expr.right)), negated)
 

@@ -6,6 +6,7 @@ left out.  Expressions nested deeper than Python's parser allows are moved into 
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -156,13 +157,13 @@ class Expressions:
 
     # --- what a build that holds values in local variables does otherwise
 
+    @abstractmethod
     def kept(self, machine: str, address: Address) -> str | None:
         """Python for what an item of the memory holds, if that need not be read from there."""
-        return None
 
+    @abstractmethod
     def known_range(self, node: Node) -> Range | None:
         """What is known of the value of a load or temporary besides its type."""
-        return None
 
     def rounded(self, node: Node, text: str) -> str:
         """Python for the value of `node`, whose number, not yet rounded to 32 bits, is `text`."""

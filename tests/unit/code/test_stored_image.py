@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -135,5 +136,6 @@ def test_what_is_no_image_is_refused(content: bytes) -> None:
 ])
 def test_code_that_is_nested_deep_comes_back(body: str) -> None:
     image = image_of(f"PROGRAM Main\nVAR x : LINT := 1; END_VAR\n{body}\nEND_PROGRAM")
-    back = decode(encode(image))
+    back, limit = decode(encode(image)), sys.getrecursionlimit()
     assert [plain(stored).code for stored in back.bodies] == [plain(made).code for made in image.bodies]
+    assert sys.getrecursionlimit() == limit
