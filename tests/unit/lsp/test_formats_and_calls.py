@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from in_process import PUMP, Desk, span, talk
+from lsprotocol.types import Location, Position, Range
 
 from fbvm.base.diagnostics import Source
 from fbvm.interchange.imported import Place
+from fbvm.lsp import navigation
 from fbvm.lsp.foreign import narrowed
 
 pytestmark = pytest.mark.slow  # pygls and the protocol take their time to be imported
@@ -81,3 +85,24 @@ def test_what_is_said_of_a_damaged_object_of_twincat_goes_when_it_is_mended(tmp_
         assert projects.forget_regrouped(tmp_path / "Kind.TcDUT") == [], "it consists of the same files as before"
 
     talk(tmp_path, about, "Kind.TcDUT")
+
+
+def test_a_declaration_whose_text_is_no_longer_there_has_no_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = Source("Ton.st", "x TON")
+    declared: Any = SimpleNamespace(source=source, node=SimpleNamespace(start=2, end=5), name="TON",
+                                    pou=SimpleNamespace(kind="FUNCTION_BLOCK"))
+    paths: list[Path | None] = [None, tmp_path / "Ton.st"]
+    checked = SimpleNamespace(checker=None, project=SimpleNamespace(libraries=SimpleNamespace(path=lambda source: paths[0])))
+    program: Any = SimpleNamespace(place=lambda source: None, checked=None)
+    server: Any = SimpleNamespace(uri=lambda path: path.name, positions=lambda source: SimpleNamespace(
+        range=lambda start, end: Range(Position(0, start), Position(0, end))))  # fmt: skip
+    monkeypatch.setattr(navigation, "find", lambda checker, key: declared if key else None)
+    assert navigation.declared_location(server, program, declared) is None
+    assert navigation._item(server, program, ("pou",)) is None
+    program.checked = checked
+    assert navigation._item(server, program, ("pou",)) is None
+    paths.reverse()
+    assert navigation.declared_location(server, program, declared) == Location("Ton.st", Range(Position(0, 2), Position(0, 5)))
+    item = navigation._item(server, program, ("pou", "", "TON"))
+    assert item is not None and (item.name, item.detail, item.data) == ("TON", "FUNCTION_BLOCK", ["pou", "", "TON"])
+    assert navigation._item(server, program, ()) is None  # type: ignore[arg-type]
