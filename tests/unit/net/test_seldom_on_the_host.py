@@ -254,3 +254,55 @@ def test_a_station_that_hears_no_datagrams_and_takes_no_connections_answers_noth
     link = network.attach(UNIT)
     link.submit([Bind(2, 9600), SendTo(2, SERVER, b"?"), Connect(1, SERVER)], 0)
     assert link.events(0) == [Opened(2, 9600, Peer("0.0.0.0", 0)), Sent(2, 1), Failed(1, "open", "ECONNREFUSED")]
+
+
+def test_a_network_that_is_closed_has_nothing_open_and_nothing_left() -> None:
+    listening, second = (socket.create_server(("127.0.0.1", 0)) for _ in range(2))
+    other = Peer("192.168.250.8", 502)
+    rows = {SERVER: ("127.0.0.1", listening.getsockname()[1]), other: ("127.0.0.1", second.getsockname()[1]),
+            Peer(UNIT, 0): ("127.0.0.1", 0)}  # fmt: skip
+    network = TcpNetwork(rows, faults=[fault("slow", latency_ns=MS, peer=other)])
+    link: Any = network.attach(UNIT)
+    closed: list[str] = []
+    try:
+        link.submit([Listen(1, 502), Bind(2, 9600), Connect(3, SERVER), Connect(4, SERVER), Connect(5, other)], 0)
+        opened, now_ns = set[int](), 0
+        while opened < {2, 3, 4, 5}:
+            now_ns += MS
+            opened |= {event.channel for event in link.events(now_ns) if isinstance(event, Opened)}
+        socks = {number: channel.sock for number, channel in link.channels.items() if hasattr(channel, "sock")}
+        link.submit([Close(4)], now_ns)
+        kept = network.host_endpoint(Peer(UNIT, 777))
+        keeper: Any = SimpleNamespace(close=lambda: closed.append("keeper"))
+        network._reserved["tcp", Peer(UNIT, 778)] = kept, keeper
+        network.waiting.held[Peer(UNIT, 502)] = [(SimpleNamespace(close=lambda: closed.append("caller")), CLIENT)]  # type: ignore
+        behind = next(iter(network.relays._behind.values()))
+        relayed = [channel.sock for channel in behind.channels.values()]  # type: ignore[attr-defined]
+        network.relays.at(now_ns + MS, lambda now_ns: None)
+    finally:
+        network.close()
+        listening.close()
+        second.close()
+    assert sorted(closed) == ["caller", "keeper"] and set(socks) == {1, 3, 4}
+    assert [sock.fileno() for sock in (*socks.values(), *relayed)] == [-1] * 5
+    assert (network.links, link.channels, behind.channels, list(network._orphans), network._reserved, network.closed) == (
+        {}, {}, {}, [], {}, True)  # fmt: skip
+    assert (network.relays.carried, network.relays._behind, network.relays.next_due_ns()) == ({}, {}, None)
+    assert network._selector.get_map() is None and network.waiting.held == {}
+    link.submit([Connect(9, SERVER)], now_ns)
+    assert link.pending[-1] == Failed(9, "open", "ENETDOWN")
+
+
+def test_a_network_in_memory_that_is_closed_forgets_all() -> None:
+    network = LoopNetwork()
+    network.place(SERVER, Sleepers())
+    link = network.attach(UNIT)
+    link.submit([Connect(1, SERVER)], 0)
+    network.place(Peer("10.0.0.1", 1), Station())
+    network.remove(Peer("10.0.0.1", 1))
+    network.remove(Peer("10.0.0.1", 1))
+    network.at(50 * MS, lambda now_ns: None)
+    assert list(network._stations) == [SERVER] and network.next_due_ns() is not None
+    network.close()
+    assert (network._stations, network._links, network.next_due_ns()) == ({}, {}, None)
+    network.attach(UNIT)
