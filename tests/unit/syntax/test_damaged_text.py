@@ -1,11 +1,12 @@
-"""What is said of a text from which a word or sign is taken, of one after the other, or in which it stands twice, and what is
-still read of it, word for word.  `FBVM_REWRITE=1 pytest` of this file writes the texts anew; read the difference before you
-keep it."""
+"""What is said of a text from which a word or sign is taken, of one after the other, or in which it stands twice, or another one
+in its place, and what is still read of it, word for word.  `FBVM_REWRITE=1 pytest` of this file writes the texts anew; read the
+difference before you keep it."""
 
 from __future__ import annotations
 
 import os
 import re
+from itertools import cycle
 from pathlib import Path
 
 import pytest
@@ -66,6 +67,20 @@ def test_what_is_said_of_a_damaged_text(how: str) -> None:
         column = found.start() - TEXT.rfind("\n", 0, found.start())
         lines.append(f"{row}:{column} {found[0]}: {said(TEXT[: found.start()] + instead + TEXT[found.end() :])}")
     check(f"{how}.txt", lines)
+
+
+OTHERS = ("END_IF", "(", ":=", "1", "VAR", ";", "STEP", "END_VAR", "x", "THEN", ",", "END_PROGRAM", "TYPE")
+
+
+@pytest.mark.slow
+def test_what_is_said_of_a_text_with_another_word_in_place_of_one() -> None:
+    """In each declaration by itself; the words take turns."""
+    lines, others = [], cycle(OTHERS)
+    for declaration in re.split(r"(?m)^(?=TYPE|VAR_GLOBAL|FUNCTION|PROGRAM|CONFIGURATION)", TEXT):
+        for found, other in zip(_WORD.finditer(declaration), others, strict=False):
+            damaged = declaration[: found.start()] + other + declaration[found.end() :]
+            lines.append(f"{found[0]} -> {other}: {said(damaged)}")
+    check("other.txt", lines)
 
 
 MISTAKES = [text for text, *_ in ONE_ERROR] + [
