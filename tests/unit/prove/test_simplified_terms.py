@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable
 
 import pytest
+from rows import each_of
 from symbolic import term_value
 
 from fbvm.prove.encoding.rewriting import substituted
@@ -125,6 +126,66 @@ def test_a_term_means_what_its_operations_say(seed: int) -> None:
             assert not term.width or low <= signed(value, term.width) <= high, f"{term} for {row}"
         constants = {leaf: maker.terms.constant(leaf.width, value) for leaf, value in maker.values(VALUES[1]).items()}
         assert substituted(maker.terms, [term], constants)[0] is maker.terms.constant(term.width, wanted[1]), f"{term}"
+
+
+WIDE = 4
+SOME = (0, 1, 2, 7, 8, 9, 14, 15)
+"""Constants of so many bits at which something changes."""
+
+
+def _divided(a: int, b: int) -> tuple[int, int]:
+    quotient = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+    return quotient, a - b * quotient
+
+
+def s(value: int) -> int:
+    return signed(value, WIDE)
+
+
+BINARY: dict[str, tuple[Callable[[Terms, Term, Term], Term], Callable[[int, int], int]]] = {
+    "add": (Terms.add, lambda a, b: a + b), "sub": (Terms.sub, lambda a, b: a - b), "mul": (Terms.mul, lambda a, b: a * b),
+    **{name: (lambda terms, a, b, name=name: terms.bitwise(name, a, b), made) for name, made in (
+        ("bvand", int.__and__), ("bvor", int.__or__), ("bvxor", int.__xor__))},
+    "shl": (lambda terms, a, b: terms.shift("shl", a, b), lambda a, n: a << n),
+    "shr": (lambda terms, a, b: terms.shift("shr", a, b), lambda a, n: a >> n),
+    "udiv": (lambda terms, a, b: terms.divide("udiv", a, b), lambda a, b: a // b),
+    "urem": (lambda terms, a, b: terms.divide("urem", a, b), lambda a, b: a % b),
+    "sdiv": (lambda terms, a, b: terms.divide("sdiv", a, b), lambda a, b: _divided(s(a), s(b))[0]),
+    "srem": (lambda terms, a, b: terms.divide("srem", a, b), lambda a, b: _divided(s(a), s(b))[1]),
+    "eq": (Terms.eq, lambda a, b: a == b),
+    "ult": (lambda terms, a, b: terms.less(a, b, False), lambda a, b: a < b),
+    "ule": (lambda terms, a, b: terms.less(a, b, False, True), lambda a, b: a <= b),
+    "slt": (lambda terms, a, b: terms.less(a, b, True), lambda a, b: s(a) < s(b)),
+    "sle": (lambda terms, a, b: terms.less(a, b, True, True), lambda a, b: s(a) <= s(b)),
+    "concat": (Terms.concat, lambda a, b: a << WIDE | b),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@each_of("name", BINARY)
+def test_an_operation_with_a_constant_means_the_same_for_every_value(name: str) -> None:
+    make, meaning = BINARY[name]
+    terms = Terms()
+    x, p = terms.variable("x", WIDE), terms.variable("p", 0)
+    three = terms.ite(p, terms.constant(WIDE, 3), terms.ite(terms.eq(x, terms.constant(WIDE, 9)), terms.constant(WIDE, 8),
+                                                            terms.constant(WIDE, 0)))  # fmt: skip
+    low = terms.extend(terms.extract(x, 0, 2), WIDE, False)
+    operands = (x, terms.neg(x), terms.invert(x), terms.add(x, terms.constant(WIDE, 5)), three, low, terms.of_boolean(p, WIDE),
+                terms.concat(terms.constant(2, 0), terms.extract(x, 1, 2)), terms.extend(terms.extract(x, 1, 3), WIDE, True))
+    pairs = [(one, constant) for one in operands for constant in SOME]
+    for one, number in pairs:
+        constant = terms.constant(WIDE, number)
+        for left, right in ((one, constant), (constant, one)):
+            if name[1:] in ("div", "rem") and (right is not constant or not number):
+                continue
+            term = make(terms, left, right)
+            for value in range(1 << WIDE):
+                for choice in (0, 1) if one in (three, operands[6]) else (0,):
+                    known = {x: value, p: choice}
+                    a, b = term_value(left, known), term_value(right, known)
+                    wanted = meaning(a, b) & ((1 << max(term.width, 1)) - 1)
+                    assert term_value(term, known) == wanted, f"{left} {name} {right} = {term} for {known}"
+                    assert term.low <= wanted <= term.high, f"{term} for {known}"
 
 
 T = Terms()
