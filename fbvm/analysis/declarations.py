@@ -61,6 +61,11 @@ def _owner(checker: Checker, key: Key) -> Pou | None:
     return next((method for method in found.methods.values() if fold(method.name) == key[2]), None)
 
 
+def shown_name(variable: Variable) -> str:
+    """The name of a variable as it is written: VAR_INST of a method are kept with the name of the method in front."""
+    return variable.name.rpartition(".")[2]
+
+
 def _variable(checker: Checker, key: Key) -> Declared | None:
     pou = _owner(checker, key)
     if pou is None:
@@ -70,7 +75,7 @@ def _variable(checker: Checker, key: Key) -> Declared | None:
     if variable is None and pou.block is not None:  # a VAR_INST
         variable = pou.block.variables.get(f"{fold(pou.tree.name.text)}.{key[3]}")
     if variable is not None:
-        return Declared(key, variable.name, variable.source, variable.node, variable=variable, pou=pou)
+        return Declared(key, shown_name(variable), variable.source, variable.node, variable=variable, pou=pou)
     name = declared_name(pou.tree, key[3]) if not pou.resolved else None
     return Declared(key, name.text, pou.source, name, pou=pou) if name is not None else None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.analysis.comments import comment_at
-from fbvm.analysis.declarations import Declared
+from fbvm.analysis.declarations import Declared, shown_name
 from fbvm.base.areas import FIXED_OR_SIZED_AREAS, Address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import EnumType, StructType
@@ -33,7 +33,7 @@ def variable(declared: Variable) -> str:
     place = f" AT {declared.location}" if declared.location is not None else ""
     written = declared.source.text[declared.node.end:].partition(";")[0]
     value = written.partition(":=")[2].strip() if ":=" in written and "\n" not in written else ""
-    return f"{kind} {declared.name}{place} : {declared.type}" + (f" := {value}" if value else "")
+    return f"{kind} {shown_name(declared)}{place} : {declared.type}" + (f" := {value}" if value else "")
 
 
 def head(pou: Pou) -> str:

@@ -84,10 +84,6 @@ class Part:
         """True if a message about the part says the number of a line."""
         return "_parsed" in vars(self) and any(re.search(r"\bline \d", each.message + each.hint) for each in self.mistakes)
 
-    def has(self, offset: int) -> bool:
-        """True if an offset of the file lies in the part, or directly behind it."""
-        return self.base <= offset <= self.base + len(self.source.text)
-
 
 @dataclass(eq=False)
 class File:
