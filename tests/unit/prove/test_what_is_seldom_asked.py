@@ -78,6 +78,18 @@ def test_tasks_of_events_and_inputs_of_every_kind(
         assert found == said and [*map(set, wrote)] == [*map(set, writes)], (limits, wrote)
 
 
+FRESH = """PROGRAM Main VAR First AT A200.15 : BOOL; n, m : INT; END_VAR
+    IF First THEN n := n + 1; END_IF IF m < 3 THEN m := m + 1; END_IF END_PROGRAM
+CONFIGURATION C VAR_GLOBAL Go AT %IX0.0 : BOOL; END_VAR RESOURCE R ON PLC
+TASK T(SINGLE := Go, PRIORITY := 1); PROGRAM p WITH T : Main; END_RESOURCE END_CONFIGURATION"""
+
+
+@pytest.mark.slow
+def test_the_first_cycle_of_a_task_of_an_event_is_its_first_one() -> None:
+    assert shown(asked(FRESH, Question(REACH, "p.n = 1")))[0] == "REACHED after 1 scan, by the shortest run"
+    assert shown(asked(FRESH, Question(REACH, "p.n = 1 AND p.m = 2")))[0] == "REACHED after 3 scans, by the shortest run"
+
+
 NOTHING = "a run of 1 scans may get there, but does not on the engine: it depends on values of which the solver knows nothing"
 
 

@@ -10,8 +10,10 @@ from rows import each_of
 from test_run_loop import MS, Clock, RealNetwork, real_plc
 
 from fbvm.machine.plc import Plc
+from fbvm.net.faults import NAMED
+from fbvm.run import fault_rows, real_pace, slices, time_limit
 from fbvm.run import project_reader as reader
-from fbvm.run import real_pace, slices, time_limit
+from fbvm.run.fault_rows import FAULT
 from fbvm.run.plc_names import PlcNames
 from fbvm.run.real_pace import RealPace
 from fbvm.run.running import Running, TimedWrite
@@ -162,3 +164,25 @@ def test_what_somebody_else_has_written_is_not_written_again() -> None:
     plc.run(scans=2)
     run.resume()
     assert plc.now_ns == 10_000_000 and ([row.value for row in run.writes], run.reason) == ([3], "scans")
+
+
+def test_the_page_of_faults_says_of_each_kind_what_it_sets() -> None:
+    lines = fault_rows.page().split("\n")
+    assert lines[:12] == [
+        "# Faults of a network", "",
+        "A row of fbvm.toml, [[fault]], says what befalls connections with an endpoint, in memory as with real connections",
+        '(net = "tcp"), of peers as of doors. The first row that fits and is in force counts.', "", "    [[fault]]",
+        '    kind = "slow"', '    latency = "80ms"', '    peer = "192.168.250.1:502"', '    from = "2s"', "", "## Kinds"]
+    first = lines.index("## Kinds") + 2
+    assert lines[first : first + 8] == [
+        "slow         data take longer each way; needs latency", "             latency = ...",
+        "unsteady     data take longer by chance; needs jitter", "             jitter = ...",
+        "cut          data arrive in pieces of 1 byte up to a size", "             segment_bytes = 5, random_cut = true",
+        "dripping     data arrive byte by byte", '             segment_bytes = 1, gap = "12ms"']
+    keys = lines.index("## Keys")
+    assert keys == first + 2 * len(NAMED) + 1 and lines[keys - 1] == lines[keys + 1] == ""
+    assert [line[:18].strip() for line in lines[keys + 2 : keys + 2 + len(FAULT)]] == list(FAULT)
+    assert lines[keys + 3] == "peer               Only connections with this endpoint; 0.0.0.0 and port 0 fit any."
+    assert lines[keys + 2 + len(FAULT) :] == [
+        "", "From Python: network.faults is a list of rows, which may be changed while PLCs run.", "",
+        "    from fbvm.net.faults import fault", '    plant.network.faults.append(fault("slow", latency_ns=80_000_000))']

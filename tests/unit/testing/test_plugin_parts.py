@@ -13,6 +13,7 @@ from rows import each_of
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.recorder import Recorder
 from fbvm.testing import coverage_plugin, golden, warning_plugin
+from fbvm.testing import plugin as testing_plugin
 from fbvm.testing.course.class_report import _cell
 from fbvm.testing.course.lessons import Lesson, Result
 from fbvm.testing.coverage_plugin import CoveragePlugin
@@ -131,3 +132,21 @@ def test_what_pytest_shows_of_a_failure_ends_in_the_test_itself(tmp_path: Path) 
         if visible := [file for file, local in frames if not local.get("__tracebackhide__")]:
             shown[name] = visible
     assert shown == {}
+
+
+@pytest.mark.slow
+def test_the_trace_of_a_test_is_written_into_a_folder_that_is_made_when_the_test_has_ended(tmp_path: Path) -> None:
+    (tmp_path / "Lamp.st").write_text(TEXT, encoding="utf-8")
+    rigs, ends = [Rig.of("Lamp.st::Lamp", folders=[tmp_path]) for _ in range(2)], list[Any]()
+    folder = tmp_path / "deep" / "traces"
+    request = SimpleNamespace(
+        config=SimpleNamespace(pluginmanager=SimpleNamespace(has_plugin=lambda name: False),
+                               getoption=lambda name: str(folder) if name == "fbvm_traces" else ""),
+        node=SimpleNamespace(nodeid="tests/test_a.py::test_b[1]", stash={testing_plugin.RIGS: rigs}),
+        addfinalizer=ends.append)  # fmt: skip
+    for rig in rigs:
+        testing_plugin._instrument(cast(Any, request), rig)
+        rig.scan(on=True)
+    for end in ends:
+        end()
+    assert sorted(path.name for path in folder.iterdir()) == [f"tests.test_a.test_b[1].{number}.fbtrace" for number in (0, 1)]

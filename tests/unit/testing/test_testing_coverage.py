@@ -239,7 +239,8 @@ def test_a_report_at_the_end(pytester: pytest.Pytester) -> None:
     project_of(pytester)
     result = run(pytester, "--fbvm-cov", "--fbvm-cov-html=pages", "--fbvm-cov-xml=cov.xml")
     result.assert_outcomes(passed=3)
-    result.stdout.fnmatch_lines(["Name*", "src/Choose.st*9*1*6*1*87%*16->18, 18", "test_choose.st*2*100%", "TOTAL*"])
+    result.stdout.fnmatch_lines(["Name*", "src/Choose.st*9*1*6*1*87%*16->18, 18", "test_choose.st*2*100%", "TOTAL*",
+                                  "written to *pages*", "written to cov.xml"])
     assert (pytester.path / "pages" / "index.html").is_file()
     assert 'filename="src/Choose.st"' in (pytester.path / "cov.xml").read_text()
 
