@@ -9,17 +9,27 @@ from pathlib import Path
 
 import pytest
 from drawings import RAIL, block, coil, contact, document, imported, pou, result, value, variable, wires
-from test_charts import actions, chart, does, inline, jump, step, transition
+from test_charts import STEP_ACTIONS, actions, chart, does, inline, jump, step, transition
 from test_whole_texts import check
 
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.plcopen.schema import MNEMONIC
 
 TIMER = variable("t", "TON") + "".join(map(variable, ("a", "b", "x", "y")))
 NUMBERS = variable("n", "INT") + variable("m", "INT") + variable("a") + variable("x")
 STORED = ('<block localId="4" typeName="NOT"><position x="0" y="0"/><inputVariables><variable formalParameter="IN" storage="set">'
           f'{wires("2")}</variable></inputVariables><inOutVariables/><outputVariables><variable formalParameter="OUT">'
           "<connectionPointOut/></variable></outputVariables></block>")  # fmt: skip
+
+
+def ours(number: int, kind: str, mnemonic: str, inputs: str) -> str:
+    """A block that fbvm has drawn for an instruction."""
+    data = f'<addData><data name="{MNEMONIC}" handleUnknown="discard"><text>{mnemonic}</text></data></addData>'
+    return block(number, kind, inputs, "ENO" if "EN=" in inputs else "OUT").replace("</block>", f"{data}</block>")
+
+
+MOVED = value(15, "#1") + value(16, "D0")
 RUNGS = {
     "a contact that is not connected": (contact(2, "", "a") + coil(3, "2", "x"), "a x"),
     "two ways, one of which is read twice": (
@@ -57,8 +67,48 @@ RUNGS = {
     "outputs between branches": (
         contact(2, "1", "a") + coil(3, "2", "x") + contact(4, "2", "b") + coil(5, "4", "y") + contact(6, "2", "c")
         + coil(7, "6", "z") + coil(8, "2", "v"), "a b c v x y z"),
+    "a block with power through it behind a negated pin": (
+        contact(2, "1", "a") + block(3, "TON", "EN=2 !IN=4", "ENO,Q", "t") + value(4, "b") + coil(5, "3.ENO", "x"), TIMER),
+    "a comparison with a pin that is not wired": (
+        ours(2, "GT", ">", "IN1=5 IN2=") + value(5, "n") + coil(3, "2.OUT", "x"), NUMBERS),
+    "a contact that is negated and has an edge, in front of a branch": (
+        contact(2, "1", "a", 'negated="true" edge="rising"') + coil(3, "2", "x") + contact(4, "2", "b") + coil(5, "4", "y"),
+        "a b x y"),
+    "a value with blanks at a pin of a block with power through it": (
+        contact(2, "1", "a") + block(3, "TON", "EN=2 IN=4 PT=6", "ENO,Q", "t") + value(4, "b") + value(6, "T#1s + T#2s")
+        + coil(5, "3.ENO", "x"), TIMER),
+    "an instruction beside a block that is not of ladder": (
+        contact(2, "1", "a") + ours(3, "MOV", "MOV", "EN=2 OP1=15 OP2=16") + MOVED
+        + block(7, "GT", "IN1=8 IN2=8", "OUT") + value(8, "n") + coil(9, "3.ENO 7.OUT", "x"), NUMBERS),
+    "an instruction with two conditions behind one contact": (
+        contact(2, "1", "a") + ours(3, "CNT", "CNT", "EN=2 C2=2 OP1=15 OP2=16") + MOVED + coil(9, "2", "x"), "a x"),
+    "an instruction whose second condition is the rail": (
+        contact(2, "1", "a") + ours(3, "CNT", "CNT", "EN=2 C2=1 OP1=15 OP2=16") + MOVED, "a x"),
+    "an instruction whose second condition is missing": (
+        contact(2, "1", "a") + ours(3, "CNT", "CNT", "EN=2 C2= OP1=15 OP2=16") + MOVED, "a x"),
+    "an instruction behind an edge that is negated": (
+        contact(2, "1", "a", 'negated="true" edge="falling"') + ours(3, "MOV", "MOV", "EN=2 OP1=15 OP2=16") + MOVED, "a"),
+    "a result of which nobody knows the type": (
+        contact(2, "1", "a") + block(3, "Strange", "EN=2 IN=4", "ENO,OUT") + value(4, "b") + block(5, "Other",
+        "IN1=3.OUT IN2=3.OUT", "OUT") + coil(6, "5.OUT", "x"), "a b x"),
+    "more branch points than there are bits for them": (
+        contact(2, "1", "a") + "".join(contact(at, str(at - 2), "b") + coil(at + 1, str(at), f"c{at}") for at in range(4, 42, 2)),
+        "a b " + " ".join(f"c{at}" for at in range(4, 42, 2))),
+    "blocks that feed one another": (
+        block(2, "AND", "IN1=3.OUT IN2=4", "OUT") + block(3, "OR", "IN1=2.OUT IN2=4", "OUT") + value(4, "a")
+        + coil(5, "3.OUT", "x"), "a x"),
+    "a sum that feeds itself through another": (
+        block(2, "ADD", "IN1=3.OUT IN2=4", "OUT") + block(3, "ADD", "IN1=2.OUT IN2=4", "OUT") + value(4, "1")
+        + result(5, "3.OUT", "n"), NUMBERS),
+    "outputs in another order than their conditions": (
+        contact(2, "1", "a", at="0,40") + coil(3, "2", "b", at="90,40") + contact(4, "1", "b", at="0,0")
+        + coil(5, "4 2", "x", at="90,0"), "a b x"),
+    "a wire from the right rail": (
+        RAIL.replace("localId=\"1\"", 'localId="7"').replace("left", "right") + coil(3, "7", "x"), "x"),
 }  # fmt: skip
 LOOP = jump(3, "2", "s")
+DATA = ('<addData><data name="http://www.3s-software.com/plcopenxml/sfc/element"><attributes><attribute guid="{}">{}</attribute>'
+        "</attributes></data></addData></step>")
 CONDITION = transition(2, "1", inline("a"))
 CHARTS = {
     "a step without a name": (step(1, "", first=True), CONDITION, jump(3, "2", "")),
@@ -72,6 +122,18 @@ CHARTS = {
     "a jump to nowhere": (step(1, "s", first=True), CONDITION, jump(3, "2", "t")),
     "priorities": (step(1, "s", first=True), transition(2, "1", inline("a"), 'priority="2"'),
                    transition(4, "1", inline("b"), 'priority="0"'), jump(3, "2", "s"), jump(5, "4", "s")),
+    "a condition behind a block that is not understood": (
+        step(1, "s", first=True), transition(2, "1", wires("8.OUT")), LOOP, block(8, "Strange", "IN=9.NO", "OUT"),
+        block(9, "TON", "IN=7", "Q", "t"), value(7, "a")),
+    "a condition that cannot be executed": (
+        step(1, "s", first=True), transition(2, "1", wires("8.OUT")), LOOP, block(8, "ADD", "IN1=9.OUT IN2=7", "OUT"),
+        block(9, "SUB", "IN1=8.OUT IN2=7", "OUT"), value(7, "n + 1")),
+    "an action of a step without a name": (
+        step(1, "s", first=True).replace("</step>", DATA.format(next(iter(STEP_ACTIONS)), "")), CONDITION, LOOP),
+    "an action of a step that is not known": (
+        step(1, "s", first=True).replace("</step>", DATA.format("f00", "Act")), CONDITION, LOOP),
+    "an action of a step": (
+        step(1, "s", first=True).replace("</step>", DATA.format(next(iter(STEP_ACTIONS)), "Act")), CONDITION, LOOP),
     "a negated condition": (step(1, "s", first=True), CONDITION.replace("<condition>", '<condition negated="true">'), LOOP),
 }  # fmt: skip
 XML = {
@@ -80,6 +142,10 @@ XML = {
     "a POU that is none": document(pou(RAIL + coil(3, "1", "x"), "x", kind="thing"), pou("", "", name="")),
     "access variables of a POU": document(pou(RAIL + coil(3, "1", "x"), "x").replace(
         "</interface>", f"<accessVars>{variable('x')}</accessVars></interface>")),
+    "a transition whose diagram does not assign to its name": document(pou(
+        step(1, "s", first=True) + transition(2, "1", '<reference name="T"/>') + LOOP, "x", language="SFC").replace(
+        "</interface>", '</interface><transitions><transition name="T"><body><FBD>' + value(7, "x") + result(8, "7", "x")
+                        + "</FBD></body></transition></transitions>")),
     "transitions without a chart": document(pou(RAIL + coil(3, "1", "x"), "x").replace(
         "</interface>", '</interface><transitions><transition name="T"><body><ST><xhtml:p>TRUE</xhtml:p></ST></body>'
                         '</transition></transitions>')),
