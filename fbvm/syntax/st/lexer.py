@@ -205,7 +205,7 @@ class Lexer:
             elif kind == "NAME":
                 kind = kinds[word]
                 if kind in in_context:
-                    kind, at = self._word_in_context(lex, before, kind, start, at)
+                    kind, at = self._word_in_context(lex, kind, start, at)
                     word = text[start:at]
                 elif before in _PLACES or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
@@ -229,7 +229,7 @@ class Lexer:
             before = kind
         yield Token("$END", "", length, length)
 
-    def _word_in_context(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
+    def _word_in_context(self, lex: Lexis, kind: str, start: int, end: int) -> tuple[str, int]:
         """The terminal of a word that depends on the text behind the word, and where its token ends."""
         condition = lex.conditions.get(kind)
         if condition is not None and not condition.match(self.text, end):
@@ -250,8 +250,6 @@ class Lexer:
             if last:
                 return kind, last
             kind = "NAME"
-        if before == "AT" or (before in lex.operand_ends and self.text.startswith("=", end)):
-            return self._special(lex, before, kind, start, end)
         return kind, end
 
     def _read_again(self, kind: str, word: str, start: int, end: int) -> tuple[str, str, int]:

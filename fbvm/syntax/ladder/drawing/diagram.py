@@ -237,7 +237,6 @@ class _Reader:
             raise Undrawable
         self._point().outs.append(box)
         self.lost = self.now.start is not self.bar
-        self.now = self.now if self.lost else _Condition(self.bar, Series())
 
     def _join_branch(self, blocks: Sequence[_Condition]) -> None:
         """Let the lower inputs of a box begin at the point from which power comes to the box."""
