@@ -12,13 +12,14 @@ import pytest
 from browsers import HOST, PORT, TOKEN, Page, connected, frame
 from rows import each_of
 
+from fbvm.base.types import WORD
 from fbvm.live import host as host_module
 from fbvm.live.connection import MOST_REQUEST_BYTES, Connection
 from fbvm.live.guard import Guard
 from fbvm.live.host import LOOK_TICKS, LiveHost
 from fbvm.live.plcs import LivePlc
 from fbvm.live.pytest_text import plant_text
-from fbvm.live.updates import UPDATE_NS
+from fbvm.live.updates import STEP, UPDATE_NS, Updates
 
 pytestmark = pytest.mark.slow
 
@@ -143,3 +144,19 @@ def test_a_test_of_all_plcs_names_the_network_only_where_something_was_done_to_i
         assert ("    network = made.network\n" in text) is wanted, text
         assert text.splitlines()[-3:] == ["    while plc.scans < 3:", "        made.scan()",
                                           "    assert all(rig.plc.trap is None for rig in made.rigs.values())"]  # fmt: skip
+
+
+def test_values_of_many_pictures_are_read_in_steps_of_the_plcs_that_are_looked_at() -> None:
+    here, other = object(), object()
+    places = {f"k{number}": (here if number % 5 else other, SimpleNamespace(type=WORD, hexadecimal=number == 7, name=number))
+              for number in range(3 * STEP + 1)}  # fmt: skip
+    look = SimpleNamespace(instance=None, units=False, pictures=True)
+    updates: Any = SimpleNamespace(_look=look, _bench=SimpleNamespace(pictures=SimpleNamespace(shown=["a"], places=places)),
+                                   _copies={here: None}, _value=lambda live, place: place.name)
+    made: dict[str, Any] = {}
+    assert len(list(Updates._panels(updates, made, None))) == 3
+    wanted = {f"k{number}": "16#0007" if number == 7 else str(number) for number in range(3 * STEP + 1) if number % 5}
+    assert made == {"pictures": ["a"], "picture": wanted}
+    look.pictures = False
+    nothing: dict[str, Any] = {}
+    assert list(Updates._panels(updates, nothing, None)) == [] and nothing == {}

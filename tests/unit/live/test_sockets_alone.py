@@ -160,7 +160,7 @@ def test_pages_without_a_session_or_with_something_unsent_get_no_update(server: 
 
 
 def test_pages_are_told_the_end_and_those_who_do_not_take_it_are_dropped(server: LiveServer) -> None:
-    takes, full = browser(server, Sock(1000)), browser(server, Sock(None))
+    takes, full = browser(server, Sock(1000)), browser(server, Sock(None), b"left")
     server._selector.rows.clear()  # type: ignore[attr-defined]
     for made in (takes, full):
         made.connection.close(reason="fbvm has ended")
