@@ -99,6 +99,13 @@ NOTHING = "a run of 1 scans may get there, but does not on the engine: it depend
      "codesys", ["text of STRING", "length of STRING"]),
     ("PROGRAM Main VAR_INPUT b : INT; END_VAR VAR n : INT; END_VAR n := REAL_TO_INT(INT_TO_REAL(b) / 3.0); END_PROGRAM",
      "standard", ["convert of REAL", "div of REAL", "nearest of REAL"]),
+    ("PROGRAM Main VAR_INPUT b : INT; END_VAR VAR n : INT; END_VAR n := LREAL_TO_INT(SQRT(INT_TO_LREAL(b))); END_PROGRAM",
+     "standard", ["convert of LREAL", "math of LREAL", "nearest of LREAL"]),
+    ("PROGRAM Main VAR_INPUT b : WORD; END_VAR VAR s : WSTRING[4] := \"abc\"; n : INT; END_VAR "
+     "s[0] := b; n := LEN(s); END_PROGRAM",
+     "codesys", ["text of WSTRING", "length of WSTRING"]),
+    ("PROGRAM Main VAR_INPUT b : INT; END_VAR VAR n : INT; END_VAR n := STRING_TO_INT(INT_TO_STRING(b)); END_PROGRAM",
+     "standard", ["to_text of STRING", "from_text of STRING"]),
 ])
 def test_what_is_taken_for_any_value_is_said(text: str, dialect: str, unknown: list[str]) -> None:
     verdict = asked(text, Question(NEVER, "Main.n > 4"), dialect)
