@@ -13,6 +13,8 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.prove.cycle import cycle_bounds, show_cycle, show_passed
+from fbvm.prove.encoding.clocks import FixedCycle, FreeCycle
+from fbvm.prove.encoding.terms import Terms
 from fbvm.prove.prover import Limits, prove
 from fbvm.prove.question import NEVER, REACH, WITHIN, Question, Verdict
 from fbvm.prove.runs import Judge, repeated
@@ -108,3 +110,9 @@ def test_the_test_that_is_written_scans_at_the_times_of_the_run(tmp_path: Path) 
     assert result.exit_code == 0, result.output
     assert "  times between its scans: 50ms (2 times)" in result.stdout.splitlines()
     runpy.run_path(str(test))["test_reach_main_t_q"]()
+
+
+def test_what_was_in_the_scan_before_is_no_affair_of_the_clock() -> None:
+    for clock in (FixedCycle(Terms(), (), 10 * MS), FreeCycle(Terms(), (), 5 * MS, 50 * MS)):
+        found = [clock.value(number, (kind, 0)) for number in (0, 3) for kind in ("level", "fresh")]
+        assert found == [None] * 4, clock
