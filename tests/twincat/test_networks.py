@@ -69,6 +69,12 @@ FORMS = {
         "Ld", [network(wire(1, logic("AND", leaf("a"), leaf("b"))), assign(logic("AND", wire(1), leaf("c")), operand("p")),
                        assign(wire(1), operand("q")))],
         ["LADDER", "RUNG 1", "LD a", "AND b", "OUT TR0", "AND c", "OUT p", "LD TR0", "OUT q", "END_LADDER"]),
+    "a value behind power": (
+        "Ld", [network(wire(1, leaf("a")), assign(logic("AND", leaf("b"), wire(1)), operand("p")))],
+        ["// network 1", "p := b AND a;"]),
+    "an assignment behind power": (
+        "Ld", [network(assign(logic("AND", leaf("a"), leaf("n > 1", "")), operand("p")))],
+        ["// network 1", "p := a AND (n > 1);"]),
     "a function with EN": ("Ld", [network(function("ADD", leaf("a"), leaf("n", "INT"), leaf("1", "INT"),
                                                    target=operand("n", "INT")))],
                            ["// network 1", "IF a THEN n := n + 1; END_IF;"]),

@@ -8,6 +8,7 @@ from test_codesys2_diagrams import assigned, box, contact, export, instance, ope
 
 from fbvm.base.diagnostics import Source
 from fbvm.interchange.codesys2.exports import as_source
+from fbvm.interchange.codesys2.importing import import_codesys2, read_export
 from fbvm.interchange.codesys2.objects import _name_before, _named
 from fbvm.interchange.cx.write.markers import renumbered
 
@@ -31,6 +32,10 @@ NETWORKS = {
     (rung(row("OR", contact("a"), GREATER), "p"),): "p := a OR n > 1;",
     (rung(row("AND", contact("a", "_NEGATIV"), row("OR", contact("b"), GREATER)), "p"),): "p := NOT a AND (b OR n > 1);",
     (rung(row("AND", contact("a"), contact("TRUE")), "p"),): "p := a;",
+    (assigned(operand("a"), "p").replace(f"{operand('a')} _EXPRESSION _POSITIV", f"{operand('a')} _EXPRESSION _NEGATIV"),):
+        "p := NOT a;",
+    (assigned(box("GT", operand("n"), operand("1")), "p").replace("_POSITIV _OUTPUTS", "_NEGATIV _OUTPUTS"),):
+        "p := NOT (n > 1);",
     (rung(row("OR", contact("a"), row("AND", contact("b"), contact("c", "_NEGATIV"))), "p", "reset q"),):
         "LADDER RUNG 1 Says 0 LD a LD b ANDNOT c OR LD OUT p RSET q END_LADDER",
     (rung(row("AND", row("OR", contact("a"), contact("b")), row("OR", contact("c"), contact("p"))), "set q", "-p"),):
@@ -73,6 +78,9 @@ REFUSED = {
     "TON has other inputs or outputs than its box": assigned(instance("t", "TON", (operand("a"),), "p", "n", "q"), "p"),
     "a box with EN stands outside of ENABLELIST": assigned(box("ABS", operand("n"), enabled=EN), "m"),
     "`_END_PROGRAM` stands in it": "_END_PROGRAM",
+    "`_OUTPUTS` stands in it": assigned(operand("a"), "p").replace("_OUTPUTS:1", "_OUTPUTS"),
+    "`n` stands in it": assigned(operand("a"), "p") + " n",
+    "it ends too early": assigned(operand("a")).replace("_OUTPUTS:0", ""),
     "`_MAYBE` stands in it": assigned(box("ABS", operand("n"), sign="_MAYBE"), "m"),
 }  # fmt: skip
 
@@ -81,6 +89,21 @@ REFUSED = {
 def test_a_network_without_a_meaning_is_refused(said: str) -> None:
     _, found = as_source(Source("a.exp", export(REFUSED[said])))
     assert [said in each.message for each in found] == [True], [each.message for each in found]
+
+
+def test_an_action_has_no_variable_for_the_power_of_its_boxes() -> None:
+    text = export(rung(contact("a"), "p", boxes=(assigned(box("ABS", operand("n"), enabled=EN), "n"),)))
+    body = text.partition("_LD_BODY")[2]
+    action = f"END_PROGRAM\nACTION Act:\n_LD_BODY{body}".replace("END_PROGRAM\n", "END_ACTION\n")
+    source, said = as_source(Source("a.exp", text + action.partition("END_ACTION\n")[2]))
+    assert ["an action has no variables" in found.message for found in said] == [True], [found.message for found in said]
+    assert "Power_1" in source.text.partition("ACTION Act")[0] and "Power_1" not in source.text.partition("ACTION Act")[2]
+
+
+def test_an_export_that_is_no_text_is_refused() -> None:
+    for read in (read_export, import_codesys2):
+        made = read(b"\xef\xbb\xbfPROGRAM \xff", "a.exp")
+        assert made.files == {} and ["begins as UTF-8" in found.message for found in made.errors] == [True]
 
 
 # --- names in projects ------------------------------------------------------------------------------------------------
