@@ -64,7 +64,7 @@ def test_functions_of_texts(function: str, arguments: tuple[Any, ...], value: An
 def test_the_shortest_text_that_is_read_as_the_same_real(value: float, shortest: str) -> None:
     made = arithmetic.shortest(arithmetic.single(value))
     assert repr(made) == shortest and arithmetic.single(made) == arithmetic.single(value)
-    assert math.isnan(arithmetic.shortest(math.nan))
+    assert math.isnan(arithmetic.shortest(math.nan)) and arithmetic.shortest(1 / 3) == 1 / 3
 
 
 @each_of("name, value, answer", [

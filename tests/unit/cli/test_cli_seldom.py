@@ -6,6 +6,7 @@ import asyncio
 import os
 import sys
 from contextlib import nullcontext
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar, NoReturn
@@ -19,12 +20,16 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.campaign.execution import Wrong
 from fbvm.cli.main import main
 from fbvm.cli.programs import check
-from fbvm.cli.projects import planned_runs, runs_of_tests, shown_progress
+from fbvm.cli.projects import fleet, planned_runs, runs_of_tests, shown_progress
 from fbvm.cli.projects import test as test_verb
-from fbvm.cli.running import peer
+from fbvm.cli.recordings import why
+from fbvm.cli.running import peer, step
 from fbvm.cli.shared import given_sources, status, streams
 from fbvm.cli.shared.debug import launch
+from fbvm.cli.shared.live import origins
 from fbvm.interchange.formats import given
+from fbvm.interchange.imported import Imported
+from fbvm.record.trace.writer import Depth
 
 MAIN: ModuleType = sys.modules["fbvm.cli.main"]
 COUNTER = "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n"
@@ -159,6 +164,7 @@ def test_where_the_page_of_a_campaign_lies_is_said_on_a_terminal(monkeypatch: py
 WRONG = Wrong([Diagnostic("S0301", Source("counter.st", COUNTER), 0, 7, "the value is wrong")])
 
 
+@pytest.mark.slow
 @each_of("arguments, conducts", [
     (["sweep", "counter.st", "--vary", "Main.n=1,2", "--for", "1s"], "fbvm.campaign.runs.conduct"),
     (["campaign", "counter.st", "--runs", "2", "--for", "1s"], "fbvm.cli.projects.campaign._conduct"),
@@ -201,6 +207,7 @@ class Server:
         self.made.append(("shut down",))
 
 
+@pytest.mark.slow
 @each_of("listens, trace", [(True, True), (True, False), (False, False)])
 def test_a_peer_says_where_it_listens_and_is_shut_down(listens: bool, trace: bool) -> None:
     server = pytest.importorskip("pymodbus.server")
@@ -245,3 +252,69 @@ def test_how_a_peer_ends(error: BaseException | None, ended: int) -> None:
     assert result.exit_code == ended
     assert asked == [("0.0.0.0", 15021, True), ("127.0.0.1", 15020, False)]
     assert warned == [peer.Peer("0.0.0.0", 15021), peer.Peer("127.0.0.1", 15020)]
+
+
+# --- recordings, fleets and projects -----------------------------------------------------------------------------------------
+
+
+def test_a_recording_without_scans_says_so(counter: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("x.trace").write_bytes(b"")
+    empty = SimpleNamespace(depth=Depth.STATEMENTS, find=lambda name: SimpleNamespace(), scans=[])
+    for module in (why, step):
+        monkeypatch.setattr(module, "open_trace", lambda *given: nullcontext(empty))
+    monkeypatch.setattr(why, "Place", SimpleNamespace)
+    monkeypatch.setattr(step, "FileScans", SimpleNamespace)
+    result = CliRunner().invoke(why.command, ["Main.n", "x.trace"])
+    assert (result.exit_code, "the trace has no scans yet" in result.output) == (status.USAGE, True)
+    with click.Context(step.command), pytest.raises(click.UsageError, match=r"^x\.trace has no scans yet$"):
+        step._past(Path("x.trace"), None, [], [])
+
+
+class Enough(Exception):
+    """What matters has happened."""
+
+
+def test_what_is_said_of_the_programs_of_a_fleet_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[Diagnostic] = []
+    monkeypatch.setattr(fleet, "_project", lambda file, options: (None, None))
+    monkeypatch.setattr(fleet, "_check_shards", lambda project, shards: None)
+    monkeypatch.setattr(fleet, "show_diagnostic", shown.append)
+    monkeypatch.setattr("fbvm.campaign.planning.images_of", lambda project: ([], WRONG.diagnostics))
+    monkeypatch.setattr("fbvm.campaign.work.packed", raising(Enough()))
+    with pytest.raises(Enough):
+        fleet._places(None, {"shards": 2})
+    assert shown == WRONG.diagnostics
+
+
+def test_what_is_said_of_a_project_on_a_page_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[Any] = []
+    plant = SimpleNamespace(diagnostics=WRONG.diagnostics, missing_units=lambda: ["unit 3 is missing"], doors=["door"])
+    monkeypatch.setattr(origins, "Plant", lambda project, **options: shown.append((project, options)) or plant)
+    monkeypatch.setattr(origins, "show_diagnostic", shown.append)
+    monkeypatch.setattr(origins, "say", lambda text, **options: shown.append((text, options)))
+    monkeypatch.setattr(origins, "say_doors", raising(Enough()))
+    project: Any = object()
+    origin = origins.ProjectOrigin(Path("fbvm.toml"), "loop", lambda run: run, 5, 7)
+    origin.project = project
+    with pytest.raises(Enough):
+        origin.build()
+    assert shown == [(project, {"net": "loop", "for_ns": 5, "scans": 7}), *WRONG.diagnostics,
+                     ("unit 3 is missing", {"fg": "yellow", "err": True})]  # fmt: skip
+
+
+@each_of("name, files, made", [
+    ("a.exp", {"A.st": "text"}, ["A.st"]), ("a.lib", {}, []), ("a.lib", {"A.st": "text"}, ["A.st", "library.toml"]),
+    ("a.LIB", {"A.st": "text"}, ["A.st", "library.toml"]),
+])  # fmt: skip
+def test_only_a_library_of_codesys_becomes_a_folder_of_a_library(tmp_path: Path, name: str, files: dict[str, str],
+                                                                made: list[str]) -> None:  # fmt: skip
+    verb = import_module("fbvm.cli.programs.import")
+    (tmp_path / name).write_bytes(b"content")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verb, "is_cx_project", lambda file: False)
+        patch.setattr(verb, "is_export", lambda data: data == b"content")
+        patch.setattr(verb, "import_codesys2", lambda data, name: Imported(files, []))
+        patch.setattr(verb, "library_description", lambda imported, title: f"title = {title}")
+        found = verb._imported(tmp_path / name, None, None, None, None)
+    assert sorted(found.files) == made
+    assert found.files.get("library.toml") in (None, "title = a")
