@@ -160,6 +160,17 @@ def test_a_refused_connection_and_a_tap_that_came_late() -> None:
     ]
 
 
+def test_who_has_ended_a_connection_says_no_more_on_it() -> None:
+    file = io.BytesIO()
+    capture, here = Capture(file), Peer(UNIT, 5000)
+    for what, out in [(TapKind.SYN, True), (TapKind.FIN, True), (TapKind.DATA, True), (TapKind.FIN, True), (TapKind.DATA, False),
+                      (TapKind.FIN, False), (TapKind.DATA, False)]:  # fmt: skip
+        capture.tap(0, UNIT, TapEvent(what, here, SERVER, out, b"more" if what is TapKind.DATA else b""))
+    assert [(sender, flags, data) for _, sender, flags, data in segments(file.getvalue())][1:] == [
+        (UNIT, FIN | ACK, b""), (SERVER.host, ACK, b""), (SERVER.host, PSH | ACK, b"more"), (UNIT, ACK, b""),
+        (SERVER.host, FIN | ACK, b""), (UNIT, ACK, b"")]  # fmt: skip
+
+
 def test_the_checksum_of_rfc_1071() -> None:
     assert frames.checksum(bytes.fromhex("0001f203f4f5f6f7")) == 0x220D
     assert frames.checksum(b"\x01") == 0xFEFF

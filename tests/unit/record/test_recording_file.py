@@ -389,6 +389,16 @@ def test_without_a_part_of_the_description_the_rest_is_read_or_refused_in_words(
         key: "" for key in said if key in ("budget", "charts", "format", "heap", "objects", "results", "sized")}
 
 
+@pytest.mark.parametrize(("key", "value", "said"), [
+    ("slots", -1, "-1 bytes of slots"), ("slots", 1 << 62, f"{1 << 62} bytes of slots"), ("outer", [], "do not fit one another"),
+    ("outer", [7], "do not fit one another")])  # fmt: skip
+def test_a_description_that_does_not_fit_is_refused_in_words(key: str, value: object, said: str) -> None:
+    whole = blocks(written(scans=1))
+    at, (head, payload) = next((at, row) for at, row in enumerate(whole) if row[0].kind == container.PLC)
+    changed = json.dumps({**json.loads(payload), key: value}).encode()
+    assert said in damaged(joined([*whole[:at], (head, changed), *whole[at + 1 :]]))
+
+
 @pytest.mark.slow
 def test_blocks_that_are_much_larger_when_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(container, "LARGEST_BYTES", 1 << 22)
