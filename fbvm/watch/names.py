@@ -16,7 +16,7 @@ from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Elementary, Field, RefType, StructType, Type, base, followed
 from fbvm.code.image import Image
 from fbvm.code.operations import BIT_MASK, BUFFER_OBJECT, FIRST_OBJECT, LEASED, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT
-from fbvm.watch.paths import Place, Span, UnknownPlace, find_place, member
+from fbvm.watch.paths import Place, Span, find_place, member
 from fbvm.watch.values import Value, as_read
 
 REFERENCE = RefType("reference", 8, 8, None)
@@ -85,8 +85,7 @@ class Names:
         """The address at which a variable is located, "" for one in the program's own memory."""
         for area in self._areas.values():
             if area.offset <= place.offset < _end(area):
-                found = _address(self._areas, area, place.offset, place.bit)
-                return found.name if found else ""
+                return _address(self._areas, area, place.offset, place.bit).name
         return ""
 
     # --- references
@@ -264,8 +263,8 @@ def _subscripts(kind: ArrayType, number: int) -> list[int]:
     return subscripts
 
 
-def _address(areas: Mapping[str, Area], area: Area, offset: int, bit: int | None) -> Place | None:
-    """The word, byte, bit or flag of an area."""
+def _address(areas: Mapping[str, Area], area: Area, offset: int, bit: int | None) -> Place:
+    """The word, byte, bit or flag of an area; each byte of one, and each bit, has an address."""
     distance = offset - area.offset
     text = ""
     if area.name in FLAG_AREAS:
@@ -278,10 +277,7 @@ def _address(areas: Mapping[str, Area], area: Area, offset: int, bit: int | None
         address = Address(area.name, distance, bit, 1 if bit is not None else 8)
     else:
         address = Address(area.name, distance // 2, None if bit is None else distance % 2 * 8 + bit)
-    try:
-        return find_place({}, areas, text or str(address))
-    except UnknownPlace:
-        return None
+    return find_place({}, areas, text or str(address))
 
 
 def is_single(place: Place) -> bool:

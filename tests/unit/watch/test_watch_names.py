@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from fbvm.base.areas import AREAS, e_bank
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
-from fbvm.watch.names import Names, is_single
+from fbvm.watch.names import Names, _address, is_single
 from fbvm.watch.paths import Place
 from fbvm.watch.places import parse_for, read_found, write_found
 from fbvm.watch.values import parse_time_ns
@@ -89,3 +90,14 @@ def test_a_reader_reads_what_read_does_now_and_later() -> None:
         found = [(type(value), value) for value in (read() for read in readers)]
         assert found == [(type(value), value) for value in map(plc.read, places)]
         plc.scan()
+
+
+@pytest.mark.slow
+def test_each_byte_and_each_bit_of_an_area_has_an_address() -> None:
+    areas = {**AREAS, "E2": e_bank("E2", 1 << 20)}
+    for area in areas.values():
+        end = area.offset + area.size_bytes
+        for offset in {*range(area.offset, area.offset + 8), *range(end - 8, end)}:
+            for bit in (None, *range(8)):
+                found = _address(areas, area, offset, bit)
+                assert found.offset <= offset < found.offset + max(1, found.type.size), (area.name, offset, bit, found)
