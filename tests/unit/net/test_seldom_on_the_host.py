@@ -269,6 +269,7 @@ def test_a_network_that_is_closed_has_nothing_open_and_nothing_left() -> None:
         opened, now_ns = set[int](), 0
         while opened < {2, 3, 4, 5}:
             now_ns += MS
+            assert now_ns < 10_000 * MS, opened
             opened |= {event.channel for event in link.events(now_ns) if isinstance(event, Opened)}
         socks = {number: channel.sock for number, channel in link.channels.items() if hasattr(channel, "sock")}
         link.submit([Close(4)], now_ns)
