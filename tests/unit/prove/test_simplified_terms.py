@@ -179,6 +179,7 @@ def test_an_operation_with_a_constant_means_the_same_for_every_value(name: str) 
             if name[1:] in ("div", "rem") and (right is not constant or not number):
                 continue
             term = make(terms, left, right)
+            assert 0 <= term.low <= term.high < 1 << max(term.width, 1), f"{term}"
             for value in range(1 << WIDE):
                 for choice in (0, 1) if one in (three, operands[6]) else (0,):
                     known = {x: value, p: choice}
