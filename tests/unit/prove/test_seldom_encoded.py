@@ -35,6 +35,8 @@ def either(then: Block, otherwise: Block) -> Node:
     ((either((SET_9, ("return",)), (store("u8", 9, const("u8", 8)),)), store("u8", 10, const("u8", 1))), {0: b"\0"}),
     ((("store_bit", at(100), 3, B0), ("fill", at(100), b"\x55\xaa")), {0: b"\1"}),
     ((("store_bit", at(100), 3, B0), ("fill", at(99), b"\x55\x5a")), {0: b"\1"}),
+    ((store("b", 100, B0), store("b", 101, B0), ("fill", at(100), b"\0\1")), {0: b"\1"}),
+    ((store("b", 100, B0), ("fill", at(99), b"\5\1\6")), {0: b"\0"}),
     ((store("u32", 100, load("u32", 0)), ("fill", at(98), b"\1\2\3")), {0: b"\x11\x22\x33\x44"}),
     ((store("u32", 100, load("u32", 0)), ("fill", at(102), b"\1\2\3\4")), {0: b"\x11\x22\x33\x44"}),
     ((store("u32", 100, load("u32", 0)), ("fill", at(100), b"\1\2\3\4\5")), {0: b"\x11\x22\x33\x44"}),

@@ -157,6 +157,13 @@ COUNTER = """PROGRAM Main VAR In AT %IX0.0 : BOOL; n, m, d : DINT; END_VAR
 END_PROGRAM"""
 
 
+@pytest.mark.slow
+def test_a_random_run_that_is_longer_than_is_searched_is_told_as_it_is() -> None:
+    verdict = asked(COUNTER, Question(REACH, "Main.n = 6"), scans=3, simulated_scans=400)
+    assert shown(verdict)[0].startswith("REACHED after ") and shown(verdict)[0].endswith("by a run that may not be the shortest")
+    assert verdict.run is not None and verdict.run.scans >= 6
+
+
 def prover_of(question: Question, **limits: Any) -> Prover:
     return Prover(image_of(COUNTER), question, Limits(**{**FEW, **limits}), lambda said: None)
 

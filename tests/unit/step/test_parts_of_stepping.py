@@ -18,7 +18,7 @@ from fbvm.step.filters import BetweenScans
 from fbvm.step.position import Position
 from fbvm.step.properties import Properties
 from fbvm.step.scan_replay import ScanReplay
-from fbvm.step.search import MOST_AT_ONCE, LiveRunner, PastRunner
+from fbvm.step.search import MOST_AT_ONCE, LiveRunner, PastRunner, Runner
 from fbvm.step.session import Session
 from fbvm.step.statement_ends import StatementEnds
 from fbvm.step.stop_report import StopReport
@@ -295,3 +295,53 @@ def test_a_breakpoint_that_cannot_be_says_why(where: str, said: str) -> None:
     with pytest.raises(CommandError) as error:
         list(Commands(made, StopReport(made, {"text.st": MOTORS})).run(f"break {where}"))
     assert str(error.value) == said
+
+
+class Rows:
+    """The breakpoints of a PLC, and what is done to them, in order."""
+
+    def __init__(self) -> None:
+        self.said: list[object] = []
+        self.state = "before"
+
+    def clear(self) -> None:
+        self.said.append("clear")
+
+    def put(self, row: object) -> None:
+        self.said.append(row)
+
+    def begin(self, passes: object) -> None:
+        self.said.append(("begin", passes))
+
+    def restore(self, state: str) -> None:
+        self.said.append(("restore", state))
+
+
+class Played(Runner):
+    """Executes nothing, and says so."""
+
+    def execute(self) -> None:
+        self.plc.breakpoints.said.append("execute")  # type: ignore[attr-defined]
+
+    def many(self, scan: int) -> bool:
+        return False
+
+
+@each_of(("changed", "rows", "halted", "stops", "said"), [
+    (True, ["b"], None, True, ["clear", "execute", "clear", "b", ("restore", "seen")]), (False, ["b"], None, False, ["execute"]),
+    (True, ["b"], None, False, ["clear", "execute", "clear", "b", ("restore", "seen")]), (True, [], None, False, ["execute"]),
+    (True, ["b"], "halt", True, ["execute"]), (False, ["b"], "halt", True, ["execute"]),
+])  # fmt: skip
+def test_a_scan_in_which_something_was_done_is_played_for_its_stops_and_executed_without(
+    changed: bool, rows: list[Any], halted: Any, stops: bool, said: list[object]
+) -> None:
+    made = Rows()
+    plc: Any = SimpleNamespace(breakpoints=made, halted=halted, scans=3)
+    scene: Any = SimpleNamespace(changed_inside=lambda scan: changed, stops_in=lambda scan, state: (stops, "seen"))
+    check: Any = SimpleNamespace(attached=lambda plc: made.said.append("attached"), checked=lambda plc: plc.scans == 3)
+    runner = Played(plc, scene, rows, "kept", {}, check)  # type: ignore[arg-type]
+    assert made.said == ["clear", *rows, ("begin", {}), ("restore", "kept"), "attached"]
+    made.said.clear()
+    assert runner.scan() is stops and made.said == said and runner.stops_behind()
+    plc.scans = 4
+    assert not runner.stops_behind() and not Played(plc, scene, rows, None, {}, None).stops_behind()

@@ -176,6 +176,11 @@ def test_a_course_of_inputs_is_followed() -> None:
     assert (seen.plc.scans, seen.y) == (5, 10)
 
 
+def test_a_course_has_one_step_at_least_and_as_many_as_are_wanted_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strategies.st, "lists", lambda step, min_size, max_size: (min_size, max_size))
+    assert strategies.courses(rig("Twice"), "30ms", 4) == (1, 4) and strategies.courses(rig("Twice")) == (1, 20)
+
+
 # --- a rig of a project -----------------------------------------------------------------------------------------------
 
 PROJECT = """[run]
