@@ -259,3 +259,8 @@ def test_of_named_tests_so_many_are_tried_and_files_are_tried_whole() -> None:
     quick = [item.nodeid for item in forked._chosen(items, tests, False, 2)]
     assert quick == ["c.py::one", "c.py::two", "b.py::two", "b.py::one"]
     assert [item.nodeid for item in forked._chosen(items, tests, True, 2)] == ["b.py::three"]
+
+
+def test_a_mutant_in_structured_text_is_left_to_a_new_process() -> None:
+    with pytest.raises(NotImplementedError):
+        m.Copy.finds_in_fork(object.__new__(m.Copy), m.Mutant(Path("fblib/iec/TON.st"), 0, 1, "x"), [], "slow", 20)

@@ -290,7 +290,9 @@ class Copy:
         return failed[1] if failed else ""
 
     def finds_in_fork(self, mutant: Mutant, tests: list[str], marks: str, limit_s: int) -> bool:
-        """As `finds`, in forks of one session.  Raises NotImplementedError for a mutant outside of functions."""
+        """As `finds`, in forks of one session.  Raises NotImplementedError for a mutant outside of functions of Python."""
+        if mutant.path.suffix != ".py":
+            raise NotImplementedError(mutant.path)
         self._forked = self._forked or Forked(self.folder, self._environment)
         file = self.folder / mutant.path
         text = file.read_text(encoding="utf-8")

@@ -29,6 +29,7 @@ def either(then: Block, otherwise: Block) -> Node:
     return "if", ((B0, then),), otherwise
 
 
+@pytest.mark.slow
 @each_of(("code", "before"), [
     ((either((SET_9, ("return",)), (store("u8", 9, const("u8", 8)), ("return",))), store("u8", 10, const("u8", 1))), {0: b"\1"}),
     ((either((SET_9, ("return",)), (store("u8", 9, const("u8", 8)),)), store("u8", 10, const("u8", 1))), {0: b"\1"}),

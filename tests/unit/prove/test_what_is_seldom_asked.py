@@ -348,3 +348,18 @@ def test_terms_are_shown_for_people() -> None:
     assert repr(one) == "x" and repr(other) == "5"
     assert repr(terms.add(one, other)) in ("(add x 5)", "(add 5 x)")
     assert repr(terms.extract(one, 3, 2)) == "(extract:3 x)"
+
+
+@pytest.mark.slow
+@each_of(("question", "limits", "said"), [
+    (Question(REACH, "Main.n = 3"), {"scans": 12, "simulated_scans": 400}, ["searching 4 scans"]),
+    (Question(REACH, "Main.n = 6"), {"scans": 3, "simulated_scans": 400}, [
+        "searching 3 scans", "searching 3 scans", "trying random inputs",
+        "a random run gets there after 6 scans: looking for the shortest", "searching 3 scans"]),
+    (Question(NEVER, "Main.m > 2001", lemmas=("Main.m = 2 * Main.n AND Main.n >= 0 AND Main.n <= 1000",)), FEW, [
+        "searching 4 scans", "proving the lemmas", "looking for statements that no run reaches"]),
+])  # fmt: skip
+def test_what_is_done_is_told_as_it_goes(question: Question, limits: dict[str, int], said: list[str]) -> None:
+    told: list[str] = []
+    prove(compiled(COUNTER, "standard"), question, Limits(**limits), told.append)
+    assert told == said

@@ -20,7 +20,7 @@ from fbvm.testing.coverage import FileCoverage
 from fbvm.testing.coverage_plugin import CoveragePlugin
 from fbvm.testing.reads import VariableReads
 from fbvm.testing.recorded import Recorded
-from fbvm.testing.session import UNEXPLAINED, library_folders, search_folders
+from fbvm.testing.session import UNEXPLAINED, VARIED, library_folders, search_folders
 from fbvm.testing.st_items import AssertFailed, StFile, StItem
 from fbvm.testing.subject import LIBRARY, SubjectError, subject
 from fbvm.testing.suites import results
@@ -464,3 +464,18 @@ def test_of_a_failure_that_nobody_reads_no_page_is_written(tmp_path: Path, monke
         with pytest.raises(AssertFailed) as failed:
             item.runtest()
         assert (failed.value.page, pages) == ("" if unexplained else "page", ["Wrong"])
+
+
+def test_a_campaign_is_asked_before_and_told_behind_each_scan_of_a_test_in_st(tmp_path: Path) -> None:
+    told: list[object] = []
+    varied = SimpleNamespace(before_scan=lambda: told.append("before"), after_scan=lambda: told.append("after"), elapsed_ns=None)
+    run = SimpleNamespace(cycle_ns=lambda name, cycle_ns: 7 * MS,
+                          made=lambda name, plc, find, more: told.append((name, plc.cycle_ns, more)) or varied)
+    file = tmp_path / "tests" / "test_it.st"
+    file.parent.mkdir()
+    file.write_text("PROGRAM Waits VAR Done : BOOL; n : INT; END_VAR n := n + 1; ASSERT(n < 4); Done := n = 3; END_PROGRAM",
+                    encoding="utf-8")
+    item = st_item(file, "Waits")
+    item.config.stash[VARIED] = cast(Any, run)
+    item.runtest()
+    assert told == [("", 7 * MS, None), *["before", "after"] * 3]
