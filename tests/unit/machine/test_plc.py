@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import pytest
 from images import D200, counter_image, task
@@ -614,3 +614,21 @@ def test_a_watch_cycle_time_is_10_ms_to_40_s_and_1_s_unless_somebody_says(time_n
         with pytest.raises(ValueError, match="a watch cycle time is 10 ms to 40 s"):
             watch.time_ns = time_ns
         assert watch.time_ns == 1_000 * MS
+
+
+@each_of(("trap", "needed", "mode", "recorded", "told"), [
+    (None, True, Mode.PROGRAM, True, ["serve 5", "changed", Mode.PROGRAM]),
+    (None, True, Mode.PROGRAM, False, ["serve 5", Mode.PROGRAM]),
+    (None, True, None, True, ["serve 5"]), (None, False, Mode.PROGRAM, True, []), ("trap", True, Mode.PROGRAM, True, []),
+])  # fmt: skip
+def test_a_change_of_mode_by_a_command_is_recorded(
+    trap: Any, needed: bool, mode: Mode | None, recorded: bool, told: list[Any]
+) -> None:
+    said: list[Any] = []
+    servicing = SimpleNamespace(is_needed=needed, serve=lambda now_ns: said.append(f"serve {now_ns}") or recorded)
+    plc: Any = SimpleNamespace(trap=trap, servicing=servicing, now_ns=5, _io=SimpleNamespace(changed_words=False),
+                               _next_mode=mode, _change_mode=said.append,
+                               _recorder=SimpleNamespace(changed=lambda: said.append("changed")) if recorded else None)
+    Plc._serve_peripherals(plc)
+    assert said == told and plc._io.changed_words is (bool(told) and recorded)
+    assert plc._next_mode == (None if told else mode)

@@ -61,6 +61,8 @@ def shown(verdict: Verdict) -> tuple[str, list[dict[str, object]]]:
 
 @pytest.mark.slow
 @each_of(("text", "question", "said", "writes"), [
+    ("PROGRAM Main VAR_INPUT w : WORD; END_VAR VAR n : INT; END_VAR IF w.12 AND NOT w.4 AND w.8 THEN n := 1; END_IF END_PROGRAM",
+     Question(REACH, "Main.n = 1"), "REACHED after 1 scan, by the shortest run", [{"Main.w.8": True, "Main.w.12": True}]),
     (EVENT, Question(REACH, "p.n = 1"), "REACHED after 1 scan, by the shortest run", [{"Go": True}]),
     (EVENT, Question(REACH, "p.n = 2"), "REACHED after 3 scans, by the shortest run",
      [{"Go": True}, {"Go": False}, {"Go": True}]),

@@ -70,3 +70,15 @@ def test_the_plcs_of_a_project_have_the_cycle_the_watch_cycle_and_the_phase_of_t
     assert [plant.kinds[0].values(run) for run in plant.runs] == [{"Main.n": 7, "D0..D1": [0, 0]}] * 3
     assert [run.reason for run in plant.runs] == ["scans"] * 3
     plant.close()
+
+
+@each_of(("alone", "many", "scans", "asked"), [(True, True, 0, [9]), (True, False, 1, [9]), (False, True, 1, [])])
+def test_many_scans_of_a_run_that_is_alone_are_no_burst(alone: bool, many: bool, scans: int, asked: list[int]) -> None:
+    found: list[int] = []
+    run = Running(Plc(counter_image()), scans=9)
+    run.begin(1000 * MS)
+    run.alone = alone
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Plc, "scan_many", lambda plc, most: found.append(most) or many)
+        assert run.scan(1000 * MS) == [] and (run.plc.scans, found) == (scans, asked)
+    assert run.due_ns == 1000 * MS + scans * run.plc.cycle_ns

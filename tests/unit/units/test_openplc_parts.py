@@ -11,7 +11,7 @@ from fbvm.units.front import Front, Lamp, Socket
 from fbvm.units.openplc import tables
 from fbvm.units.openplc.tables import Bits, Registers, numbers_of, plain
 from fbvm.units.openplc.unit import OpenPlc
-from fbvm.wire.link import Close, Closed, Failed, Grant, Listen, Opened, Peer
+from fbvm.wire.link import Close, Closed, Failed, Grant, Listen, Opened, Peer, Received
 
 
 class Areas:
@@ -91,3 +91,15 @@ def test_its_front_and_what_it_asks_again_behind_failures() -> None:
     assert unit.reset(memory) == [Close(0, True), Close(1, True)]  # type: ignore[arg-type]
     assert unit.front(memory).lamps == (Lamp("RUN", True, "serves"),)  # type: ignore[arg-type]
     assert unit.refresh(memory, [Closed(0)], 3) == [Listen(0, 502), Listen(2, 502)]  # type: ignore[arg-type]
+
+
+def test_a_unit_that_goes_on_from_a_state_has_the_clients_of_that_state_alone() -> None:
+    unit, memory = OpenPlc(clients=3), Areas()
+    unit.refresh(memory, [], 0)  # type: ignore[arg-type]
+    nobody = unit.state
+    unit.refresh(memory, [Opened(number, 502, Peer("192.168.250.9", 50000 + number)) for number in (0, 2)], 1)  # type: ignore
+    unit.refresh(memory, [Received(2, b"\0\1\0\0\0\6\1")], 2)  # type: ignore[arg-type]  # a part of a frame
+    two = unit.state
+    for state, clients in ((nobody, []), (two, ["client 0", "client 2"]), (nobody, [])):
+        unit.resume(state, memory)  # type: ignore[arg-type]
+        assert [socket.name for socket in unit.front(memory).sockets] == clients and unit.state == state  # type: ignore[arg-type]
