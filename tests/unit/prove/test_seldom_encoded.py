@@ -97,3 +97,14 @@ def test_what_no_path_reads_is_nothing_that_is_known() -> None:
     found = scanned((when(B0, store("u8", 16, ("load", "u8", behind(const("ref", 0))))),), 0)
     assert [(trap.code, trap.site) for trap in found.execution.traps] == [("R0110", 9)]
     assert found.contents.number(SLOTS_OFFSET + 16, 1).op == "ite"
+
+
+@each_of(("code", "traps"), [
+    (store("i32", 16, ("nearest", "i32", "f32", load("f32", 0), 7)), [("R0105", 7)]),
+    (store("f32", 16, ("add", "f32", load("f32", 0), load("f32", 4))), []),
+    (("store_text", at(16), 3, ("left", "s8", ("load_text", "s8", at(0), 3), load("i64", 8), 6)), [("R0108", 6)]),
+])  # fmt: skip
+def test_an_operation_of_which_nothing_is_known_may_trap_as_it_does(code: Node, traps: list[tuple[str, int]]) -> None:
+    found = scanned((code,), *range(16)).execution.traps
+    assert [(trap.code, trap.site) for trap in found] == traps
+    assert all(trap.condition.op == "unknown" and trap.condition.width == 0 for trap in found)

@@ -113,7 +113,9 @@ def test_late_scans_by_the_time_that_is_asked_for(times_ms: tuple[int, ...], wan
     found = []
     for number, time_ms in enumerate(times_ms):
         plc.now_ns, plc.scans = time_ms * MS, number + 1
-        found.append((filters.found, filters.kind) if filters.checked(plc) else ("", ""))
+        stops = filters.checked(plc)
+        found.append((filters.found, filters.kind) if stops else ("", ""))
+        assert stops is bool(found[-1][0])
     assert [text for text, _ in found] == late and {kind for text, kind in found if text} <= {"late"}
     others = BetweenScans({"response": frozenset()})
     others.attached(plc)

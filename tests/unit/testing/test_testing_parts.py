@@ -176,6 +176,14 @@ def test_a_course_of_inputs_is_followed() -> None:
     assert (seen.plc.scans, seen.y) == (5, 10)
 
 
+@pytest.mark.slow
+def test_what_is_done_with_a_rig_can_be_written_in_a_row() -> None:
+    made = rig("Twice")
+    for done in (made.write(x=1), made.scan(x=2), made.run(scans=2), made.until(lambda rig: True), made.power_on(),
+                 made.cold_start(), made.mode("PROGRAM"), made.mode("RUN"), made.unforce()):  # fmt: skip
+        assert done is made
+
+
 def test_a_course_has_one_step_at_least_and_as_many_as_are_wanted_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(strategies.st, "lists", lambda step, min_size, max_size: (min_size, max_size))
     assert strategies.courses(rig("Twice"), "30ms", 4) == (1, 4) and strategies.courses(rig("Twice")) == (1, 20)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -460,3 +461,19 @@ def test_at_power_on_a_word_that_was_left_is_cleared(area: str, word: int, value
     is_on = unit.exchanged is not None
     assert (memory.words(area)[word], is_on, unit.changed_words) == (value if left is None else left, left is not None, is_on)
     assert memory.words("CIO")[N + at.SERVICE_STATUS] == 0x4000
+
+
+def test_a_restart_that_the_own_program_commands_is_asked_for_until_it_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    refused = [0]
+    monkeypatch.setattr("fbvm.units.etn21.fins.service.routing", SimpleNamespace(
+        refusal=lambda settings, command, size: refused[0], execute=lambda *given: (len(given), b"x"),
+        restarts=lambda command, end_code: command.code == 0x0403))  # fmt: skip
+    service: Any = object.__new__(FinsService)
+    service.settings = service.state = None
+    service.error_status, service.asks_restart = 0, False
+    told = []
+    for code, refusal in ((0x0501, 0), (0x0403, 0x1001), (0x0403, 0), (0x0501, 0)):
+        refused[0] = refusal
+        answer = service.execute(SimpleNamespace(code=code, to_bytes=lambda: b"12"), None)
+        told.append((answer, service.asks_restart))
+    assert told == [((5, b"x"), False), ((0x1001, b""), False), ((5, b"x"), True), ((5, b"x"), True)]
