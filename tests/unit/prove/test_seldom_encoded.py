@@ -11,9 +11,11 @@ from symbolic import encoded_program
 from test_encoded_rows import compare, result
 
 from fbvm.base.areas import SLOTS_OFFSET
+from fbvm.base.types import BOOL, WORD, Field, array
 from fbvm.code.operations import Block, Node
 from fbvm.prove.encoding.execution import Refused
 from fbvm.prove.encoding.scan import Scanned
+from fbvm.prove.encoding.summary import _extent
 
 B0: Node = ("load", "b", at(0))
 SET_9: Node = store("u8", 9, const("u8", 7))
@@ -108,3 +110,12 @@ def test_an_operation_of_which_nothing_is_known_may_trap_as_it_does(code: Node, 
     found = scanned((code,), *range(16)).execution.traps
     assert [(trap.code, trap.site) for trap in found] == traps
     assert all(trap.condition.op == "unknown" and trap.condition.width == 0 for trap in found)
+
+
+@each_of(("member", "places"), [
+    (Field("a", WORD, 3), [(13, 2, None)]), (Field("a", WORD, 3, absolute=True), [(3, 2, None)]),
+    (Field("a", BOOL, 3, bit=6), [(13, 1, 6)]),
+    (Field("a", array(((0, 4),), BOOL), 3, bit=6), [(13, 1, 6), (13, 1, 7), (14, 1, 0), (14, 1, 1), (14, 1, 2)]),
+])  # fmt: skip
+def test_where_an_input_lies(member: Field, places: list[tuple[int, int, int | None]]) -> None:
+    assert _extent(member, 10) == places

@@ -72,13 +72,21 @@ def test_the_plcs_of_a_project_have_the_cycle_the_watch_cycle_and_the_phase_of_t
     plant.close()
 
 
-@each_of(("alone", "many", "scans", "asked"), [(True, True, 0, [9]), (True, False, 1, [9]), (False, True, 1, [])])
+@each_of(("alone", "many", "scans", "asked"), [(True, True, 9, [9]), (True, False, 1, [9]), (False, True, 1, [])])
 def test_many_scans_of_a_run_that_is_alone_are_no_burst(alone: bool, many: bool, scans: int, asked: list[int]) -> None:
     found: list[int] = []
     run = Running(Plc(counter_image()), scans=9)
     run.begin(1000 * MS)
     run.alone = alone
+
+    def scan_many(plc: Plc, most: int) -> bool:
+        found.append(most)
+        for _ in range(most if many else 0):
+            plc.scan()
+        return many
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Plc, "scan_many", lambda plc, most: found.append(most) or many)
+        patch.setattr(Plc, "scan_many", scan_many)
         assert run.scan(1000 * MS) == [] and (run.plc.scans, found) == (scans, asked)
+    assert bool(run.reason) is (scans == 9)
     assert run.due_ns == 1000 * MS + scans * run.plc.cycle_ns

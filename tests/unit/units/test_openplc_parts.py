@@ -103,3 +103,12 @@ def test_a_unit_that_goes_on_from_a_state_has_the_clients_of_that_state_alone() 
     for state, clients in ((nobody, []), (two, ["client 0", "client 2"]), (nobody, [])):
         unit.resume(state, memory)  # type: ignore[arg-type]
         assert [socket.name for socket in unit.front(memory).sockets] == clients and unit.state == state  # type: ignore[arg-type]
+
+
+def test_a_frame_of_another_protocol_is_passed_over_and_what_is_no_frame_ends_the_connection() -> None:
+    unit, memory = OpenPlc(clients=1), Areas()
+    unit.refresh(memory, [], 0)  # type: ignore[arg-type]
+    unit.refresh(memory, [Opened(0, 502, Peer("192.168.250.9", 50000))], 1)  # type: ignore[arg-type]
+    foreign, endless = b"\0\1\0\1\0\2\1\3", b"\0\1\0\0\xff\xff"
+    assert unit.refresh(memory, [Received(0, foreign)], 2) == [Grant(0, 2080)]  # type: ignore[arg-type]
+    assert unit.refresh(memory, [Received(0, foreign + endless)], 3) == [Close(0)]  # type: ignore[arg-type]
