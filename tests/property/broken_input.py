@@ -25,6 +25,8 @@ if __name__ == "__main__":
     TESTS = Path(__file__).parents[1]
     sys.path[:0] = [str(TESTS.parent), *(str(TESTS / name) for name in ("unit/rigs", "twincat", "cx"))]
 
+import broken_seeds
+import codesys2_files
 import twincat_files
 from click.testing import CliRunner
 from cx_text import Cxt
@@ -144,6 +146,19 @@ KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
         ("run", "--scans", "3", "--trace", "out.fbtrace", "--depth", "statements", "--html", "out.html",
          "--journal", "out.journal"),
     )),
+    "codesys": ("text.st", (
+        ("check", "--dialect", "codesys2"), ("check", "--dialect", "codesys"), ("fmt", "--diff"), ("export", "-o", "out.xml"),
+        ("run", "--dialect", "codesys", "--heap", "1000", "--scans", "3"), ("run", "--dialect", "codesys2", "--scans", "3"),
+        ("list", "--native", "--dialect", "codesys"),
+        ("prove", "--dialect", "codesys", "--no-trap", "--scans", "3", "--budget", "500ms"),
+    )),
+    "export2": ("text.exp", (
+        ("check",), ("check", "--json"), ("import", "-o", "out", "--force"), ("run", "--scans", "3"), ("fmt", "--diff"),
+        ("ladder",), ("export", "-o", "out.xml"), ("diff", "use.st"),
+    )),
+    "library2": ("own.lib", (("import", "-o", "out", "--force"), ("check",), ("list",), ("run", "--scans", "3"))),
+    "system": ("Plant.tsproj", (("check",), ("run", "--scans", "3"))),
+    "campaign": ("campaign.toml", (("campaign", "--jobs", "1", "--runs", "1", "--for", "50ms", "--fresh", "--out", "out"),)),
     "xml": ("text.xml", (("import", "-o", "out", "--force"), ("import", "-o", "out", "--force", "--json"), ("check",))),
     "project": ("fbvm.toml", (  # a good one may ask for hours, and gets them
         ("check",), ("check", "--json"), ("run", "--for", "1s"), ("run", "--for", "1s", "--json"), ("step",),
@@ -192,9 +207,14 @@ def seeds() -> dict[str, list[bytes]]:
                *sorted((ROOT / "tests/golden").rglob("*.st"))]
     found = {"source": [path.read_bytes() for path in sources] + [text.encode() for text in (COUNTER, LIST, OBJECTS)],
              "xml": [path.read_bytes() for path in sorted((ROOT / "tests/plcopen/documents").glob("*.xml"))],
-             "project": [PROJECT.encode()], "library": [LIBRARY.encode()], "property": [PROPERTY], "cx": [GOOD_CX],
+             "project": [text.encode() for text in (PROJECT, broken_seeds.PICTURES)],
+             "library": [LIBRARY.encode()], "property": [PROPERTY], "cx": [GOOD_CX],
              "cxp": [compress(GOOD_CX)], "drawing": [(ROOT / "examples/conveyor/conveyor.svg").read_bytes()],
-             "object": [text.encode() for name, text in twincat_files.FILES.items() if "POUs" in name],
+             "object": [text.encode() for name, text in twincat_files.FILES.items() if "POUs" in name]
+                       + broken_seeds.drawn_objects(),
+             "codesys": [text.encode() for text in (broken_seeds.HEAP, broken_seeds.FILES)], "export2": broken_seeds.exports(),
+             "library2": [codesys2_files.LIBRARY], "system": [broken_seeds.SYSTEM.encode()],
+             "campaign": [broken_seeds.CAMPAIGN.encode()],
              "plcproj": [twincat_files.PROJECT.encode()]}  # fmt: skip
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         Path("counter.st").write_text(COUNTER, encoding="utf-8")
@@ -204,7 +224,9 @@ def seeds() -> dict[str, list[bytes]]:
         verb("run", "counter.st", "--scans", "5", "--trace", "a.fbtrace", "--depth", "statements", "--set", "D7=3@20ms")
         verb("run", str(examples[0]), "--map", "192.168.250.1:502=peer", "--scans", "60", "--trace", "b.fbtrace", "--verify")
         verb("convert", "a.fbtrace", "a.csv")
-        found["recording"] = [Path(name).read_bytes() for name in ("a.fbtrace", "b.fbtrace")]
+        Path("heap.st").write_text(broken_seeds.HEAP, encoding="utf-8")
+        verb("run", "heap.st", "--dialect", "codesys", "--scans", "5", "--trace", "c.fbtrace", "--depth", "statements")
+        found["recording"] = [Path(name).read_bytes() for name in ("a.fbtrace", "b.fbtrace", "c.fbtrace")]
         demo = examples[0].read_text(encoding="utf-8")
         for name, text, scans in (("a", COUNTER, 5), ("b", demo, 60)):
             write_old_journal(f"{name}.journal", text, f"{name}.st", scans)
@@ -324,6 +346,7 @@ def furnish() -> None:
     Path("use.st").write_text("PROGRAM Main VAR t : Twice; END_VAR t(IN := 1); END_PROGRAM\n", encoding="utf-8")
     Path("own/Twice.st").write_text("FUNCTION_BLOCK Twice VAR_INPUT x : INT; END_VAR\nEND_FUNCTION_BLOCK\n", encoding="utf-8")
     Path("good.cxt").write_bytes(GOOD_CX)
+    Path("tank.svg").write_bytes((ROOT / "examples/tank/tank.svg").read_bytes())
     twincat_files.write_project(Path())
     Path("own/lists.st").write_text("VAR_GLOBAL own_list : INT; END_VAR\n", encoding="utf-8")
 

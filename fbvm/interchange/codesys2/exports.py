@@ -7,7 +7,9 @@ with an error."""
 from __future__ import annotations
 
 import re
-from functools import cache
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from functools import cache, lru_cache
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.codesys2.diagrams import Unreadable, networks
@@ -24,50 +26,57 @@ _BODY = re.compile(r"(?m)^[ \t]*_(LD|FBD|CFC|SFC)_BODY\b")
 _END_OF_POU = re.compile(r"(?m)^[ \t]*END_(?:PROGRAM|FUNCTION_?BLOCK|FUNCTION|ACTION)\b")
 _HEAD = re.compile(r"(?m)^[ \t]*(PROGRAM|FUNCTION_?BLOCK|FUNCTION|ACTION)\s+(\w+)")
 _TASK = re.compile(r"(?m)^[ \t]*TASK\s+(\w+)")
-_STRUCTURE = re.compile(r"(?m)^[ \t]*(?:FUNCTION_?BLOCK|FUNCTION|PROGRAM|TYPE|VAR_GLOBAL|VAR_CONFIG|ACTION)\b")
+_BEGINS = r"FUNCTION_?BLOCK|FUNCTION|PROGRAM|TYPE|VAR_GLOBAL|VAR_CONFIG|ACTION"
+_MARK = re.compile(rf"(?m)^[ \t]*(?:{_BEGINS}|(?P<end>END_(?:FUNCTION_?BLOCK|FUNCTION|PROGRAM|TYPE|VAR|ACTION)))\b")
+"""Where a POU, a type or a list of variables begins or ends."""
 
 
 def as_source(source: Source) -> tuple[Source, list[Diagnostic]]:
     """The program in an export, at its lines and columns, and what is said about the rest."""
-    text, said = source.text, []
-    for start, end, word in _settings(text):
+    said: list[Diagnostic] = []
+    parts = _settings(source.text)
+    for start, end, word in parts:
         said += _tasks(source, start, end) if word == "RESOURCE" else []
-        text = text[:start] + _blank(text[start:end]) + text[end:]
+    text = _blanked(source.text, [(start, end) for start, end, _ in parts])
     bodies = []
     for body in _BODY.finditer(text):
         found = _END_OF_POU.search(text, body.end())
         bodies.append((body, found.start() if found else len(text)))
-    declared = text
+    places = [(body.start(), end) for body, end in bodies]
+    pins = _pins(_blanked(text, places))
+    drawn: dict[int, str] = {}
     for body, end in bodies:
-        declared = declared[:body.start()] + _blank(declared[body.start():end]) + declared[end:]
-    pins = _pins(declared)
-    made = text
-    for body, end in reversed(bodies):
-        lines: list[str] = []
         if text[body.end():end].strip():
             try:
-                lines = _lines(text, body, end, pins)
+                drawn[body.start()] = "\n".join(_lines(source, text, body, end, pins)) + "\n"
             except Unreadable as refusal:
                 said.append(_refused(source, text, body, *refusal.args))
-        kept = _blank(text[body.start():end])
-        made = made[:body.start()] + ("\n".join(lines) + "\n" if lines else kept) + made[end:]
-    return Source(source.name, made, source.library), sorted(said, key=Diagnostic.order)
+    return Source(source.name, _blanked(text, places, drawn), source.library), sorted(said, key=Diagnostic.order)
 
 
-def _lines(text: str, body: re.Match[str], end: int, pins: Pins) -> list[str]:
+def _blanked(text: str, places: Sequence[tuple[int, int]], instead: Mapping[int, str] | None = None) -> str:
+    """The text with blanks at places that follow each other, or with what stands there `instead`, by where it begins."""
+    kept, at = [], 0
+    for start, end in places:
+        kept += [text[at:max(start, at)], (instead or {}).get(start) or _blank(text[max(start, at):end])]
+        at = max(end, at)
+    return "".join((*kept, text[at:]))
+
+
+def _lines(source: Source, text: str, body: re.Match[str], end: int, pins: Pins) -> list[str]:
     """The lines in place of a diagram, each network at the line where it begins.  Raises Unreadable."""
     if body[1] not in ("LD", "FBD"):
         raise Unreadable(body.start(), "only ladder and FBD are read")
-    writer, first = Writer(pins), text.count("\n", 0, body.start())
+    writer, first = Writer(pins), source.place(body.start())[0]
     lines = [""]
     for number, network in enumerate(networks(text, body.end(), end), 1):
-        lines += [""] * (text.count("\n", 0, network.start) - first - len(lines)) + writer.network(number, network)
+        lines += [""] * (source.place(network.start)[0] - first - len(lines)) + writer.network(number, network)
     if writer.power:
         kind = (_owner(text, body.start()) or ("", ""))[0]
         if kind == "ACTION":
             raise Unreadable(body.start(), "an action has no variables, and this one needs some for the power of boxes with EN")
         lines[0] = f"VAR{'' if kind == 'FUNCTION' else '_TEMP'} {', '.join(writer.power)} : BOOL; END_VAR"
-    return lines + [""] * (text.count("\n", 0, end) - first - len(lines))
+    return lines + [""] * (source.place(end)[0] - first - len(lines))
 
 
 def _pins(declared: str) -> Pins:
@@ -90,22 +99,24 @@ def _pins(declared: str) -> Pins:
 def _settings(text: str) -> list[tuple[int, int, str]]:
     """The parts that are no program: from, to, and the first word."""
     parts: list[tuple[int, int, str]] = []
+    marks, opened, at = _MARK.finditer(text), False, 0
+    mark = next(marks, None)
     for found in _SETTINGS.finditer(text):
+        while mark is not None and mark.start() < found.start():
+            opened, mark = mark["end"] is None, next(marks, None)
+        if found.start() < at or opened:
+            continue
         word = found["word"] or found["plc"]
         last = "PLC_END" if found["plc"] else _ENDS.get(word, f"_END{word}")
-        ends = re.compile(rf"(?m)^[ \t]*{last}\b.*").search(text, found.end())
-        if (parts and found.start() < parts[-1][1]) or _within_program(text, found.start()):
-            continue
-        parts.append((found.start(), ends.end() if ends else len(text), word))
+        ends = _end_of(last).search(text, found.end())
+        at = ends.end() if ends else len(text)
+        parts.append((found.start(), at, word))
     return parts
 
 
-def _within_program(text: str, at: int) -> bool:
-    """Whether a place lies in a POU, a type or a list of variables."""
-    opened = max((found.start() for found in _STRUCTURE.finditer(text, 0, at)), default=-1)
-    closed = max((found.start() for found in re.finditer(r"(?m)^[ \t]*END_(?:FUNCTION_?BLOCK|FUNCTION|PROGRAM|TYPE|VAR|ACTION)\b",
-                                                         text[:at])), default=-1)
-    return opened > closed
+@cache
+def _end_of(last: str) -> re.Pattern[str]:
+    return re.compile(rf"(?m)^[ \t]*{last}\b.*")
 
 
 def _tasks(source: Source, start: int, end: int) -> list[Diagnostic]:
@@ -117,8 +128,14 @@ def _tasks(source: Source, start: int, end: int) -> list[Diagnostic]:
 
 def _owner(text: str, at: int) -> tuple[str, str] | None:
     """The kind and name of the POU or action whose body stands at an offset."""
-    heads = list(_HEAD.finditer(text, 0, at))
-    return (heads[-1][1], heads[-1][2]) if heads else None
+    heads = _heads(text)
+    found = bisect_left(heads, at, key=lambda head: head.end())
+    return (heads[found - 1][1], heads[found - 1][2]) if found else None
+
+
+@lru_cache(maxsize=1)
+def _heads(text: str) -> list[re.Match[str]]:
+    return list(_HEAD.finditer(text))
 
 
 def _refused(source: Source, text: str, body: re.Match[str], at: int, why: str) -> Diagnostic:

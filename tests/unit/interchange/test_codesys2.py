@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 from click.testing import CliRunner
+from codesys2_files import EXPORT, LIBRARY
 
 from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
@@ -14,62 +14,6 @@ from fbvm.interchange.codesys2.importing import import_codesys2
 from fbvm.interchange.formats.given import usual_dialect, within
 from fbvm.machine.plc import Plc
 
-EXPORT = """
-(* @NESTEDCOMMENTS := 'Yes' *)
-(* @PATH := '\\/Motors' *)
-(* @OBJECTFLAGS := '0, 8' *)
-(* @SYMFILEFLAGS := '2048' *)
-FUNCTION_BLOCK Doubler
-VAR_INPUT IN : INT; END_VAR
-VAR_OUTPUT OUT : INT; END_VAR
-(* @END_DECLARATION := '0' *)
-OUT := IN * Factor;
-Count;
-END_FUNCTION_BLOCK
-
-ACTION Count:
-Calls := Calls + 1;
-END_ACTION
-(* @NESTEDCOMMENTS := 'Yes' *)
-(* @PATH := '' *)
-PROGRAM PLC_PRG
-VAR d : Doubler; r : INT; END_VAR
-(* @END_DECLARATION := '0' *)
-d(IN := r + 1);
-r := d.OUT;
-END_PROGRAM
-
-(* @NESTEDCOMMENTS := 'Yes' *)
-(* @GLOBAL_VARIABLE_LIST := 'Settings' *)
-(* @PATH := '' *)
-VAR_GLOBAL
-    Factor : INT := 2;
-    Calls : INT;
-END_VAR
-(* @OBJECT_END := 'Settings' *)
-(* @CONNECTIONS := Settings
-FILENAME : ''
-NUMOFCONNECTIONS : 0
-*)
-
-_ALARMCONFIG
-_ALARMCLASSNAME : 'DEFAULT'
-_END_ALARMCONFIG
-
-LIBRARY
-\\\\.host\\Standard.lib 4.10.05 12:14:46
-NumOfPOUs: 1
-TON: 0
-END_LIBRARY
-
-PLC_CONFIGURATION
-_MODULE: '3S'
-PLC_END
-
-RESOURCE
-TASK Fast (INTERVAL := T#1ms)
-END_RESOURCE
-"""
 DIAGRAM = EXPORT.replace("d(IN := r + 1);\nr := d.OUT;", "_FBD_BODY\n_NETWORKS : 1\n_NETWORK\n_OUTPUTS : 0")
 
 
@@ -102,25 +46,6 @@ def test_a_diagram_of_an_export_is_refused_by_name() -> None:
     error, = made.errors
     assert error.code == "X0203" and "PROGRAM PLC_PRG is a diagram (FBD)" in error.message
     assert DIAGRAM[error.start:].startswith("_OUTPUTS : 0")
-
-
-def _text(text: str) -> bytes:
-    return struct.pack("<I", len(text.encode("cp1252"))) + text.encode("cp1252")
-
-
-def _object(name: str, declaration: str, body: str | None = None, kind: int = 0x12) -> bytes:
-    head = bytes(17) + b"\xcd" * 8 + b"\2\0" * 8
-    made = _text(name) + head + _text(declaration.replace("\n", "\r\n"))
-    return made + (bytes((kind,)) + _text(body.replace("\n", "\r\n")) if body is not None else b"") + bytes(20)
-
-
-LIBRARY = b"CoDeSys+" + bytes(50) + _text("VAR_GLOBAL\r\nEND_VAR\r\n") + bytes(40) + b"".join((
-    _object("Limits", "VAR_GLOBAL CONSTANT\n\tHIGHEST : INT := 5; (* f\xfcr alle *)\nEND_VAR\n"),
-    _object("Pair", "TYPE Pair :\nSTRUCT\n\ta, b : INT;\nEND_STRUCT\nEND_TYPE\n\n(* a FUNCTION Odd of old *)\n"),
-    _object("Sum", "(* adds up *)\nFUNCTION Sum : INT\nVAR_INPUT p : Pair; END_VAR\n", "Sum := MIN(p.a + p.b, HIGHEST);"),
-    _object("Twice", "FUNCTIONBLOCK Twice\nVAR_INPUT n : INT; END_VAR\nVAR_OUTPUT m : INT; END_VAR\n", "m := 2 * n;"),
-    _object("Demo", "PROGRAM Demo\nVAR x : INT; END_VAR\n", "not text", kind=0x29),
-))
 
 
 def test_a_library_is_read_and_found_by_name(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from codesys2_files import assigned, box, contact, export, instance, operand, row, rung
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
@@ -11,56 +12,6 @@ from fbvm.interchange.codesys2.exports import as_source
 from fbvm.machine.plc import Plc
 
 ENGINES = ("python", "native") if available() else ("python",)
-VARIABLES = "a, b, c, p, q : BOOL; n, m, k : INT; t : TON; d : Double;"
-DOUBLE = ("FUNCTION_BLOCK Double\nVAR_INPUT x : INT; more : BOOL; END_VAR\nVAR_OUTPUT y : INT; odd : BOOL; END_VAR\n"
-          "y := x * 2; odd := more;\nEND_FUNCTION_BLOCK\n")
-
-
-def contact(name: str, sign: str = "_POSITIV") -> str:
-    return f"_LD_CONTACT {name} _EXPRESSION {sign}"
-
-
-def row(word: str, *parts: str) -> str:
-    return f"_LD_{word} _LD_OPERATOR:{len(parts)} {' '.join(parts)} _EXPRESSION _POSITIV"
-
-
-def operand(text: str) -> str:
-    return f"_OPERAND _EXPRESSION _POSITIV {text}"
-
-
-def box(name: str, *parts: str, enabled: str = "", sign: str = "_POSITIV") -> str:
-    return f"_OPERATOR _BOX_EXPR:{len(parts)} {enabled} {' '.join(parts)} _EXPRESSION {sign} {name}"
-
-
-def instance(name: str, kind: str, parts: tuple[str, ...], *more: str) -> str:
-    return f"_FUNCTIONBLOCK {name} _BOX_EXPR:{len(parts)} {' '.join(parts)} _EXPRESSION _POSITIV {kind} {outputs(*more)}"
-
-
-def outputs(*coils: str) -> str:
-    """Coils as `q`, `-q`, `set q` and `reset q`."""
-    signs = {"": "_POSITIV _NO_SET", "-": "_NEGATIV _NO_SET", "set": "_POSITIV _SET", "reset": "_NEGATIV _SET"}
-    made = []
-    for coil in coils:
-        how, _, name = coil.rpartition(" ")
-        how, name = ("-", name[1:]) if name.startswith("-") else (how, name)
-        made.append(f"_OUTPUT {signs[how]} {name}")
-    return f"_OUTPUTS:{len(coils)} {' '.join(made)}"
-
-
-def rung(value: str, *coils: str, boxes: tuple[str, ...] = ()) -> str:
-    return f"_LD_ASSIGN {value} _EXPRESSION _POSITIV ENABLELIST:{len(boxes)} {' '.join(boxes)} ENABLELIST_END {outputs(*coils)}"
-
-
-def assigned(value: str, *coils: str) -> str:
-    return f"_ASSIGN {value} _EXPRESSION _POSITIV {outputs(*coils)}"
-
-
-def export(*networks: str, language: str = "LD") -> str:
-    """An export with PLC_PRG in these networks, whose words stand one a line."""
-    written = "\n".join(f"_NETWORK\n\n_COMMENT\n'Says {number}'\n_END_COMMENT\n" + network.replace(":", " : ").replace(" ", "\n")
-                        .replace("\n:\n", " : ") for number, network in enumerate(networks))
-    return (f"(* @NESTEDCOMMENTS := 'Yes' *)\n{DOUBLE}PROGRAM PLC_PRG\nVAR {VARIABLES} END_VAR\n(* @END_DECLARATION := '0' *)\n"
-            f"_{language}_BODY\n_NETWORKS : {len(networks)}\n{written}\nEND_PROGRAM\n")
 
 
 def run(text: str, names: str, *scans: str) -> list[list[list[object]]]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from codesys2_files import assigned, box, contact, export, instance, operand, row, rung
 from rows import each_of
-from test_codesys2_diagrams import assigned, box, contact, export, instance, operand, row, rung
 
 from fbvm.base.diagnostics import Source
 from fbvm.interchange.codesys2.exports import as_source
