@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -228,12 +228,14 @@ class SourceBuilder(SfcElements):
         self.lists = [each for each in lists if each.start >= start]
         self.targets = {each: name for each, name in targets.items() if each.start >= start}
         self.labels = {each: name for each, name in labels.items() if each.start >= start}
+        self.rungs = _rungs(self.ladders)
         self.charted, self.jump_sections = {}, []
         yield
         self.ladders = [each for each in ladders if each.start < start]
         self.lists = [each for each in lists if each.start < start]
         self.targets = {each: name for each, name in targets.items() if each.start < start}
         self.labels = {each: name for each, name in labels.items() if each.start < start}
+        self.rungs = _rungs(self.ladders)
         self.blocks, self.numbered, self.charted, self.jump_sections = blocks, numbered, charted, jump_sections
 
     def _add_ladders(self, word: Token, actions: list[Action], declared: list[VarSection]) -> None:
@@ -247,6 +249,7 @@ class SourceBuilder(SfcElements):
             turn_condition_flags_off(self.ladders)
         declared += hidden_sections(self.ladders, declared, self.report)
         self.ladders.clear()
+        self.rungs = 0
 
     def _sections_of_jumps(self) -> list[VarSection]:
         """The hidden sections with the variables of the jumps in the POU's body, its actions and its transitions."""
@@ -286,6 +289,7 @@ class SourceBuilder(SfcElements):
 
         made = read_ladder(self, token)
         self.ladders.append(made)
+        self.rungs += len(made.rungs)
         return made
 
     # --- actions ---
@@ -311,6 +315,10 @@ _ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
 
 
 _IN_NAMESPACE = (Pou, TypeDecl, Namespace, Action, Actions)
+
+
+def _rungs(ladders: Sequence[Ladder]) -> int:
+    return sum(len(ladder.rungs) for ladder in ladders)
 
 
 def _is_program(declaration: Declaration) -> bool:

@@ -53,7 +53,7 @@ class LadderLowering:
         self.spans.find_jumps(texts)
         self.blocks.find_timers(texts)
         rungs = []
-        before = sum(len(ladder.rungs) for ladder in self.builder.ladders)
+        before = self.builder.rungs
         self.programs.find_places(enumerate(texts, before + 1))
         for position, text in enumerate(texts, 1):
             context.rung = before + position

@@ -58,6 +58,8 @@ class Builder:
         """Whether ERROR_LIMIT is reached."""
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""
+        self.rungs = 0
+        """How many rungs these have."""
         self.lists: list[InstructionList] = []
         """Instruction lists of the POU that is being read."""
         self.blocks: dict[str, str] = {}

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 from codesys2_files import EXPORT, LIBRARY
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_sources
-from fbvm.interchange.codesys2.importing import import_codesys2
+from fbvm.interchange.codesys2.importing import import_codesys2, read_export
 from fbvm.interchange.formats.given import usual_dialect, within
 from fbvm.machine.plc import Plc
 
@@ -84,3 +87,19 @@ def test_a_diagram_in_the_first_line_of_an_export_has_the_name_of_its_pou() -> N
     assert error.message == ("the body of PROGRAM First is a diagram (CFC), which is not read from an export as text: "
                              "only ladder and FBD are read")
     assert error.source.text[error.start : error.end] == "_CFC_BODY"
+
+
+@pytest.mark.slow
+@each_of("part", [
+    "VISUALISATION V{}\nEND_VISUALISATION\n", "LIBRARY\nL{}.lib\nEND_LIBRARY\n", "ACTION A{}:\nx := 1;\nEND_ACTION\n",
+    "FUNCTION_BLOCK B{}\nVAR END_VAR\n_CFC_BODY\n_ITEMS : 0\nEND_FUNCTION_BLOCK\n",
+])
+def test_the_time_of_an_export_grows_with_its_parts(part: str) -> None:
+    def took_s(count: int) -> float:
+        text = EXPORT + "".join(part.format(number) for number in range(count))
+        began_s = time.process_time()
+        read_export(text.encode(), "many.exp")
+        return time.process_time() - began_s
+
+    took_s(10)
+    assert took_s(4000) < 8 * took_s(1000)
