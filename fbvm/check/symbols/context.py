@@ -5,7 +5,7 @@ of a POU, the context looks it up, and has it resolved first by the rule that `R
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fbvm.base.areas import (
@@ -107,6 +107,10 @@ class Context:
         self._attributes: dict[Pou, dict[str, str]] = {}
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}
+        self._descendants: dict[str, list[Pou]] = {}
+        """By name of a type the blocks whose types have that name or are derived from one that has."""
+        self._indexed = 0
+        """How many blocks there were when that was made."""
         self._identifiers = 0
         self._anonymous = 0
         self._resolving = 0
@@ -197,9 +201,10 @@ class Context:
 
         pou: what the call names: a method, an accessor, an ACTION or a block.  Types that are ABSTRACT have no instances."""
         home = pou.block or pou.owner
+        assert home.type is not None, "what has no instances is not meant by different types"
         found: dict[Pou, list[int]] = {}
-        for block in self._blocks.values():
-            if block.kind == "INTERFACE" or "ABSTRACT" in block.modifiers or not derives(block.type, home.type):
+        for block in self._derived_from(home.type):
+            if "ABSTRACT" in block.modifiers:
                 continue
             meant = block.method(pou.key) if pou.block is not None else block.action(pou.key) if pou.home is not None else block
             if meant is not None:
@@ -215,8 +220,17 @@ class Context:
 
     def numbers_of(self, kind: StructType) -> list[int]:
         """The numbers with which instances of a type begin, and of those derived from it."""
-        return sorted(block.identifier for block in self._blocks.values()
-                      if block.kind != "INTERFACE" and derives(block.type, kind))
+        return sorted(block.identifier for block in self._derived_from(kind))
+
+    def _derived_from(self, kind: StructType) -> Iterator[Pou]:
+        """The blocks and programs, as far as they are resolved, whose instances are of a type or of one derived from it."""
+        if self._indexed != len(self._blocks):
+            self._indexed = len(self._blocks)
+            self._descendants.clear()
+            for block in self._blocks.values():
+                for name in _names_of(block.type) if block.kind != "INTERFACE" and block.type is not None else ():
+                    self._descendants.setdefault(name, []).append(block)
+        return (block for block in self._descendants.get(kind.name, ()) if derives(block.type, kind))
 
     # --- attributes -------------------------------------------------------------------------------------------------
 
@@ -380,6 +394,17 @@ _LOOK_UP: dict[str, Callable[[Context, str, str, Pou], object]] = {
     "interface": lambda context, name, library, pou: context.interface(context.project.pous[library, name], pou.source, pou.tree),
 }
 """How each kind of look-up of `Dependencies` is repeated for the body of a POU."""
+
+
+def _names_of(kind: StructType) -> set[str]:
+    """The names of a type and of all that it is derived from."""
+    names, waiting = set[str](), [kind]
+    while waiting:
+        each = waiting.pop()
+        if each.name not in names:
+            names.add(each.name)
+            waiting += each.parents
+    return names
 
 
 def _set_targets(references: list[RefType], target: Type | None) -> None:

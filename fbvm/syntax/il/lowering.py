@@ -16,8 +16,8 @@ from fbvm.syntax.il.flow import is_formal, needs
 from fbvm.syntax.il.instructions import Instruction, read_instructions
 from fbvm.syntax.il.operators import OPERATORS, Operator
 from fbvm.syntax.ladder.instructions.pasted import ladder_lines
-from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
-from fbvm.syntax.st.builder import TooDeep
+from fbvm.syntax.st.automaton import NESTING_LIMIT, Automaton, ErrorRecovery
+from fbvm.syntax.st.builder import CHAIN_LIMIT, TooDeep
 from fbvm.syntax.st.declarations import SET_BY
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.statements import Statements
@@ -120,7 +120,9 @@ class ListLowering:
             self._rules[operator.kind](each, operator, needed)
             return
         self.open.append(_Open(each, self._current(each)))
-        self.result, self.operations, self.is_unused = None, 0, False
+        self.result, self.is_unused = None, False
+        if len(self.open) > NESTING_LIMIT:
+            raise InstructionError(f"brackets stand in each other more than {NESTING_LIMIT} deep", "store what is in between")
         if each.operands:
             self.result, self.is_unused = self._operand(each), True
 
@@ -194,7 +196,7 @@ class ListLowering:
             self.first = each.word.start if each.word else each.start
         value = self._operand(each)
         self.result = self._inverse(each, value) if operator.negated else value
-        self.operations, self.is_unused = 1, True
+        self.operations, self.is_unused = self.operations + 1 if self.open else 1, True
         self.is_wrong = False
 
     def _store(self, each: Instruction, operator: Operator, needed: bool) -> None:
@@ -228,6 +230,9 @@ class ListLowering:
         self.operations += 1
         if self.operations > LONGEST and not self.open:
             self._kept(each, True)
+        elif self.operations > CHAIN_LIMIT:
+            self.result, self.operations = None, 0
+            raise InstructionError(f"more than {CHAIN_LIMIT} operations stand in brackets", "store what is in between")
 
     def _close(self, each: Instruction, operator: Operator, needed: bool) -> None:
         if not self.open:

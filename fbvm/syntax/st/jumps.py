@@ -40,6 +40,7 @@ class Jumps:
         self.targets = targets
         self.labels = labels
         self.others = others
+        self._known = {fold(label) for label in labels.values()}
         self.flags: dict[str, str] = {}
         """Names of the variables that jumps set, by folded label."""
 
@@ -52,8 +53,7 @@ class Jumps:
 
     def astray(self) -> list[Statement]:
         """Jumps to labels that do not exist."""
-        known = {fold(label) for label in self.labels.values()}
-        return [jump for jump, label in self.targets.items() if fold(label) not in known]
+        return [jump for jump, label in self.targets.items() if fold(label) not in self._known]
 
     def section(self, body: Block) -> tree.VarSection:
         """The variables that jumps need."""
@@ -72,7 +72,7 @@ class Jumps:
             return Row(statement, label=fold(self.labels[statement]))
         if statement in self.targets:
             name = fold(self.targets[statement])
-            if statement in self.astray():
+            if name not in self._known:
                 return Row(tree.Empty(statement.start, statement.end))
             return Row(self._set(statement, name, True), (name,))
         leaving: list[str] = []
@@ -92,6 +92,7 @@ class Jumps:
         group: list[Statement] = []
         passing: list[str] = []
         gone: list[str] = []
+        last = {row.label: at for at, row in enumerate(rows)}
         for at, row in enumerate(rows):
             if not row.label:
                 group.append(row.statement)
@@ -102,10 +103,9 @@ class Jumps:
             if row.label in passing:
                 passing.remove(row.label)
                 made.append(self._set(row.statement, row.label, False))
-            ahead = {later.label for later in rows[at + 1:]}
-            out = [name for name in row.leaving if name not in ahead]
+            out = [name for name in row.leaving if last.get(name, -1) <= at]
             gone += [name for name in out if name not in gone]
-            stays = row.leaving if loop is None else [name for name in row.leaving if name in ahead]
+            stays = row.leaving if loop is None else [name for name in row.leaving if name not in out]
             passing += [name for name in stays if name not in passing]
             if loop is not None:
                 made += self._leaves(row.statement, out, loop)
@@ -119,23 +119,32 @@ class Jumps:
 
     def _with_loops(self, rows: list[Row]) -> list[Row]:
         """Rows with loops for jumps back: each from its label up to the last jump to that label.  Raises Tangled."""
+        jumps: dict[str, list[int]] = {}
+        for at, row in enumerate(rows):
+            for name in row.leaving:
+                jumps.setdefault(name, []).append(at)
+        made, last = list[Row](), -1
         for first, row in enumerate(rows):
-            last = max((at for at, later in enumerate(rows) if at > first and row.label in later.leaving), default=None) \
-                if row.label else None
-            if last is None:
+            if first <= last:
                 continue
-            inside = rows[first + 1:last + 1]
-            known = {each.label for each in inside if each.label}
-            if any(known & set(each.leaving) for each in (*rows[:first], *rows[last + 1:])) or \
-                    any(_leaves_loop(each.statement) for each in inside):
-                raise Tangled
-            body, leaving = self._sequence(inside, row.label)
-            start, end = inside[0].statement.start, inside[-1].statement.end
-            taken = self._set(inside[0].statement, row.label, False)
-            again = tree.Unary(start, end, "NOT", NameRef(start, end, self._name(row.label)))
-            loop = Row(tree.Repeat(start, end, (taken, *body), again), tuple(n for n in leaving if n != row.label))
-            return [*rows[:first + 1], loop, *self._with_loops(rows[last + 1:])]
-        return rows
+            made.append(row)
+            if row.label and jumps.get(row.label, [-1])[-1] > first:
+                last = jumps[row.label][-1]
+                inside = rows[first + 1:last + 1]
+                if any(not first < at <= last for each in inside if each.label for at in jumps.get(each.label, ())):
+                    raise Tangled
+                made.append(self._loop(row.label, inside))
+        return made
+
+    def _loop(self, label: str, inside: list[Row]) -> Row:
+        """The loop of a jump back to a label: what stands between both.  Raises Tangled."""
+        if any(_leaves_loop(each.statement) for each in inside):
+            raise Tangled
+        body, leaving = self._sequence(inside, label)
+        start, end = inside[0].statement.start, inside[-1].statement.end
+        taken = self._set(inside[0].statement, label, False)
+        again = tree.Unary(start, end, "NOT", NameRef(start, end, self._name(label)))
+        return Row(tree.Repeat(start, end, (taken, *body), again), tuple(n for n in leaving if n != label))
 
     def _guarded(self, group: list[Statement], passing: list[str]) -> list[Statement]:
         if not group or not passing:

@@ -17,7 +17,9 @@ from old_files import write_old_journal, write_old_trace
 from rows import each_of, first_quick
 
 from fbvm.base import files
+from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
+from fbvm.code.compiler import compile_sources
 from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.record.trace import format as trace_format
 
@@ -162,6 +164,34 @@ def test_the_time_of_an_import_grows_with_its_pous() -> None:
 
     took_s(10)
     assert took_s(8000) < 8 * took_s(2000)
+
+
+def of_interfaces(count: int) -> str:
+    """A program with interfaces that each have a block of their own."""
+    parts = "".join(f"INTERFACE I{at} METHOD M : INT END_METHOD END_INTERFACE\n"
+                    f"FUNCTION_BLOCK C{at} IMPLEMENTS I{at} METHOD PUBLIC M : INT M := 1; END_METHOD END_FUNCTION_BLOCK\n"
+                    for at in range(count))
+    held = "".join(f"c{at} : C{at}; i{at} : I{at}; " for at in range(count))
+    return f"{parts}PROGRAM Main VAR {held}r : INT; END_VAR {''.join(f'r := i{at}.M(); ' for at in range(count))}END_PROGRAM\n"
+
+
+def of_jumps(count: int) -> str:
+    """An instruction list with a label and a jump to the next one again and again."""
+    lines = "".join(f"l{at}: LD n\nGT 100\nJMPCN l{at + 1}\n" for at in range(count))
+    return f"PROGRAM Main VAR n : INT; END_VAR\n{lines}l{count}: LD 1\nST n\nEND_PROGRAM\n"
+
+
+@pytest.mark.slow
+@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500)])
+def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int) -> None:
+    def took_s(count: int) -> float:
+        source = Source("x.st", made(count))
+        began_s = time.process_time()
+        assert compile_sources([source], runnable=True).image is not None
+        return time.process_time() - began_s
+
+    took_s(10)
+    assert took_s(4 * few) < 8 * took_s(few)
 
 
 @needs_devices

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fbvm.base.diagnostics import Source
+from fbvm.code.compiler import compile_sources
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.automaton import NESTING_LIMIT
 from fbvm.syntax.st.builder import CHAIN_LIMIT
@@ -13,6 +14,7 @@ from fbvm.syntax.tree import Pou
 pytestmark = pytest.mark.slow
 
 MANY = 100_000
+MOST_LINES = 5_000
 
 
 def codes(statements: str, declarations: str = "") -> list[str]:
@@ -71,6 +73,26 @@ def test_the_deepest_nesting_allowed() -> None:
 def test_the_longest_chain_allowed() -> None:
     assert codes("a := " + "a + " * (CHAIN_LIMIT - 1) + "a;") == []
     assert codes("a := " + "a + " * CHAIN_LIMIT + "a; b := 1;") == ["S0106"]
+
+
+LISTS = {
+    "nested brackets": "ADD (\nLD n\n" * MOST_LINES + ")\n" * MOST_LINES,
+    "operations in brackets": "ADD (\nLD n\n" + "ADD 1\n" * MOST_LINES + ")\n",
+    "brackets in brackets": "ADD (\nLD n\n" + "ADD (\nLD n\n)\n" * MOST_LINES + ")\n",
+    "open brackets": "ADD (\n" * MOST_LINES,
+}
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_deep_instruction_lists_are_refused(name: str) -> None:
+    assert set(codes(f"LD n\n{LISTS[name]}ST n")) == {"S0114"}
+
+
+def test_the_deepest_instruction_lists_allowed() -> None:
+    assert codes("LD n\n" + "ADD (\nLD n\n" * NESTING_LIMIT + ")\n" * NESTING_LIMIT + "ST n") == []
+    for inside in ("ADD (\nLD n\n" + "ADD 1\n" * (CHAIN_LIMIT - 2) + ")\n", "ADD (\nLD n\n)\n" * MOST_LINES):
+        text = f"PROGRAM p VAR n : INT; END_VAR\nLD n\n{inside}ST n\nEND_PROGRAM\n"
+        assert compile_sources([Source("x", text)], runnable=True).image is not None
 
 
 WIDE = {
