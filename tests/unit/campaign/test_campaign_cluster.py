@@ -12,11 +12,12 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from fbvm.base.version import VERSION
 from fbvm.campaign.executors import LIMIT_NS, InThisProcess
 from fbvm.campaign.plan_file import Written, with_about
 from fbvm.campaign.planning import images_of, plan_of, program_project
 from fbvm.campaign.runs import Outcome
-from fbvm.campaign.work import Batch, Bench, Mismatch
+from fbvm.campaign.work import Batch, Bench, Mismatch, Unreachable
 from fbvm.cli.main import main
 from fbvm.cli.shared import status
 
@@ -97,6 +98,42 @@ def test_a_result_that_goes_with_its_worker_is_waited_for(monkeypatch: pytest.Mo
     executor._client = SimpleNamespace(submit=lambda *_, **__: next(made), loop=None)
     monkeypatch.setattr(cluster, "as_completed", Completed)
     assert list(executor.results([1, 2], LIMIT_NS)) == [(2, "result of b"), (1, "result of a")]
+
+
+@pytest.mark.parametrize(("state", "raised", "said"), [
+    ("error", None, ""), ("error", ValueError, "of the task"), ("cancelled", Unreachable, "tcp://h:1 has gone away")])
+def test_a_task_that_fails_ends_all_unless_it_ends_its_workers(
+        state: str, raised: type[Exception] | None, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fbvm.campaign import cluster
+
+    failing: Any = Ended("a", state)
+    killed: Any = cluster.KilledWorker
+    failing.exception = lambda: ValueError("of the task") if raised else killed("t", SimpleNamespace(address="w"), 3)
+    made = iter([failing, Ended("b", "finished")])
+    executor: Any = cluster.Cluster(SimpleNamespace(mark="m"), "tcp://h:1", 1)  # type: ignore[arg-type]
+    executor._client = SimpleNamespace(submit=lambda *_, **__: next(made), loop=None)
+    monkeypatch.setattr(cluster, "as_completed", Completed)
+    if raised is None:
+        found = [(task, type(each).__name__) for task, each in executor.results([1, 2], LIMIT_NS)]
+        assert found == [(1, "Crashed"), (2, "str")]
+    else:
+        with pytest.raises(raised, match=said):
+            list(executor.results([1, 2], LIMIT_NS))
+
+
+@pytest.mark.parametrize(("workers", "raised", "said"), [
+    ({}, Unreachable, "the scheduler a has no workers"), ({"w": VERSION}, None, ""),
+    ({"w": VERSION, "v": OSError("no module")}, Mismatch, "the worker v has no fbvm: no module"),
+    ({"w": "0.0"}, Mismatch, f"the worker w has fbvm 0.0, not {VERSION}")])  # fmt: skip
+def test_workers_are_asked_for_their_version(workers: dict[str, Any], raised: type[Exception] | None, said: str) -> None:
+    from fbvm.campaign import cluster
+
+    client = SimpleNamespace(run=lambda made, asked, on_error: workers if asked == cluster.ASK_VERSION else {})
+    if raised is None:
+        cluster._check(client, "a")
+    else:
+        with pytest.raises(raised, match=said):
+            cluster._check(client, "a")
 
 
 def test_a_scheduler_that_is_not_there_is_told_with_its_status(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
