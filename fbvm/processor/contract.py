@@ -7,10 +7,9 @@ is refused by a ContractError before anything runs."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from operator import itemgetter
 from struct import Struct
-from typing import Any
+from typing import Any, NamedTuple
 
 from fbvm.base.memory import FORMATS, STRUCTS
 from fbvm.base.types import ArrayType, EnumType, StructType, Type, fold, machine
@@ -29,8 +28,7 @@ class ContractError(TypeError):
     """A program and Python do not name the same fields, or the same values; the message says which of them."""
 
 
-@dataclass(frozen=True)
-class Leaf:
+class Leaf(NamedTuple):
     """One elementary value of a row: `offset` in bytes from the row's start, its machine type, and the type it has."""
 
     name: str
@@ -216,9 +214,14 @@ def _leaves(type_: Type, name: str, offset: int) -> Iterator[Leaf]:
         for field in type_.fields.values():
             yield from _leaves(field.type, f"{name}.{field.name}" if name else field.name, offset + field.offset)
     elif isinstance(type_, ArrayType) and len(type_.bounds) == 1 and not type_.packed:
-        low = type_.bounds[0][0]
-        for number in range(type_.count):
-            yield from _leaves(type_.element, f"{name}[{low + number}]", offset + number * type_.element.size)
+        low, element = type_.bounds[0][0], type_.element
+        if isinstance(element, StructType | ArrayType):
+            for number in range(type_.count):
+                yield from _leaves(element, f"{name}[{low + number}]", offset + number * element.size)
+        elif type_.count > 0:
+            form = _form(element, f"{name}[{low}]")
+            for number in range(type_.count):
+                yield Leaf(f"{name}[{low + number}]", offset + number * element.size, form, element)
     else:
         yield Leaf(name, offset, _form(type_, name), type_)
 
