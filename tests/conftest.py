@@ -49,7 +49,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 TOP = len(Path(__file__).parts)
 """Parts of the path of a test file that stands in no folder of the tests."""
-gc.set_threshold(100_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
+gc.set_threshold(400_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
 
 
 ALL_SLOW = re.compile(r"^pytestmark = \[?pytest\.mark\.slow\b", re.M)
