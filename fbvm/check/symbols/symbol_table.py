@@ -108,7 +108,6 @@ class SymbolTable:
         """VAR_ACCESS and VAR_CONFIG sections."""
         self.dependencies = Dependencies()
         """What the check of the present body looks up."""
-        self._loaded: set[str] = set()
         self._owners: dict[str, tuple[str, ...]] = {}
         self._found_pous: dict[str, dict[Seen, Pou | None]] = {}
         self._found_types: dict[str, dict[Seen, TypeEntry | None]] = {}
@@ -264,11 +263,9 @@ class SymbolTable:
         return self._collect_loaded(self.libraries.load_list(name, self.report))
 
     def _collect_loaded(self, loaded: list[tuple[Source, tree.SourceText]]) -> bool:
-        new = [(source, text) for source, text in loaded if source.name not in self._loaded]
-        for source, text in new:
-            self._loaded.add(source.name)
+        for source, text in loaded:
             self.collect(text, source)
-        return bool(new)
+        return bool(loaded)
 
     def pou(self, name: str, source: Source) -> Pou | None:
         """The POU of that name as seen from `source`."""

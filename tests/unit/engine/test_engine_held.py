@@ -45,6 +45,15 @@ def test_what_was_stored_or_loaded_is_not_read_again() -> None:
     assert looks((store("i16", 2, X), store("i16", 4, X)), 0) == 1
 
 
+def test_a_part_that_is_a_function_of_its_own_holds_values_itself() -> None:
+    code: Block = (store("i16", 2, X), store("i16", 4, X))
+    for _ in range(60):
+        code = (("if", ((("ne", "b", "i16", Y, const("i16", 9)), code),), ()),)
+    rig = execute(code, before={0: b"\7\0"})
+    assert [rig.slot("i16", offset) for offset in (2, 4)] == [7, 7]
+    assert "def o" in source_of(code) and looks(code, 0) == 1
+
+
 def test_what_one_place_alone_reads_is_not_held() -> None:
     assert "i16_at" not in source_of((store("i16", 2, X),))
 

@@ -288,6 +288,16 @@ def test_a_store_to_the_budget_counts(level: int) -> None:
 
 
 @pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("stored", [
+    ("store_flag", behind(const("ref", 1 << 40 | BUDGET << 8 | 3)), const("b", False)),
+    ("store_bit", ("abs", BUDGET, ()), 3, const("b", False)),
+])  # fmt: skip
+def test_a_store_of_a_bit_of_the_budget_counts(level: int, stored: Any) -> None:
+    trap = engine((("charge", 1, 1), stored, ("charge", 1, 2)), budget=9, level=level).run(0)
+    assert trap is not None and (trap.code, trap.site.line) == ("R0104", 2)
+
+
+@pytest.mark.parametrize("level", LEVELS)
 def test_instances_of_one_body_do_not_mix(level: int) -> None:
     inner = (("store", "i16", own(2), ("add", "i16", ("load", "i16", own(2)), ("load", "i16", own(0)))),)
     calls = tuple(("call", 1, at(64 * number)) for number in range(4))
