@@ -271,3 +271,13 @@ def test_tshark_reads_the_same_modbus(tmp_path: Path) -> None:
     assert [row[3] for row in replies] == ["", "", "3", *[""] * 8, "1"]
     interfaces = tshark(path, "-T", "fields", "-e", "frame.interface_name")
     assert {row[0] for row in interfaces} == {UNIT, "192.168.250.3"}
+
+
+def test_a_checksum_of_0_is_written_as_ffff_by_udp_alone() -> None:
+    """RFC 768: 0 says that there is none; RFC 9293 3.1 knows no such exception."""
+    sender = Peer(UNIT, 9600)
+    [frame] = frames.udp(sender, SERVER, 1, b"ab\0\0")
+    [frame] = frames.udp(sender, SERVER, 1, b"ab" + frame[40:42])
+    assert frame[40:42] == b"\xff\xff"
+    made = frames.tcp(sender, SERVER, 1, 7, 9, ACK, b"ab\0\0")
+    assert frames.tcp(sender, SERVER, 1, 7, 9, ACK, b"ab" + made[50:52])[50:52] == b"\0\0"
