@@ -5,6 +5,7 @@ changes of its inputs."""
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import accumulate
@@ -100,11 +101,7 @@ class BoundedSearch:
         self.hit(scans - 1)
         if self.solver.ask(self._alive[scans]) != UNSAT:
             return None
-        low, high = 0, scans
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (low, middle) if self.solver.ask(self._alive[middle]) == UNSAT else (middle, high)
-        return low
+        return bisect_left(range(1, scans), True, key=lambda end: self.solver.ask(self._alive[end]) == UNSAT)
 
     def _shortest(self, hits: list[Term]) -> Inputs | None:
         while True:

@@ -493,6 +493,20 @@ def test_names_of_another_plc_stand_beside() -> None:
     assert [row["units"][0]["plugged"] for row in update["plant"]["plcs"]] == [True, True]
 
 
+def test_who_looks_at_another_plc_looks_at_its_present() -> None:
+    page, other = Page(), Page()
+    page.bench.plcs["tank"] = other.live
+    page.done("hello", version=1)
+    page.done("look", plc="pump", names=["Main.Level"])
+    page.scan(30)
+    page.done("view", plc="pump", scan=9)
+    page.done("look", plc="pump", names=["Main.Level", "D10"])
+    assert page.update()["state"] == "past", "the same PLC is still seen as it was"
+    page.done("look", plc="tank", names=["Main.Level"])
+    update = page.update()
+    assert (update["state"], update["values"]) == ("run", {"Main.Level": "20"})
+
+
 def test_groups_are_kept_in_a_file_and_read_again_when_it_changes(page: Page, tmp_path: Path) -> None:
     file = tmp_path / "watch.toml"
     assert "no file" in page.ask("group", name="a", names=["D10"])["error"]

@@ -43,6 +43,7 @@ def test_a_run_that_only_the_solver_believes_in_meets_nothing() -> None:
     made = image("IF Go THEN\nr := r + 0.5;\nEND_IF;\nIF r > 2.1 AND r < 2.2 THEN\nn := 4;\nEND_IF;")
     found = cover(made, Limits(scans=20), free=("Main.Go",))
     assert words(made, found) == ([], ["text.st:6"]) and found.met == 5
+    assert list(found.missed.values()) == [0], "the solver believes in a run of one scan"
     assert all(run.spots for run in found.runs)
 
 
