@@ -124,6 +124,16 @@ def test_a_scan_behind_one_that_has_asked_has_its_time_from_its_own_beginning(as
     assert not asking.may_go_on(1_000_000, 1200)
 
 
+def test_a_scan_of_a_batch_begins_when_it_asks_for_the_first_time(asking: Asking) -> None:
+    asking.begin(0)
+    asking.dog.begin_batch()
+    for first_ms in (5000, 20_000):
+        assert asking.may_go_on(1_000_000, first_ms)
+        assert asking.may_go_on(900_000, first_ms + 999)
+        assert not asking.may_go_on(800_000, first_ms + 1000)
+        asking.dog.end()
+
+
 def test_where_breakpoints_are_set_nobody_is_ended(asking: Asking) -> None:
     asking.plc.breakpoints.condition("Main.n > 100")
     asking.begin(0)
