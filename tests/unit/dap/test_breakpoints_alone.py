@@ -7,8 +7,11 @@ from typing import Any
 
 from rows import each_of
 
+from fbvm.code.compiler import compile_text
 from fbvm.dap.breakpoints import BreakpointRequests, Wanted
 from fbvm.machine.breakpoints import Breakpoint
+from fbvm.machine.plc import Plc
+from fbvm.step.facts import ProgramFacts
 
 ROWS = {name: Breakpoint("line", name, "", "") for name in ("a", "b", "c", "gone")}
 
@@ -74,15 +77,34 @@ def test_numbers_count_on_and_are_kept_where_the_client_knows_them() -> None:
         assert made.numbers(plc, [ROWS[reached]]) == numbers
 
 
+CHARTS = """FUNCTION_BLOCK Gait
+VAR n : INT; END_VAR
+INITIAL_STEP Start: END_STEP
+STEP Walk: END_STEP
+TRANSITION FROM Start TO Walk := n > 1; END_TRANSITION
+TRANSITION FROM Walk TO Start := TRUE; END_TRANSITION
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR left, right : Gait; END_VAR
+INITIAL_STEP Idle: END_STEP
+STEP Walk: Both(N); END_STEP
+TRANSITION FROM Idle TO Walk := TRUE; END_TRANSITION
+TRANSITION FROM Walk TO Idle := TRUE; END_TRANSITION
+ACTION Both: left(); right(); END_ACTION
+END_PROGRAM"""
+
+
 @each_of(("name", "when", "row"), [
-    ("Main.Walk", "", ("condition", "Main.Walk.X", "")), ("main.walk", "n > 1", ("condition", "main.walk.X AND (n > 1)", "")),
+    ("Main.Walk", "", ("condition", "Main.Walk.X", "")), ("main.walk", "n > 1", ("condition", "Main.walk.X AND (n > 1)", "")),
     ("Main.Other", "", ("line", "Main.Other", "")), ("Walk", "n > 1", ("line", "Walk", "n > 1")),
-    ("Nobody.Walk", "", ("line", "Nobody.Walk", "")),
+    ("Nobody.Walk", "", ("line", "Nobody.Walk", "")), ("Main.Start", "", ("line", "Main.Start", "")),
+    ("Gait.Walk", "", ("condition", "Main.left.Walk.X", "")), ("GAIT.START", "", ("condition", "Main.left.START.X", "")),
+    ("main.RIGHT.Walk", "n", ("condition", "main.RIGHT.Walk.X AND (n)", "")), ("Gait.Idle", "", ("line", "Gait.Idle", "")),
 ])  # fmt: skip
-def test_a_step_of_a_chart_is_a_condition(name: str, when: str, row: tuple[str, str, str]) -> None:
-    debugged = Debugged()
-    chart = SimpleNamespace(steps=[("Start",), ("Walk",)], body=0)
-    facts = SimpleNamespace(charts=[chart], body_name=lambda body: "Main", symbols={})
+def test_a_step_of_a_chart_is_a_condition_of_the_first_instance(name: str, when: str, row: tuple[str, str, str]) -> None:
+    debugged, image = Debugged(), compile_text(CHARTS).image
+    assert image
+    facts = ProgramFacts.of(Plc(image))
     debugged.plc = lambda name: SimpleNamespace(facts=facts)  # type: ignore[method-assign]
     made = BreakpointRequests(debugged)._function("one", name, when, "3")  # type: ignore[arg-type]
     assert (made.kind, made.where, made.when, made.hits) == (*row, "3")
