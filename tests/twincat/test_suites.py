@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -199,9 +200,11 @@ def test_results_in_the_form_of_tcunit(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_each_test_of_the_example_is_one_of_pytest(pytester: pytest.Pytester) -> None:
-    pytester.makeini("[pytest]")
-    done = pytester.runpytest_inprocess(str(EXAMPLE), "-p", "no:cacheprovider", "--fbvm-pages", "0", "-p", "no:randomly")
+    settings = str(pytester.makeini("[pytest]"))
+    done = pytester.runpytest_inprocess(str(EXAMPLE), "-c", settings, "-p", "no:cacheprovider", "-p", "no:randomly")
     done.assert_outcomes(passed=3, failed=1, skipped=1)
+    [page] = re.findall("every scan, in a browser: (.*)", done.stdout.str())
+    assert "a motor that was stopped is started again" in (pytester.path / page).read_text(encoding="utf-8")
     done.stdout.fnmatch_lines(["*FB_Motor_Test.TcPOU:31: in PRG_TEST.fbMotors, test a motor that was stopped is started again, *",
                                ">   AssertEquals_UDINT(Expected := 3, Actual := fbMotor.nStarts, *",
                                "E   EXP: 3, ACT: 2, MSG: starts behind a stop"])  # fmt: skip
