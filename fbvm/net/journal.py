@@ -137,7 +137,7 @@ class Journal:
         self._remarks: list[str] = []
         self._line: dict[str, Any] = {}
         self._scans = 0
-        self._budget = 0
+        self._budget: int
         self._fingerprint: Fingerprint
 
     # Called by the PLC.

@@ -281,7 +281,7 @@ class _Drawing:
     def _parallel(self, parallel: Parallel, x: int, y: int, power: bool | None, wide: int) -> tuple[int, bool | None]:
         left, right, top = x + 1, x + wide - 1, y
         self.surface.across(x, left, y + 1, bool(power))
-        powers, begun, ended = [], y + 1, y + 1
+        powers = []
         for branch in parallel.branches:
             begun = y + 1
             height, out, ended, end = self._series(branch, left, y, power, right)
