@@ -6,7 +6,7 @@ left out.  Expressions nested deeper than Python's parser allows are moved into 
 from __future__ import annotations
 
 import re
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -69,7 +69,7 @@ def plus(text: str, number: int) -> str:
     return text if number == 0 else f"{text} + {number}" if number > 0 else f"{text} - {-number}"
 
 
-class Expressions:
+class Expressions(ABC):
     """Writes the expressions of one body.
 
     `constants` are objects by the names under which generated code finds them; `base` is the byte at which the body's only
