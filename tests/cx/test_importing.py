@@ -85,6 +85,9 @@ def test_damaged_and_foreign_files_get_a_sentence() -> None:
         assert [d.code for d in made.diagnostics] == ["X0401"], text[:40]
         assert words in made.diagnostics[0].message
         assert not made.files
+    other = import_project(whole.encode(), "line.cxt", plc="Elsewhere")
+    assert [each.render().splitlines()[0] for each in other.diagnostics] == [
+        "line.cxt:1:1: error X0401: the project has no PLC Elsewhere"]
     assert "Sysmac" in import_project(b"PK\x03\x04", "a.smc2").diagnostics[0].message
     assert "cut" in import_project(compress(SAMPLE.bytes())[:500], "a.cxp").diagnostics[0].message
 

@@ -318,3 +318,10 @@ def test_only_a_library_of_codesys_becomes_a_folder_of_a_library(tmp_path: Path,
         found = verb._imported(tmp_path / name, None, None, None, None)
     assert sorted(found.files) == made
     assert found.files.get("library.toml") in (None, "title = a")
+
+
+def test_verbs_on_programs_say_that_no_file_is_given() -> None:
+    verbs = ("ladder", "list", "prove", "sfc")
+    told = {verb: CliRunner().invoke(main, [verb]) for verb in verbs}
+    missing = "Error: Missing argument 'FILE...'."
+    assert {verb: (made.exit_code, missing in made.output) for verb, made in told.items()} == dict.fromkeys(verbs, (2, True))

@@ -222,6 +222,17 @@ def test_random_faults_are_seeded() -> None:
         assert before.from_scan < before.until_scan <= before.from_scan + 50
         assert before.until_scan < after.from_scan <= before.until_scan + 50
     assert {row.silent for row in rows} == {True, False}
+    begins = {random_faults(seed, 100, longest=3)[0].from_scan for seed in range(40)}
+    assert begins == {1, 2, 3}, "the first scan, too"
+
+
+def test_the_rows_of_the_faults_by_name() -> None:
+    assert dict(KINDS) == {
+        "slow": Fault(latency_ns=80 * MS), "unsteady": Fault(jitter_ns=60 * MS), "cut": Fault(segment_bytes=5, random_cut=True),
+        "dripping": Fault(segment_bytes=1, gap_ns=12 * MS), "joined": Fault(join_ns=150 * MS), "lossy": Fault(lose_percent=10),
+        "doubled": Fault(duplicate_percent=10), "silent": Fault(silent=True), "reset": Fault(reset=True),
+        "refused": Fault(error="ECONNREFUSED", reset=True), "unreachable": Fault(error="EHOSTUNREACH", silent=True),
+        "interrupted": Fault(reset_after_bytes=16)}  # fmt: skip
 
 
 @pytest.mark.parametrize(("row", "copies"), [(Fault(duplicate_percent=7), 2), (Fault(lose_percent=7), 0)])
