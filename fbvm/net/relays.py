@@ -351,7 +351,13 @@ class Relays(Wires):
         fault = find(self.faults, local, ANYBODY, self.scan_of(local, local), self.now_ns) if self.faults else NO_FAULT
         if fault.error or fault.silent:
             self._doors.is_over = False
+            self.carried[DOORS] = self._doors
         return fault
+
+    def shuts(self, local: Peer) -> bool:
+        """True if a fault refuses every caller of a unit's endpoint, as far as it can be heard."""
+        fault = self.door(local)
+        return bool(fault.error) and not fault.silent
 
     def behind(self, address: str) -> HostLink:
         """The link of the host's side for the unit at an address."""
@@ -392,8 +398,6 @@ class Relays(Wires):
             for channel in list(link.channels.values()):
                 if isinstance(channel, FaultyChannel):
                     channel.meet_faults(self, now_ns)
-        if not self._doors.is_over:
-            self.carried[DOORS] = self._doors
 
     def serve(self, now_ns: int) -> list[HostLink]:
         """Does all that is due, and fetches what the connections of the host have received; returns the links with events."""

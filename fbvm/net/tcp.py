@@ -39,7 +39,7 @@ class TcpNetwork(Switchboard):
                  faults: Iterable[Fault] = ()) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
         super().__init__(AddressMap(rows, bind, door), seed, faults)
-        self.waiting: WaitingCallers[socket.socket] = WaitingCallers(self, backlog)
+        self.waiting = WaitingCallers(self, backlog)
         """Callers for whom no socket of their unit is free."""
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
 
@@ -68,6 +68,11 @@ class TcpNetwork(Switchboard):
 
     def try_door(self, real: Peer, transport: str = TCP) -> None:
         try_to_listen(real, transport)
+
+    def _serve_relays(self, now_ns: int) -> list[HostLink]:
+        woken = super()._serve_relays(now_ns)
+        self.waiting.shut(self.relays.shuts)
+        return woken
 
     def close(self) -> None:
         """Closes all connections and sockets."""
@@ -130,6 +135,8 @@ class _Listener(HostChannel):
         self._request = request
 
     def open(self, now_ns: int) -> None:
+        if self.network.relays.shuts(self.local):
+            return
         if not any(listener.sock for listener in self._listeners()):
             self.sock = sock = self.link.network.waiting.take(self.local)
             if sock is None:
@@ -216,7 +223,7 @@ class _Listener(HostChannel):
             return
         fault = relays.door(self.local)
         holder = next((listener for listener in listeners if listener.sock), None)
-        if fault.error and holder and holder.sock and not fault.silent:
+        if holder and holder.sock and relays.shuts(self.local):
             self.network.watch(holder.sock, 0, holder)
             holder.sock.close()
             holder.sock = None

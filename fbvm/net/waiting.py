@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import Generic, Protocol, TypeVar
+import socket
+from collections.abc import Callable, Collection
 
 from fbvm.net.host_link import HostLink
 from fbvm.net.notices import NoticeKind
-from fbvm.net.switchboard import READ, HasFileno, Switchboard, Watcher
+from fbvm.net.switchboard import READ, Switchboard, Watcher
+from fbvm.net.udp import reset_on_close
 from fbvm.wire.link import Peer
 
 MAX_HELD = 128
@@ -16,31 +17,21 @@ PATIENCE_NS = 500_000_000
 """How long a caller has to wait until that is told."""
 
 
-class Closable(HasFileno, Protocol):
-    """A socket of the host, as far as it is used here."""
-
-    def close(self) -> None:
-        """Closes it."""
-
-
-Socket = TypeVar("Socket", bound=Closable)
-
-
-class WaitingCallers(Generic[Socket]):
+class WaitingCallers:
     """`backlog` says of which endpoints the host's port stays open while none of the unit's sockets waits, so that callers wait
     there: True for all."""
 
     def __init__(self, network: Switchboard, backlog: bool | Collection[Peer]) -> None:
         self._network, self._backlog = network, backlog
-        self._kept: dict[Peer, tuple[Socket, _Bell]] = {}
-        self.held: dict[Peer, list[tuple[Socket, Peer]]] = {}
+        self._kept: dict[Peer, tuple[socket.socket, _Bell]] = {}
+        self.held: dict[Peer, list[tuple[socket.socket, Peer]]] = {}
         """Callers of a unit's endpoint whom the host has accepted beside the one that took its last listener."""
 
     def keeps(self, endpoint: Peer) -> bool:
         """True if callers of a unit's endpoint wait until a socket of the unit does."""
         return self._backlog if isinstance(self._backlog, bool) else endpoint in self._backlog
 
-    def keep(self, link: HostLink, endpoint: Peer, sock: Socket) -> bool:
+    def keep(self, link: HostLink, endpoint: Peer, sock: socket.socket) -> bool:
         """Keeps the listening socket of a unit's endpoint until its next listener opens; False if that is not wanted."""
         if keeps := self.keeps(endpoint):
             bell = _Bell(self._network, link, endpoint, sock)
@@ -48,13 +39,22 @@ class WaitingCallers(Generic[Socket]):
             self._network.watch(sock, READ, bell)
         return keeps
 
-    def take(self, endpoint: Peer) -> Socket | None:
+    def take(self, endpoint: Peer) -> socket.socket | None:
         """The listening socket that was kept for a unit's endpoint, if there is one."""
         if endpoint not in self._kept:
             return None
         sock, bell = self._kept.pop(endpoint)
         bell.end()
         return sock
+
+    def shut(self, is_shut: Callable[[Peer], bool]) -> None:
+        """Turns away the callers of the endpoints that are shut, and closes their ports until their next listeners open."""
+        for endpoint in filter(is_shut, {**self._kept, **self.held}):
+            if sock := self.take(endpoint):
+                sock.close()
+            for conn, _ in self.held.pop(endpoint, []):
+                reset_on_close(conn)
+                conn.close()
 
     def close(self) -> None:
         """Closes all sockets."""
@@ -68,7 +68,7 @@ class WaitingCallers(Generic[Socket]):
 class _Bell(Watcher):
     """Tells of a caller that waits while all sockets of a unit's endpoint are in use, if nobody lets the caller in soon."""
 
-    def __init__(self, network: Switchboard, link: HostLink, endpoint: Peer, sock: HasFileno) -> None:
+    def __init__(self, network: Switchboard, link: HostLink, endpoint: Peer, sock: socket.socket) -> None:
         self._network, self.link, self._endpoint, self._sock = network, link, endpoint, sock
         self._over = False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import socket
 import threading
 import time
@@ -125,29 +126,32 @@ DOOR = Peer("192.168.250.21", 502)
 
 @contextmanager
 def tank(folder: Path, engine: str) -> Iterator[tuple[Callable[[Fault | None], None], int]]:
-    """A server that runs in a thread: a function that switches its fault, and its port."""
+    """A server that runs in a thread: a function that switches its fault and waits for ten scans, and its port."""
     (folder / "server.st").write_text(SERVER, encoding="utf-8")
     (folder / "fbvm.toml").write_text(TANK.format(engine=engine), encoding="utf-8")
     project = read_project(folder / "fbvm.toml")
     assert isinstance(project, Project)
     plant = Plant(project)
     assert not errors(plant.diagnostics)
-    plc, ends, asked, seen = plant.runs[0].plc, threading.Event(), threading.Semaphore(0), threading.Semaphore(0)
+    plc, ends, scans = plant.runs[0].plc, threading.Event(), queue.SimpleQueue[None]()
     wanted: list[Fault | None] = []
 
     def watch(_: object) -> None:
-        if asked.acquire(blocking=False):
+        scans.put(None)
+        if wanted:
+            while not scans.empty():
+                scans.get()
             row = wanted.pop()
             plant.network.faults[:] = [row] if row else []
-            seen.release()
         if ends.is_set():
             raise KeyboardInterrupt
 
     def switch(row: Fault | None) -> None:
         wanted.append(row)
-        asked.release()
-        assert seen.acquire(timeout=20)
-        time.sleep(0.05)
+        while wanted:
+            time.sleep(0.001)
+        for _ in range(10):
+            scans.get(timeout=20)
 
     plc.watchers.append(watch)
     thread = threading.Thread(target=run_all, args=(plant.runs,))

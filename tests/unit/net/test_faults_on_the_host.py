@@ -425,6 +425,38 @@ def test_a_door_is_really_shut(host: Host) -> None:
     assert data_of(host.until(Received)) == b"hello"
 
 
+def test_a_listener_that_opens_while_callers_are_refused_leaves_its_door_shut(host: Host) -> None:
+    host.network.faults.append(fault("refused", peer=DOOR))
+    host.scan()
+    host.scan(Listen(5, 502), Grant(5, 100))
+    with pytest.raises(ConnectionRefusedError):
+        host.call()
+    host.network.faults.clear()
+    host.scan()
+    host.call().sendall(b"hello")
+    assert data_of(host.until(Received)) == b"hello"
+
+
+def test_a_door_that_is_kept_for_callers_is_shut_too() -> None:
+    network = TcpNetwork({DOOR: ("127.0.0.1", 0)}, backlog=True)
+    link = network.attach(UNIT)
+    real = network.host_endpoint(DOOR)
+    try:
+        link.submit([Listen(5, 502)], 0)
+        link.submit([Close(5)], 0)
+        socket.create_connection((real.host, real.port), BOUND_S).close()
+        network.faults.append(fault("refused", peer=DOOR))
+        link.events(0)
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection((real.host, real.port), BOUND_S)
+        link.submit([Listen(5, 502)], 0)
+        network.faults.clear()
+        link.events(0)
+        socket.create_connection((real.host, real.port), BOUND_S).close()
+    finally:
+        network.close()
+
+
 def test_a_silent_door_leaves_callers_waiting(host: Host) -> None:
     host.scan(Listen(5, 502), Grant(5, 100))
     host.network.faults.append(fault("silent", peer=DOOR))
