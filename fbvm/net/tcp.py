@@ -39,7 +39,7 @@ class TcpNetwork(Switchboard):
                  faults: Iterable[Fault] = ()) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
         super().__init__(AddressMap(rows, bind, door), seed, faults)
-        self.waiting = WaitingCallers(self, backlog)
+        self.waiting: WaitingCallers[socket.socket] = WaitingCallers(self, backlog)
         """Callers for whom no socket of their unit is free."""
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
 
@@ -71,7 +71,10 @@ class TcpNetwork(Switchboard):
 
     def _serve_relays(self, now_ns: int) -> list[HostLink]:
         woken = super()._serve_relays(now_ns)
-        self.waiting.shut(self.relays.shuts)
+        for endpoint in filter(self.relays.shuts, self.waiting.endpoints):
+            for sock in self.waiting.forget(endpoint):
+                with suppress(OSError), sock:
+                    reset_on_close(sock)
         return woken
 
     def close(self) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import socket
-from collections.abc import Callable, Collection
+from collections.abc import Collection
+from typing import Generic, Protocol, TypeVar
 
 from fbvm.net.host_link import HostLink
 from fbvm.net.notices import NoticeKind
-from fbvm.net.switchboard import READ, Switchboard, Watcher
-from fbvm.net.udp import reset_on_close
+from fbvm.net.switchboard import READ, HasFileno, Switchboard, Watcher
 from fbvm.wire.link import Peer
 
 MAX_HELD = 128
@@ -17,21 +16,31 @@ PATIENCE_NS = 500_000_000
 """How long a caller has to wait until that is told."""
 
 
-class WaitingCallers:
+class Closable(HasFileno, Protocol):
+    """A socket of the host, as far as it is used here."""
+
+    def close(self) -> None:
+        """Closes it."""
+
+
+Socket = TypeVar("Socket", bound=Closable)
+
+
+class WaitingCallers(Generic[Socket]):
     """`backlog` says of which endpoints the host's port stays open while none of the unit's sockets waits, so that callers wait
     there: True for all."""
 
     def __init__(self, network: Switchboard, backlog: bool | Collection[Peer]) -> None:
         self._network, self._backlog = network, backlog
-        self._kept: dict[Peer, tuple[socket.socket, _Bell]] = {}
-        self.held: dict[Peer, list[tuple[socket.socket, Peer]]] = {}
+        self._kept: dict[Peer, tuple[Socket, _Bell]] = {}
+        self.held: dict[Peer, list[tuple[Socket, Peer]]] = {}
         """Callers of a unit's endpoint whom the host has accepted beside the one that took its last listener."""
 
     def keeps(self, endpoint: Peer) -> bool:
         """True if callers of a unit's endpoint wait until a socket of the unit does."""
         return self._backlog if isinstance(self._backlog, bool) else endpoint in self._backlog
 
-    def keep(self, link: HostLink, endpoint: Peer, sock: socket.socket) -> bool:
+    def keep(self, link: HostLink, endpoint: Peer, sock: Socket) -> bool:
         """Keeps the listening socket of a unit's endpoint until its next listener opens; False if that is not wanted."""
         if keeps := self.keeps(endpoint):
             bell = _Bell(self._network, link, endpoint, sock)
@@ -39,7 +48,7 @@ class WaitingCallers:
             self._network.watch(sock, READ, bell)
         return keeps
 
-    def take(self, endpoint: Peer) -> socket.socket | None:
+    def take(self, endpoint: Peer) -> Socket | None:
         """The listening socket that was kept for a unit's endpoint, if there is one."""
         if endpoint not in self._kept:
             return None
@@ -47,14 +56,15 @@ class WaitingCallers:
         bell.end()
         return sock
 
-    def shut(self, is_shut: Callable[[Peer], bool]) -> None:
-        """Turns away the callers of the endpoints that are shut, and closes their ports until their next listeners open."""
-        for endpoint in filter(is_shut, {**self._kept, **self.held}):
-            if sock := self.take(endpoint):
-                sock.close()
-            for conn, _ in self.held.pop(endpoint, []):
-                reset_on_close(conn)
-                conn.close()
+    @property
+    def endpoints(self) -> set[Peer]:
+        """The units' endpoints whose ports are kept, or whose callers are held."""
+        return {*self._kept, *self.held}
+
+    def forget(self, endpoint: Peer) -> list[Socket]:
+        """The callers that are held for a unit's endpoint, and its listening socket, which nothing keeps any more."""
+        sockets = [conn for conn, _ in self.held.pop(endpoint, [])]
+        return [*sockets, sock] if (sock := self.take(endpoint)) else sockets
 
     def close(self) -> None:
         """Closes all sockets."""
@@ -68,7 +78,7 @@ class WaitingCallers:
 class _Bell(Watcher):
     """Tells of a caller that waits while all sockets of a unit's endpoint are in use, if nobody lets the caller in soon."""
 
-    def __init__(self, network: Switchboard, link: HostLink, endpoint: Peer, sock: socket.socket) -> None:
+    def __init__(self, network: Switchboard, link: HostLink, endpoint: Peer, sock: HasFileno) -> None:
         self._network, self.link, self._endpoint, self._sock = network, link, endpoint, sock
         self._over = False
 
