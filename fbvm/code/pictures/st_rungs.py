@@ -132,9 +132,15 @@ class _Reader:
     # --- statements -------------------------------------------------------------------------------------------------
 
     def _assignment(self, node: tree.Assign) -> Point:
+        self._refuse_hidden(node)
         if node.op not in _COILS or any(self.facts.types.get(part) != BOOL for part in (*node.targets, node.value)):
             raise NoRung("an assignment that is not of BOOL")
         return Point(self.condition(node.value), [self._coil(_COILS[node.op], target, node.value) for target in node.targets])
+
+    def _refuse_hidden(self, node: tree.Assign) -> None:
+        """Raises NoRung, with the reason, for an assignment to a variable that is not written."""
+        for target in node.targets:
+            self.written(target)
 
     def _coil(self, mark: str, target: tree.Expr, power: tree.Expr) -> Coil:
         coil = Coil(-1, mark, (self.written(target),))
@@ -146,6 +152,8 @@ class _Reader:
         (condition, body), *more = node.branches
         outs: list[Coil | Box | Point] = []
         for inner in body:
+            if isinstance(inner, tree.Assign):
+                self._refuse_hidden(inner)
             if not isinstance(inner, tree.Assign) or inner.op != ":=" or not isinstance(inner.value, tree.Literal) or \
                     self.facts.types.get(inner.value) != BOOL:
                 raise NoRung("an IF that does more than setting and resetting")

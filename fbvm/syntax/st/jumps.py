@@ -1,12 +1,12 @@
 """JMP and labels of Structured Text as conditions, and as a loop for a jump back.
 
-A jump sets a variable.  Statements that the jump passes over are executed only while the variable is FALSE, and loops that
-the jump leads out of are left.  The label sets the variable back.
+A jump stores the number of its label in a variable.  Statements that the jump passes over are executed only while the variable
+is 0, and loops that the jump leads out of are left.  The label sets its number back to 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 from fbvm.base.types import fold
@@ -24,25 +24,26 @@ class Tangled(Exception):
 
 @dataclass(frozen=True)
 class Row:
-    """A statement of a list with the jumps that leave it, or a label."""
+    """A statement of a list with the jumps that leave it, or a label; `has_exit`: an EXIT or CONTINUE of a loop around."""
 
     statement: Statement
     leaving: tuple[str, ...] = ()
     label: str = ""
+    has_exit: bool = False
 
 
 class Jumps:
     """The jumps of one body; `targets` and `labels` say which statements are jumps and labels, and of what name.
 
-    `others` is how many bodies of the POU have jumps besides, which have their own variables for labels of the same name."""
+    `others` is how many bodies of the POU have jumps besides, each with a variable of its own."""
 
     def __init__(self, targets: Mapping[Statement, str], labels: Mapping[Statement, str], others: int = 0) -> None:
         self.targets = targets
         self.labels = labels
-        self.others = others
         self._known = {fold(label) for label in labels.values()}
-        self.flags: dict[str, str] = {}
-        """Names of the variables that jumps set, by folded label."""
+        self._numbers: dict[str, int] = {}
+        """Numbers of the labels that are jumped to, by folded label."""
+        self._name = f"$JMP{others or ''}"
 
     def body(self, body: Block) -> Block:
         """The same body without jumps.  Raises Tangled if there is no such body."""
@@ -55,12 +56,16 @@ class Jumps:
         """Jumps to labels that do not exist."""
         return [jump for jump, label in self.targets.items() if fold(label) not in self._known]
 
+    @property
+    def is_needed(self) -> bool:
+        """True if a jump needs the variable."""
+        return bool(self._numbers)
+
     def section(self, body: Block) -> tree.VarSection:
-        """The variables that jumps need."""
+        """The variable that jumps need."""
         start, end = body[0].start, body[-1].end
-        variables = [tree.VarDecl(start, end, (tree.Name(start, end, name),), None, tree.NamedType(start, end, "BOOL"), None)
-                     for name in self.flags.values()]
-        return tree.VarSection(start, end, "VAR_TEMP", (), tuple(variables), True)
+        name, kind = tree.Name(start, end, self._name), tree.NamedType(start, end, "DINT")
+        return tree.VarSection(start, end, "VAR_TEMP", (), (tree.VarDecl(start, end, (name,), None, kind, None),), True)
 
     def _block(self, block: Block, loop: str | None) -> tuple[Block, tuple[str, ...]]:
         """The statements of a list without jumps, and the labels of jumps that leave the list; `loop` is None if the list is not
@@ -74,7 +79,7 @@ class Jumps:
             name = fold(self.targets[statement])
             if name not in self._known:
                 return Row(tree.Empty(statement.start, statement.end))
-            return Row(self._set(statement, name, True), (name,))
+            return Row(self._store(statement, self._number(name)), (name,))
         leaving: list[str] = []
 
         def inner(block: Block) -> Block:
@@ -82,7 +87,7 @@ class Jumps:
             leaving.extend(name for name in more if name not in leaving)
             return made
 
-        return Row(_rebuilt(statement, inner), tuple(leaving))
+        return Row(_rebuilt(statement, inner), tuple(leaving), has_exit=_has_exit(statement))
 
     def _sequence(self, rows: list[Row], loop: str | None) -> tuple[Block, tuple[str, ...]]:
         """Put the statements behind a jump under the condition that it has not been taken.  In the body of a loop, `loop` is the
@@ -90,32 +95,38 @@ class Jumps:
         rows = self._with_loops(rows)
         made: list[Statement] = []
         group: list[Statement] = []
-        passing: list[str] = []
-        gone: list[str] = []
+        passing: dict[str, None] = {}
+        gone: dict[str, None] = {}
         last = {row.label: at for at, row in enumerate(rows)}
         for at, row in enumerate(rows):
             if not row.label:
                 group.append(row.statement)
                 if not row.leaving:
                     continue
-            made += self._guarded(group, passing)
+            made += self._guarded(group) if passing else group
             group = []
             if row.label in passing:
-                passing.remove(row.label)
-                made.append(self._set(row.statement, row.label, False))
-            out = [name for name in row.leaving if last.get(name, -1) <= at]
-            gone += [name for name in out if name not in gone]
-            stays = row.leaving if loop is None else [name for name in row.leaving if name not in out]
-            passing += [name for name in stays if name not in passing]
+                del passing[row.label]
+                made.append(self._arrived(row.statement, row.label, passing))
+            out = dict.fromkeys(name for name in row.leaving if last.get(name, -1) <= at)
+            gone |= out
+            passing |= dict.fromkeys(row.leaving if loop is None else [name for name in row.leaving if name not in out])
             if loop is not None:
                 made += self._leaves(row.statement, out, loop)
-        return (*made, *self._guarded(group, passing)), tuple(gone)
+        return (*made, *(self._guarded(group) if passing else group)), tuple(gone)
 
-    def _leaves(self, at: Statement, names: list[str], loop: str) -> Iterator[Statement]:
+    def _arrived(self, at: Statement, label: str, passing: Collection[str]) -> Statement:
+        """The end of jumps to a label, which may stand among what jumps to other labels pass over."""
+        if not passing:
+            return self._store(at, 0)
+        stored = self._store(tree.Empty(at.start, at.start), 0)
+        return tree.If(at.start, at.end, ((self._compared(at, "=", self._number(label)), (stored,)),), None)
+
+    def _leaves(self, at: Statement, names: Collection[str], loop: str) -> Iterator[Statement]:
         """Leave the loop if a jump to a label behind it was taken; continue it for its own label."""
         for name in names:
             leave = (tree.Continue if name == loop else tree.Exit)(at.start, at.end)
-            yield tree.If(at.start, at.end, ((self._flag(at, name), (leave,)),), None)
+            yield tree.If(at.start, at.end, ((self._compared(at, "=", self._number(name)), (leave,)),), None)
 
     def _with_loops(self, rows: list[Row]) -> list[Row]:
         """Rows with loops for jumps back: each from its label up to the last jump to that label.  Raises Tangled."""
@@ -138,42 +149,42 @@ class Jumps:
 
     def _loop(self, label: str, inside: list[Row]) -> Row:
         """The loop of a jump back to a label: what stands between both.  Raises Tangled."""
-        if any(_leaves_loop(each.statement) for each in inside):
+        if any(each.has_exit for each in inside):
             raise Tangled
         body, leaving = self._sequence(inside, label)
-        start, end = inside[0].statement.start, inside[-1].statement.end
-        taken = self._set(inside[0].statement, label, False)
-        again = tree.Unary(start, end, "NOT", NameRef(start, end, self._name(label)))
-        return Row(tree.Repeat(start, end, (taken, *body), again), tuple(n for n in leaving if n != label))
+        first, whole = inside[0].statement, tree.Empty(inside[0].statement.start, inside[-1].statement.end)
+        is_over = self._compared(whole, "<>", self._number(label))
+        return Row(tree.Repeat(whole.start, whole.end, (self._store(first, 0), *body), is_over),
+                   tuple(name for name in leaving if name != label))  # fmt: skip
 
-    def _guarded(self, group: list[Statement], passing: list[str]) -> list[Statement]:
-        if not group or not passing:
+    def _guarded(self, group: list[Statement]) -> list[Statement]:
+        if not group:
             return group
-        start, end = group[0].start, group[-1].end
-        over: Expr = NameRef(start, end, self._name(passing[0]))
-        for name in passing[1:]:
-            over = tree.Binary(start, end, "OR", over, NameRef(start, end, self._name(name)), start)
-        return [tree.If(start, end, ((tree.Unary(start, end, "NOT", over), tuple(group)),), None)]
+        whole = tree.Empty(group[0].start, group[-1].end)
+        return [tree.If(whole.start, whole.end, ((self._compared(whole, "=", 0), tuple(group)),), None)]
 
-    def _set(self, at: Statement, label: str, value: bool) -> Statement:
-        truth = tree.Literal(at.start, at.end, "bool", value, None, "TRUE" if value else "FALSE")
-        return tree.Assign(at.start, at.end, (self._flag(at, label),), ":=", truth)
+    def _store(self, at: Statement, number: int) -> Statement:
+        return tree.Assign(at.start, at.end, (NameRef(at.start, at.end, self._name),), ":=", _literal(at, number))
 
-    def _flag(self, at: Statement, label: str) -> NameRef:
-        return NameRef(at.start, at.end, self._name(label))
+    def _compared(self, at: Statement, sign: str, number: int) -> Expr:
+        return tree.Binary(at.start, at.end, sign, NameRef(at.start, at.end, self._name), _literal(at, number), at.start)
 
-    def _name(self, label: str) -> str:
-        return self.flags.setdefault(label, f"$JMP{self.others or ''} {label}")
+    def _number(self, label: str) -> int:
+        return self._numbers.setdefault(label, len(self._numbers) + 1)
 
 
-def _leaves_loop(statement: Statement) -> bool:
+def _literal(at: Statement, number: int) -> Expr:
+    return tree.Literal(at.start, at.end, "int", number, None, str(number))
+
+
+def _has_exit(statement: Statement) -> bool:
     """Whether a statement contains an EXIT or CONTINUE of a loop around the statement."""
     if isinstance(statement, tree.Exit | tree.Continue):
         return True
     found: list[bool] = []
 
     def look(block: Block) -> Block:
-        found.extend(_leaves_loop(each) for each in block)
+        found.extend(_has_exit(each) for each in block)
         return block
 
     if not isinstance(statement, LOOPS):

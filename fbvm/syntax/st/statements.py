@@ -109,7 +109,7 @@ class Statements(Expressions):
         except Tangled:
             made = body
         else:
-            self.jump_sections += [jumps.section(body)] if jumps.flags else []
+            self.jump_sections += [jumps.section(body)] if jumps.is_needed else []
         for known, read in ((self.targets, targets), (self.labels, labels)):
             for each in read:
                 del known[each]

@@ -182,8 +182,14 @@ def of_jumps(count: int) -> str:
     return f"PROGRAM Main VAR n : INT; END_VAR\n{lines}l{count}: LD 1\nST n\nEND_PROGRAM\n"
 
 
+def of_far_jumps(count: int) -> str:
+    """A program all of whose jumps stand in front of all of their labels."""
+    jumps = "".join(f"IF n = {at} THEN JMP l{at}; END_IF\n" for at in range(count))
+    return f"PROGRAM Main VAR n : INT; END_VAR\n{jumps}{''.join(f'l{at}: n := {at};' for at in range(count))}\nEND_PROGRAM\n"
+
+
 @pytest.mark.slow
-@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500)])
+@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500), (of_far_jumps, 100)])
 def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int) -> None:
     def took_s(count: int) -> float:
         text = made(count)
