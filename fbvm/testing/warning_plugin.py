@@ -7,6 +7,7 @@ The ini options `fbvm_no_warn` and `fbvm_warnings_as_errors` say the same for ev
 
 from __future__ import annotations
 
+import re
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -69,8 +70,13 @@ class WarningPlugin:
         """Every warning once."""
         if self._shown:
             terminalreporter.section("warnings of PLC code")
-            for text in sorted(self._shown):
+            for text in sorted(self._shown, key=_by_place):
                 terminalreporter.line(text)
+
+
+def _by_place(text: str) -> str:
+    """The key that sorts texts as they read: line 9 before line 10."""
+    return re.sub("[0-9]+", lambda number: number[0].zfill(9), text)
 
 
 def warning_plugin(config: pytest.Config) -> WarningPlugin:

@@ -68,6 +68,14 @@ def test_warnings_of_all_workers_are_told_once_in_order() -> None:
     assert reporter.said == ["== warnings of PLC code", "a", "b"]
 
 
+def test_warnings_of_a_file_stand_in_the_order_of_its_lines() -> None:
+    plugin, reporter = WarningPlugin(config()), Reporter()
+    rows = ["a.st:10:1: w", "a.st:3:108: w", "a.st:3:49: w", "a.st:9:1: w"]
+    plugin.pytest_testnodedown(SimpleNamespace(workeroutput={warning_plugin.NAME: rows}), None)
+    plugin.pytest_terminal_summary(cast(Any, reporter))
+    assert reporter.said[1:] == ["a.st:3:49: w", "a.st:3:108: w", "a.st:9:1: w", "a.st:10:1: w"]
+
+
 @each_of("result, cell", [
     (None, '<td class="none">-'), (Result(True, 3, 3), '<td class="good">✓ 3/3'), (Result(False, 3, 3), '<td class="good">✗ 3/3'),
     (Result(True, 2, 3, [("t", "w")]), '<td class="bad"><a href="#Ann-4">✓ 2/3</a>'),
