@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import partial
 
 from fbvm.base.digits import whole_number
@@ -120,7 +121,7 @@ class Commands:
         if command is None and re.search(r":=|(?<![<>])=", line):
             command, rest = COMMANDS_BY_WORD["write"], line
         if command is None:
-            raise CommandError(f"{name!r} is no command; `help` lists them")
+            raise CommandError(f"{name!r} is no command{_near(name) or '; `help` lists them'}")
         if command.moves:
             self._last = line or self._last
             self.session.mark()
@@ -330,7 +331,7 @@ class Commands:
 
     def _help(self, rest: str) -> Iterator[str]:
         if rest and rest not in COMMANDS_BY_WORD:
-            raise CommandError(f"{rest!r} is no command")
+            raise CommandError(f"{rest!r} is no command{_near(rest)}")
         for command in COMMANDS:
             if not rest or COMMANDS_BY_WORD[rest] is command:
                 short = f"{command.short:<2}" if command.short else "  "
@@ -378,6 +379,12 @@ def completed(session: Stepping, takes: str, word: str, words: Mapping[str, obje
     else:
         names = [field.name for field in session.facts.image.symbols.values()]
     return [f"{front}{dot}{name}" for name in names if fold(name).startswith(fold(last))]
+
+
+def _near(word: str) -> str:
+    """`; did you mean break?` for a misspelt command, "" if none is spelt alike."""
+    near = get_close_matches(word.lower(), [command.name for command in COMMANDS], 1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def _count(text: str, least: int = 1) -> int:

@@ -19,7 +19,7 @@ from fbvm.run.plc_names import PlcNames
 from fbvm.run.project import FILE, Project, read_project
 from fbvm.run.varied import VariedRun
 from fbvm.syntax.text import read
-from fbvm.testing.rig import DEFAULT_LIMIT, Rig, to_ns
+from fbvm.testing.rig import DEFAULT_LIMIT, Rig, not_found, to_ns
 from fbvm.testing.subject import Subject, SubjectError
 from fbvm.watch.conditions import parse_condition
 from fbvm.watch.values import show_time
@@ -132,7 +132,7 @@ def project_near(folders: Sequence[Path], named: str) -> Path:
             path /= FILE
         if path.is_file():
             return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
-    raise FileNotFoundError(f"{named} is neither in {' nor in '.join(map(str, folders))}")
+    raise not_found(named, folders)
 
 
 def _wrong(diagnostics: Sequence[Diagnostic]) -> SubjectError:

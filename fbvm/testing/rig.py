@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -183,7 +184,8 @@ class Rig:
             try:
                 return find(symbols, areas, name)
             except UnknownPlace as outer:
-                raise UnknownPlace(self.subject.plain(str(inner if self.subject.prefix else outer))) from None
+                whole = not self.subject.prefix or fold(name.partition(".")[0].strip()) in symbols
+                raise UnknownPlace(self.subject.plain(str(outer if whole else inner))) from None
 
     def __getattr__(self, name: str) -> Any:
         __tracebackhide__ = True
@@ -393,7 +395,16 @@ def _file(path: str, folders: Sequence[Path]) -> Path:
     for folder in folders:
         if (folder / path).exists():
             return folder / path
-    raise FileNotFoundError(f"{path} is neither in {' nor in '.join(str(folder) for folder in folders)}")
+    raise not_found(path, folders)
+
+
+def not_found(named: str, folders: Sequence[Path]) -> FileNotFoundError:
+    """The error about a file that is in none of the folders; it names a file there that is called alike."""
+    where = " nor in ".join(str(folder) for folder in folders)
+    beside = [(folder / named).parent for folder in folders]
+    there = {each.name for folder in beside if folder.is_dir() for each in folder.iterdir() if each.suffix == Path(named).suffix}
+    hint = "".join(f"; did you mean {Path(named).with_name(each)}?" for each in get_close_matches(Path(named).name, there, 1))
+    return FileNotFoundError(f"{named} is {'not' if len(folders) == 1 else 'neither'} in {where}{hint}")
 
 
 def to_ns(time: str | int) -> int:

@@ -9,6 +9,7 @@ import re
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 
 from fbvm.base.areas import FLAG_AREAS, PORTABLE_AREAS, Address, AddressError, Area, parse_address
 from fbvm.base.digits import whole_number
@@ -27,11 +28,18 @@ from fbvm.base.types import (
     Type,
     base,
     characters,
+    fold,
 )
 
 
 class UnknownPlace(LookupError):
-    """The text names nothing in this PLC; the message says which part and what would."""
+    """The text names nothing in this PLC; the message says which part and what would.
+
+    `unheard` is the name that it begins with, if nothing in the whole program is called so."""
+
+    def __init__(self, message: str, unheard: str = "") -> None:
+        super().__init__(message)
+        self.unheard = unheard
 
 
 @dataclass(frozen=True)
@@ -103,7 +111,7 @@ def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> 
     try:
         address = parse_address(text, areas)
     except AddressError as error:
-        raise UnknownPlace(_unknown(symbols, text, first[1] if first else "", str(error))) from None
+        raise _unknown(symbols, text, first[1] if first else "", str(error)) from None
     return _at(areas, address)
 
 
@@ -115,20 +123,30 @@ def find_place(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: st
     return found
 
 
-def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -> str:
-    """The message for a name that is neither a symbol nor an address."""
+def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -> UnknownPlace:
+    """The error about a name that is neither a symbol nor an address."""
     if meant := _meant(text):
-        return f"there is no {text.strip()}; did you mean {meant}?"
+        return UnknownPlace(f"there is no {text.strip()}; did you mean {meant}?")
     if not first or re.fullmatch(r"\s*(%.*|[A-Za-z]{1,3}\s*\d+(\.\d+)?|\d+(\.\d+)?|E\w\s*[_:]\s*\d+.*)", text):
-        return reason
+        return UnknownPlace(reason)
     if holder := _holder(symbols, first):
-        return f"there is no {first}; did you mean {holder}.{text.strip()}?"
+        return UnknownPlace(f"there is no {first}; did you mean {holder}.{text.strip()}?")
     listed = sorted(field.name for field in symbols.values() if field.space.upper() == first.upper())
     if listed:
-        return f"{text.strip()}: the list has no such variable; it has {', '.join(listed[:8])}"
+        return UnknownPlace(f"{text.strip()}: the list has no such variable; it has {', '.join(listed[:8])}")
     programs_first = sorted(symbols.values(), key=lambda field: (not isinstance(field.type, StructType), field.name))
-    known = ", ".join(field.name for field in programs_first[:8])
-    return f"there is no {first}" + (f"; known here: {known}" if known else " (the program declares nothing)")
+    known = _listed(first, [field.name for field in programs_first], 8)
+    said = f"; known here: {known}" if known else " (the program declares nothing)"
+    return UnknownPlace(f"there is no {first}{said}", first)
+
+
+def _listed(wanted: str, names: list[str], most: int) -> str:
+    """Names that there are, for a message; where they are too many, those like the wanted one come first."""
+    if len(names) <= most:
+        return ", ".join(names)
+    shown = {fold(name): name for name in names}
+    near = [shown[name] for name in get_close_matches(fold(wanted), shown, 2)]
+    return ", ".join([*near, *(name for name in names if name not in near)][:most]) + ", ..."
 
 
 def _holder(symbols: Mapping[str, Field], name: str) -> str:
@@ -297,7 +315,7 @@ def member(place: Place, name: str) -> Place:
     if field is None:
         if not isinstance(place.type, StructType):
             raise UnknownPlace(f"{place.name} is {place.type.name} and has no member {name}")
-        known = ", ".join(f.name for f in list(place.type.fields.values())[:12])
+        known = _listed(name, [f.name for f in place.type.fields.values()], 12)
         raise UnknownPlace(f"{place.name} has no {name}; it has {known or 'no members'}")
     return _of(place, field, f"{place.name}.{field.name}", field.offset)
 

@@ -6,6 +6,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 
 from fbvm.base.types import ArrayType, Field, StructType, fold
 from fbvm.watch.paths import Place, Span, UnknownPlace, element
@@ -32,7 +33,20 @@ class Scope:
             return find_in(self.local, {}, text)
         if self.instance is not None and (rest := self.own(text)):
             return self._find(f"{self.instance.name}.{rest}")
-        return self._find(text)
+        try:
+            return self._find(text)
+        except UnknownPlace as error:
+            if near := self._near(error.unheard):
+                raise UnknownPlace(f"there is no {error.unheard}; did you mean {near}?") from None
+            raise
+
+    def _near(self, name: str) -> str:
+        """The variable of the body that is called like an unknown name, "" if none is."""
+        kind = self.instance.type if self.instance is not None else None
+        fields = [*self.local.values(), *(kind.fields.values() if isinstance(kind, StructType) else ())]
+        shown = {fold(field.name): field.name for field in fields}
+        near = get_close_matches(fold(name), shown, 1)
+        return shown[near[0]] if near else ""
 
     def own(self, text: str) -> str:
         """`text` without THIS before it, if it begins with a variable of the instance, else ""."""

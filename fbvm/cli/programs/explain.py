@@ -23,8 +23,9 @@ def _unknown(error: UnknownCode) -> str:
     if _CODE.fullmatch(error.code.strip()):
         return str(error)
     instruction_names = [found.mnemonic for name in meant(spelling(error.code)) if (found := instructions.find(name))]
+    pages = get_close_matches(error.code.strip().lower(), ("dialects", "fault"), 1, 0.8)
     others = get_close_matches(error.code.strip().upper(), [*block_pages.names(), *SIGNATURES], 2, 0.8)
-    names = " or ".join(dict.fromkeys([*others, *instruction_names]))
+    names = " or ".join(pages or dict.fromkeys([*others, *instruction_names]))
     rows = "".join(f"\n  {row.code}  {row.title}" for row in error.near)
     said = f"there is no diagnostic, instruction, block or function {error.code}"
     return said + (f"; did you mean {names}?" if names else "") + (f"\nDiagnostics near it are{rows}" if rows else "")

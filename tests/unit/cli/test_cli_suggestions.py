@@ -31,6 +31,12 @@ def test_a_misspelt_verb(typed: str, said: str) -> None:
     assert refused(typed) == said
 
 
+@each_of("typed, meant", [("dialect", "dialects"), ("fautl", "fault"), ("TONN", "TON or TKON")])
+def test_a_misspelt_page(typed: str, meant: str) -> None:
+    said = CliRunner().invoke(main, ["explain", typed]).stderr
+    assert f"there is no diagnostic, instruction, block or function {typed}; did you mean {meant}?" in said
+
+
 @each_of("arguments, said", [
     (["run", "pmp.st"], "Path 'pmp.st' does not exist; did you mean pump.st?"),
     (["check", "pump"], "Path 'pump' does not exist; did you mean pump.st?"),

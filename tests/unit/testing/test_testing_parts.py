@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,10 +17,11 @@ from fbvm.record.trace.recorder import Recorder
 from fbvm.testing import golden, strategies
 from fbvm.testing.plant_rig import PlantRig, project_near
 from fbvm.testing.recorded import Recorded
-from fbvm.testing.rig import Rig
+from fbvm.testing.rig import Rig, not_found
 from fbvm.testing.subject import SubjectError, subject
 from fbvm.testing.suites.results import Failure, SuiteTestResult
 from fbvm.testing.suites.xunit import write_xunit
+from fbvm.watch.paths import UnknownPlace
 
 MS = 1_000_000
 
@@ -236,6 +238,32 @@ def test_the_nearest_project_is_taken(project: Path) -> None:
     assert project_near([project], ".").resolve() == (project / "fbvm.toml").resolve()
     with pytest.raises(FileNotFoundError, match=r"none\.toml is neither in .* nor in"):
         project_near([deep, project], "none.toml")
+
+
+@each_of("name, said", [
+    ("lo", "Main has no lo; it has low, high"), ("Main.lo", "Main has no lo; it has low, high"),
+    ("main.low.x", "low is INT and has no member x"), ("low.x", "low is INT and has no member x"),
+])
+def test_a_misspelt_name_is_told_in_both_ways_to_write_it(name: str, said: str) -> None:
+    rig = Rig.of("Main", text="PROGRAM Main VAR low, high : INT; END_VAR END_PROGRAM")
+    with pytest.raises(UnknownPlace) as error:
+        rig[name]
+    assert str(error.value) == said
+
+
+@each_of("named, said", [
+    ("pmp.st", "pmp.st is neither in {0}/tests nor in {0}; did you mean pump.st?"),
+    ("src/mian.st", "src/mian.st is neither in {0}/tests nor in {0}; did you mean src/main.st?"),
+    ("{0}/pmp.st", "{0}/pmp.st is neither in {0}/tests nor in {0}; did you mean {0}/pump.st?"),
+    ("none/pump.st", "none/pump.st is neither in {0}/tests nor in {0}"), ("zzz.st", "zzz.st is neither in {0}/tests nor in {0}"),
+])
+def test_a_misspelt_file_of_a_test_gets_a_suggestion(tmp_path: Path, named: str, said: str) -> None:
+    (tmp_path / "src").mkdir(exist_ok=True)
+    for name in ("pump.st", "src/main.st"):
+        (tmp_path / name).touch()
+    path, expected = (str(Path(text.format(tmp_path))) for text in (named, said))
+    assert str(not_found(path, [tmp_path / "tests", tmp_path])) == expected.replace("/", os.sep)
+    assert str(not_found("zzz.st", [tmp_path])) == f"zzz.st is not in {tmp_path}"
 
 
 def test_a_rig_is_looked_at_afterwards(tmp_path: Path) -> None:

@@ -132,7 +132,7 @@ def test_a_mistake_of_the_test_ends_in_the_test(project: pytest.Pytester) -> Non
     result.stdout.fnmatch_lines([
         "E*: Pump has no Strat; it has Start, Running, Starts, Delay, Edge", "E*: Pump has no Runing; *",
         "E*TypeError: Start is BOOL and takes TRUE or FALSE, not 5", "E*: there is no Pumps; there is Pump",
-        "E*FileNotFoundError: src/pumps.st is neither in *",
+        "E*FileNotFoundError: src/pumps.st is not in *",
     ])  # fmt: skip
     result.stdout.no_fnmatch_line("*rig.py:*")
     assert "rig.py:" in run(project, "--full-trace", "-k", "test_value").stdout.str()
@@ -212,7 +212,7 @@ def test_what_cannot_be_had_says_why(project: pytest.Pytester) -> None:
     """)
     result = run(project, "--tb=short")
     result.assert_outcomes(failed=2)
-    result.stdout.fnmatch_lines(["E*FileNotFoundError: src/fan.st is neither in*", "E*there is no Fan; there is Pump"])
+    result.stdout.fnmatch_lines(["E*FileNotFoundError: src/fan.st is not in*", "E*there is no Fan; there is Pump"])
 
 
 @pytest.mark.slow
@@ -613,7 +613,7 @@ def test_a_network_of_plcs_from_a_project_file(project: pytest.Pytester) -> None
 def test_a_project_file_that_is_wrong(project: pytest.Pytester) -> None:
     (project.path / "fbvm.toml").write_text("[plc.a]\nsource = 1\n", encoding="utf-8")
     project.makepyfile("def test_wrong(plant):\n    plant()\ndef test_none(plant):\n    plant('other.toml')\n")
-    run(project).stdout.fnmatch_lines(["E*fbvm.toml:2:*", "E*FileNotFoundError: other.toml is neither in*"])
+    run(project).stdout.fnmatch_lines(["E*fbvm.toml:2:*", "E*FileNotFoundError: other.toml is not in*"])
 
 
 CALLER = """

@@ -128,6 +128,15 @@ def test_what_names_nothing_says_why(text: str, message: str) -> None:
     assert message in str(error.value)
 
 
+def test_where_there_are_many_names_those_like_the_wanted_one_come_first() -> None:
+    fields = {name.upper(): Field(name, t.INT, 2 * at) for at, name in enumerate([*"abcdefghijkl", "Start", "Stop"])}
+    many = {"MAIN": Field("Main", StructType("Main", 28, 2, fields, block=True), 180224)}
+    with pytest.raises(UnknownPlace, match=r"^Main has no Strat; it has Start, a, b, c, d, e, f, g, h, i, j, k, \.\.\.$"):
+        find(many, AREAS, "Main.Strat")
+    with pytest.raises(UnknownPlace, match=r"^there is no Strat; known here: Start, Stop, a, b, c, d, e, f, \.\.\.$"):
+        find({**fields, "STRATA.X": Field("x", t.INT, 0, reference=True)}, AREAS, "Strat")
+
+
 def test_one_place_is_not_a_range() -> None:
     with pytest.raises(UnknownPlace, match="is a range; name one place"):
         place("D1..D3")

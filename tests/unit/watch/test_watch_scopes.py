@@ -75,6 +75,17 @@ def test_what_lives_in_the_body_alone_is_found_in_front_of_the_instance(plc: Plc
         scope.find("n.a")
 
 
+@each_of(("text", "said"), [
+    ("pear.a", "there is no pear; did you mean pair?"), ("lcoal", "there is no lcoal; did you mean local?"),
+    ("xyz", "there is no xyz; known here: Main, spare, n, there"), ("Main.pear", "Main has no pear; it has one, two, deep, pair"),
+    ("D40000", "D ends at 32767; 40000 does not exist"),
+])
+def test_a_misspelt_name_of_the_body_gets_a_suggestion(plc: Plc, text: str, said: str) -> None:
+    with pytest.raises(UnknownPlace) as error:
+        Scope(plc.find, place(plc, "Main"), {"LOCAL": Field("local", INT, 96)}).find(text)
+    assert str(error.value).startswith(said)
+
+
 @each_of(("pou", "most", "found"), [
     ("low", 9, ["Main.one", "Main.two[1]", "Main.two[2]", "Main.deep.inner", "spare.inner"]),
     ("Low", 2, ["Main.one", "spare.inner"]),
