@@ -70,22 +70,57 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
 
     A link keeps leading where it leads, and a file that is there keeps its rights.  Devices and pipes are written directly.
     Raises OSError."""
-    target = path.resolve()
-    if os.path.lexists(target) and not target.is_file():
+    target = _behind_links(path)
+    if _is_no_file(target):
         with open(target, "wb") as device:
             yield device
         return
-    part = target.with_name(f".fbvm.{os.getpid()}.part")
+    part = _beside(target)
     try:
         with open(part, "wb") as file:
             yield file
         if target.exists():
-            if not os.access(target, os.W_OK):
-                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+            _refuse_unwritable(target, path)
             shutil.copymode(target, part)
         replace(part, target)
     finally:
         part.unlink(missing_ok=True)
+
+
+def check_writable(path: Path) -> None:
+    """Raises OSError if `new_file` could not write this file now; leaves what is there, and nothing beside it."""
+    target = _behind_links(path)
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if os.path.lexists(target):
+        _refuse_unwritable(target, path)
+    if not _is_no_file(target):
+        part = _beside(target)
+        part.write_bytes(b"")
+        part.unlink()
+
+
+def _behind_links(path: Path) -> Path:
+    """Where a path leads.  Raises OSError for links that lead to one another, for which `Path.resolve` may raise RuntimeError."""
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    return target
+
+
+def _is_no_file(target: Path) -> bool:
+    """True for a device, a pipe or a folder, which nothing takes the place of."""
+    return os.path.lexists(target) and not target.is_file()
+
+
+def _refuse_unwritable(target: Path, path: Path) -> None:
+    if not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+
+
+def _beside(target: Path) -> Path:
+    """The file that is written before it takes the place of another one."""
+    return target.with_name(f".fbvm.{os.getpid()}.part")
 
 
 def write_file(path: Path, content: bytes | str) -> None:

@@ -13,7 +13,7 @@ import click
 from fbvm.base.files import write_file
 from fbvm.cli.programs.prove_tests import answering, told, write_tests
 from fbvm.cli.shared import status
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import check_outputs, writing
 from fbvm.cli.shared.given_sources import inputs, sources_of
 from fbvm.cli.shared.options import CYCLE_NS, time_ns
 from fbvm.cli.shared.run_recording import described, program_text, record_run, write_page
@@ -107,6 +107,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     questions, pairs = _questions(options), options["pairs"]
     needs_names = options["handshake"] or options["written_once"]
     _refuse_mixed(options, bool(questions or pairs or needs_names))
+    check_outputs(*(options[name] for name in ("trace", "html", "test_file", "tests_file")))
     if options["tests_file"]:
         sys.exit(write_tests(files, program, libraries, as_json, options))
     asked = [_equality(pair, files, libraries, options["assume"]) for pair in pairs]

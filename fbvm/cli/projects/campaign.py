@@ -12,7 +12,15 @@ import click
 
 import fbvm
 from fbvm.cli.projects.cluster import cluster_of, cluster_option
-from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, write_results
+from fbvm.cli.projects.planned_runs import (
+    check_parquet,
+    check_results,
+    plan_options,
+    planned,
+    processes,
+    refuse,
+    write_results,
+)
 from fbvm.cli.projects.runs_of_tests import bench_of_tests, record_test, travelling
 from fbvm.cli.projects.shown_progress import PAGE, ShownProgress
 from fbvm.cli.shared import status
@@ -88,6 +96,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         outcome.add(store.known)
         shown = ShownProgress(outcome, options["folder"] / PAGE, options["json_lines"])
         try:
+            check_results(options)
             _conduct(bench, outcome, store, shown, processes(options["jobs"]), options["cluster"])
         finally:
             _finish(bench, outcome, options, shown, as_json or options["json_lines"])

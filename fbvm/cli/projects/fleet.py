@@ -16,7 +16,7 @@ import click
 from fbvm.cli.projects.cluster import client_of, cluster_option
 from fbvm.cli.projects.planned_runs import MOST_PROCESSES, jobs_option, processes, refuse
 from fbvm.cli.shared import status
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import check_outputs, writing
 from fbvm.cli.shared.options import time_ns
 from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.progress import show_progress
@@ -85,6 +85,7 @@ def _places(file: Path | None, options: dict[str, Any]) -> AbstractContextManage
     from fbvm.run.shards import shards_of
 
     project, for_ns = _project(file, options)
+    check_outputs(options["doors_file"])
     _check_shards(project, options["shards"])
     found, said = images_of(project)
     for diagnostic in said:

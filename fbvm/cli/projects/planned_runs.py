@@ -13,6 +13,7 @@ import click
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.cli.shared import status
+from fbvm.cli.shared.files import check_outputs, writing
 from fbvm.cli.shared.options import cycle_option, mapping, show_option, time_ns
 from fbvm.cli.shared.paths import SourcePath, taken_folders
 from fbvm.cli.shared.project_arguments import allow_outside_option, project_argument, read_given_project
@@ -171,7 +172,6 @@ def _project(files: Sequence[Path], where: Path | None, written: Written) -> Pro
 def write_results(outcome: Any, options: dict[str, Any]) -> None:
     """Writes what --csv and --parquet ask for."""
     from fbvm.campaign.store import write_parquet, write_table
-    from fbvm.cli.shared.files import writing
 
     if path := options["csv_file"]:
         with writing(path):
@@ -179,6 +179,11 @@ def write_results(outcome: Any, options: dict[str, Any]) -> None:
     if path := options["parquet_file"]:
         with writing(path):
             write_parquet(path, outcome)
+
+
+def check_results(options: dict[str, Any]) -> None:
+    """Ends the verb if `write_results` could not write, before it has anything to write."""
+    check_outputs(options.get("csv_file"), options.get("parquet_file"))
 
 
 def check_parquet(options: dict[str, Any]) -> None:

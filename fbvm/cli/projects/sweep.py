@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fbvm.cli.projects.planned_runs import check_parquet, plan_options, planned, processes, refuse, tests_among, write_results
+from fbvm.cli.projects.planned_runs import (
+    check_parquet,
+    check_results,
+    plan_options,
+    planned,
+    processes,
+    refuse,
+    tests_among,
+    write_results,
+)
 from fbvm.cli.shared import status
 from fbvm.cli.shared.progress import show_progress
 from fbvm.cli.shared.terminal import say, say_json
@@ -38,6 +47,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
 
     plan, images, _ = planned(files, program, libraries, options,
                               lambda written, project: with_about(written, runs=0, timing="exact"))  # fmt: skip
+    check_results(options)
     outcome = Outcome(plan)
     try:
         with show_progress("sweep") as update:
@@ -62,7 +72,13 @@ def _print(outcome: Outcome, options: dict[str, Any], as_json: bool) -> None:
     """The table, aligned; also of a sweep that was interrupted."""
     if not outcome.results:
         return
-    write_results(outcome, options)
+    try:
+        write_results(outcome, options)
+    finally:
+        _say(outcome, as_json)
+
+
+def _say(outcome: Outcome, as_json: bool) -> None:
     plan = outcome.plan
     names = [axis.name for axis in plan.axes]
     rows = [_row(outcome, result) for result in outcome.rows]

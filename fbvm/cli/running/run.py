@@ -14,7 +14,7 @@ import click
 from fbvm.cli.running.project_run import run_project
 from fbvm.cli.shared.breakpoint_options import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.shared.e_banks import e_banks_in
-from fbvm.cli.shared.files import growing_file, writing
+from fbvm.cli.shared.files import check_outputs, growing_file, writing
 from fbvm.cli.shared.networks import build_network, mailbox_names, net_of, try_doors
 from fbvm.cli.shared.options import (
     Door,
@@ -121,6 +121,7 @@ def command(
     options["net"] = net_of(options["net"], options["doors"])
     _check_usage(**options)
     _check_endpoints(**options)
+    check_outputs(options["html"])
     drawn = bool(options["rungs"])
     image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]

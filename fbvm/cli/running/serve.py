@@ -21,7 +21,7 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.debug.door import DebugPort
 from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import LISTENING, notice_teller, unusable, warn_if_reachable
-from fbvm.cli.shared.files import OutputError, growing_file, writing
+from fbvm.cli.shared.files import OutputError, check_outputs, growing_file, writing
 from fbvm.cli.shared.fins import ENDPOINT, FinsDoor, fins_door, fins_options, say_fins, try_fins
 from fbvm.cli.shared.networks import mailbox_names
 from fbvm.cli.shared.options import (
@@ -213,8 +213,7 @@ def _own(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ..
 
 def _load(plc: Plc, image: Path) -> None:
     """Loads the memory, and says which words the file does not set."""
-    with writing(image):
-        memory_images.check_writable(image)
+    check_outputs(image)
     if not image.exists():
         return
     try:

@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 import click
 
-from fbvm.base.files import reason
+from fbvm.base.files import check_writable, reason
 from fbvm.cli.shared.terminal import named
 
 
@@ -62,3 +62,11 @@ def writing(target: Path | str) -> Iterator[None]:
         yield
     except OSError as error:
         raise click.UsageError(f"{named(target)} cannot be written: {reason(error)}") from None
+
+
+def check_outputs(*paths: Path | None) -> None:
+    """Ends the verb as `writing` does if a file cannot be written.  To be called before long work whose outcome goes there."""
+    for path in paths:
+        if path:
+            with writing(path):
+                check_writable(path)

@@ -9,8 +9,7 @@ import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from fbvm.base.files import IMAGE_BYTES, read_file
-from fbvm.base.host import replace
+from fbvm.base.files import IMAGE_BYTES, read_file, write_file
 from fbvm.base.memory import Memory
 from fbvm.base.printable import one_line
 
@@ -24,7 +23,7 @@ class ImageError(ValueError):
 def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
     """Writes the first words of some areas into a file; `counts` is the number of words by area.
 
-    Words of 0 at the end are left out.  The file is replaced at once or not at all.  Raises OSError."""
+    Words of 0 at the end are left out.  The file is replaced at once or not at all, as `write_file` does.  Raises OSError."""
     spaces = {}
     for name, count in counts.items():
         words = memory.words(name)[:count].tolist()
@@ -34,25 +33,7 @@ def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
             words.pop()
         spaces[name] = words
     lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(words)}" for name, words in spaces.items())
-    part = _beside(path)
-    try:
-        part.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
-        replace(part, path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
-
-
-def check_writable(path: Path) -> None:
-    """Raises OSError if an image cannot be written into this file; leaves the file as it is."""
-    part = _beside(path)
-    part.write_bytes(b"")
-    part.unlink()
-
-
-def _beside(path: Path) -> Path:
-    """The file that is written before it replaces an image."""
-    return path.with_name(path.name + ".new")
+    write_file(path, f'{{"spaces": {{\n{lines}\n}}}}\n')
 
 
 def load(memory: Memory, path: Path) -> dict[str, list[int]]:

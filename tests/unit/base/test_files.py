@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from fbvm.base import host
-from fbvm.base.files import new_file, write_file
+from fbvm.base.files import check_writable, new_file, write_file
 
 
 @pytest.fixture(autouse=True)
@@ -42,6 +42,31 @@ def test_links_and_rights_stay() -> None:
     assert (os.readlink("link"), Path("real").read_bytes(), Path("real").stat().st_mode & 0o777) == ("real", b"new", 0o640)
     write_file(Path(os.devnull), "nowhere")
     assert inside() == ["link", "real"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links are a privilege there")
+def test_links_that_lead_to_one_another_are_an_error_of_the_host() -> None:
+    for name, leads in (("one", "other"), ("other", "one"), ("self", "self")):
+        Path(name).symlink_to(leads)
+    for name in ("one", "self"):
+        for wants in (check_writable, lambda path: write_file(path, "text")):
+            with pytest.raises(OSError, match=r"(?i)symbolic links"):
+                wants(Path(name))
+    assert inside() == ["one", "other", "self"]
+
+
+def test_whether_a_file_can_be_written_is_asked_without_a_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("there").write_bytes(b"old")
+    Path("folder").mkdir()
+    for good in ("there", "new", os.devnull):
+        check_writable(Path(good))
+    for wrong in ("folder", "missing/new"):
+        with pytest.raises(OSError, match=r"(?i)directory"):
+            check_writable(Path(wrong))
+    monkeypatch.setattr(os, "access", lambda *_: False)  # the superuser may write all
+    with pytest.raises(PermissionError):
+        check_writable(Path("there"))
+    assert (inside(), Path("there").read_bytes()) == (["folder", "there"], b"old")
 
 
 def test_windows_is_asked_again_while_a_reader_has_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
