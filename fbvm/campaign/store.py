@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -73,7 +74,7 @@ class Store:
         self._file.truncate()
 
     def add(self, results: Sequence[Result]) -> None:
-        """Keeps results.  They are in the file when this returns."""
+        """Keeps results.  They are in the file when this returns.  Raises OSError."""
         for result in results:
             self._write(asdict(result))
         self._file.flush()
@@ -82,8 +83,9 @@ class Store:
         self._file.write(_line(row))
 
     def close(self) -> None:
-        """Closes the file."""
-        self._file.close()
+        """Closes the file.  That the host did not take something has `add` said already."""
+        with suppress(OSError):
+            self._file.close()
 
 
 def _line(row: dict[str, Any]) -> bytes:

@@ -97,7 +97,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         shown = ShownProgress(outcome, options["folder"] / PAGE, options["json_lines"])
         try:
             check_results(options)
-            _conduct(bench, outcome, store, shown, processes(options["jobs"]), options["cluster"])
+            _conduct(bench, outcome, store, shown, processes(options["jobs"]), options["cluster"], options["folder"])
         finally:
             _finish(bench, outcome, options, shown, as_json or options["json_lines"])
             store.close()
@@ -158,15 +158,17 @@ def _open(make: type[Store], folder: Path, mark: str, fresh: bool) -> Store:
             raise click.UsageError(f"{named(folder)} {error}: name another folder by --out, or begin anew by --fresh") from None
 
 
-def _conduct(bench: AnyBench, outcome: Outcome, store: Store, shown: ShownProgress, jobs: int, cluster: str | None) -> None:
-    """Executes what is left of a campaign, and shows how it goes."""
+def _conduct(bench: AnyBench, outcome: Outcome, store: Store, shown: ShownProgress, jobs: int, cluster: str | None,
+             folder: Path) -> None:  # fmt: skip
+    """Executes what is left of a campaign, keeps its results in the folder, and shows how it goes."""
     from fbvm.campaign.executors import ByWorkers
     from fbvm.campaign.runs import conduct
 
     with show_progress("campaign") as update:
 
         def take(found: Sequence[Result]) -> None:
-            store.add(found)
+            with writing(folder):
+                store.add(found)
             outcome.add(found)
             update(shown.add(found), len(outcome.results), outcome.plan.count)
 

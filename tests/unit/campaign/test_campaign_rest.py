@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import io
+import os
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -139,6 +142,23 @@ def test_a_store_goes_on_behind_the_last_whole_line(tmp_path: Path) -> None:
     fresh = Store(tmp_path, "mark", fresh=True)
     assert fresh.known == []
     fresh.close()
+
+
+def test_a_store_on_a_full_disk_says_so_once(tmp_path: Path) -> None:
+    class Full(io.RawIOBase):
+        def writable(self) -> bool:
+            return True
+
+        def write(self, data: Any, /) -> int:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    store, full = Store(tmp_path, "mark"), Full()
+    store._file.close()
+    store._file = cast(Any, io.BufferedWriter(full))
+    with pytest.raises(OSError, match="No space"):
+        store.add([Result(0, 5, MS, 7, None, ())])
+    store.close()
+    assert full.closed
 
 
 def test_a_parquet_file_has_numbers_where_all_values_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

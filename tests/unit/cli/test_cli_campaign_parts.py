@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import logging
+import os
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -27,6 +29,21 @@ def counter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("counter.st").write_text(COUNTER, encoding="utf-8")
     return Path("counter.st")
+
+
+# --- full disks -------------------------------------------------------------------------------------------------------
+
+
+def test_a_campaign_whose_results_the_disk_does_not_take_names_their_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(found: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    kept: list[object] = []
+    monkeypatch.setattr("fbvm.campaign.runs.conduct", lambda bench, outcome, jobs, take, executor: take(["result"]))
+    with pytest.raises(click.UsageError, match=r"^results cannot be written: no space left on device$"):
+        campaign._conduct(cast(Any, "bench"), cast(Any, SimpleNamespace(add=kept.append)), cast(Any, SimpleNamespace(add=full)),
+                          cast(Any, "shown"), 1, None, Path("results"))  # fmt: skip
+    assert kept == []
 
 
 # --- clusters ---------------------------------------------------------------------------------------------------------
@@ -213,10 +230,10 @@ def test_results_are_taken_stored_and_told_as_they_come(monkeypatch: pytest.Monk
     monkeypatch.setattr(campaign, "cluster_of", lambda *given: given)
     monkeypatch.setattr(campaign, "travelling", lambda bench: f"travelling {bench}")
     monkeypatch.setattr(campaign, "show_progress", lambda what: nullcontext(lambda *told: calls.append(told)))
-    campaign._conduct(cast(Any, "bench"), cast(Any, outcome), cast(Any, store), cast(Any, shown), 3, None)
+    campaign._conduct(cast(Any, "bench"), cast(Any, outcome), cast(Any, store), cast(Any, shown), 3, None, Path("results"))
     assert calls == [("bench", True, 3, None), ("stored", [1]), ("1 runs", 1, 4), ("stored", [2, 3]), ("3 runs", 3, 4)]
     calls.clear()
-    campaign._conduct(cast(Any, "bench"), cast(Any, outcome), cast(Any, store), cast(Any, shown), 3, "local")
+    campaign._conduct(cast(Any, "bench"), cast(Any, outcome), cast(Any, store), cast(Any, shown), 3, "local", Path("results"))
     assert calls[0] == ("bench", True, 3, ("workers", ("travelling bench", "local", 3)))
 
 
