@@ -22,6 +22,7 @@ WHEN = " since scan 5 (20ms)"
 
 @each_of(("first", "change", "repeated", "said"), (
     (0, None, False, " since power-on"), (3, None, True, " since before scan 3, the first of the trace"),
+    (1, None, True, " since before scan 1, the first of the trace"),
     (0, {"phase": Phase.REFRESH}, False, f"{WHEN}, by a unit in the I/O refresh"),
     (0, {"phase": Phase.PROGRAM}, False, f"{WHEN}, by a statement that is not recorded: there were too many in this scan"),
     (0, {"phase": Phase.INPUTS}, False, f"{WHEN}, from outside the program"), (0, {}, False, f"{WHEN}, by a stub"),
