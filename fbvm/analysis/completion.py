@@ -13,7 +13,7 @@ from fbvm.analysis.hover import all_located
 from fbvm.analysis.names import key_of
 from fbvm.analysis.program import Program
 from fbvm.analysis.scopes import Member, Scope, scope_at
-from fbvm.base.areas import AREAS, SHARED_AREAS, SIZED_AREAS, with_sizes_apart
+from fbvm.base.areas import AREAS, FLAG_AREAS, SHARED_AREAS, SIZED_AREAS, Address, with_sizes_apart
 from fbvm.base.types import ELEMENTARY, EnumType, fold
 from fbvm.check import block_pages
 from fbvm.check.calls import functions
@@ -40,7 +40,7 @@ DYNAMIC = {"__NEW": "pointer := __NEW(TYPE), __NEW(TYPE, count), __NEW(BLOCK(arg
 OPERATORS = ("AND", "OR", "XOR", "NOT", "MOD", "TRUE", "FALSE")
 _PATH = re.compile(r"([A-Za-z_]\w*(?:\s*\[[^\[\]]*\]|\^|\.[A-Za-z_]\w*)*)\.\w*\Z")
 _TYPED = re.compile(r"([A-Za-z_]\w*)#\w*\Z")
-_AT = re.compile(r"\bAT\s+(%?[\w. ]*)\Z", re.I)
+_AT = re.compile(r"\bAT\s+%?[\w. ]*\Z", re.I)
 _OF_TYPE = re.compile(r"(?::|\bOF|\bTO)\s+\w*\Z|:\s*\w*\Z", re.I)
 _MADE = re.compile(r"\b__NEW\s*\(\s*\w*\Z", re.I)
 _KINDS = {"field": "variable", "enumeration": "type"}
@@ -80,8 +80,8 @@ def complete(program: Program, name: str, offset: int) -> list[Item]:
         return [_member(each, rank=1) for each in scope.members(path[1]) if each.kind not in unfit]
     if typed := _TYPED.search(line):
         return [Item(each.name, each.kind, each.type, rank=1) for each in scope.members(typed[1]) if each.kind == "enumerator"]
-    if at := _AT.search(line):
-        return list(_free_addresses(program, at[1]))
+    if _AT.search(line):
+        return list(_free_addresses(program))
     if _ADDRESS.search(line):
         return [Item(str(each.location), "address", f"{each.name} : {each.type}") for each in all_located(program)]
     if _in_ladder(text):
@@ -204,23 +204,30 @@ def _block(name: str) -> Item | None:
     return Item(name, kind, page.splitlines()[-1], "" if kind == "block" else f"{name}($0)", name, 4)
 
 
-def _free_addresses(program: Program, written: str) -> Iterator[Item]:
+def _free_addresses(program: Program) -> Iterator[Item]:
     """For each area in use the address behind the last variable, and the areas."""
     behind: dict[str, int] = {}
     for each in all_located(program):
         assert each.location is not None
-        unit = SIZED_AREAS[each.location.area].address_bits // 8 if each.location.area in SIZED_AREAS else 2
-        words = max(1, -(-each.type.size // max(1, unit)))
-        behind[each.location.area] = max(behind.get(each.location.area, 0), each.location.number + words)
+        area = each.location.area
+        behind[area] = max(behind.get(area, 0), _behind(each.location, each.type.size))
     apart = program.dialect.sizes_apart
     for area, row in (with_sizes_apart(AREAS, SIZED_AREAS.values()) if apart else AREAS).items():
         label = f"%{area}" if area in SHARED_AREAS else area
         free = behind.get(area)
         if free is not None:
-            text = f"%{area}W{free // 2 + free % 2}" if area in SHARED_AREAS else \
+            text = f"%{area}W{free}" if area in SHARED_AREAS else \
                 f"{area} {free}" if area == "CIO" else f"{area}{free}"
             yield Item(text, "address", f"the next free {'place' if area in SIZED_AREAS else 'word'}: {row.title}", rank=1)
         yield Item(label, "address", row.title, rank=2)
+
+
+def _behind(location: Address, size: int) -> int:
+    """The number of the first address behind `size` bytes: of a word, where an area has no addresses of one size only."""
+    if location.area in FLAG_AREAS:
+        return location.number + size
+    unit = max(1, SIZED_AREAS[location.area].address_bits // 8) if location.area in SIZED_AREAS else 2
+    return -(-(location.byte_offset() + size) // unit)
 
 
 def _rung(scope: Scope, line: str) -> Iterator[Item]:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
+
+from rows import each_of
+
 from fbvm.analysis.outline import Symbol, folds, lenses, outline
 from fbvm.analysis.program import Program
 from fbvm.analysis.tokens import address_hints, tokens
@@ -35,6 +39,7 @@ END_PROGRAM
 """
 
 
+@cache
 def plant(name: str = "pump.st", text: str = PLANT) -> Program:
     program = Program()
     program.replace(name, text)
@@ -151,3 +156,81 @@ def test_names_of_programs_blocks_actions_and_functions_have_their_colours() -> 
     colours = {(text[each.start:each.end], each.type) for each in tokens(file, file.files["pump.st"])}
     assert {("B", "class"), ("Stop", "method"), ("F", "function"), ("Main", "class"), ("b", "variable")} <= colours
     assert not {("Stop", "class"), ("B", "method"), ("F", "class")} & colours
+
+
+COLOURS = """\
+TYPE Mode : (Off, On); Tank : STRUCT Level : INT; END_STRUCT; END_TYPE
+VAR_GLOBAL CONSTANT Top : INT := 9; END_VAR
+VAR_GLOBAL Shared : INT; END_VAR
+FUNCTION_BLOCK Pump
+VAR_INPUT In : INT; END_VAR
+VAR_OUTPUT Out : INT; END_VAR
+VAR_IN_OUT Both : INT; END_VAR
+VAR CONSTANT Deep : INT := 3; END_VAR
+VAR T1 : Tank; END_VAR
+METHOD Turn : INT
+    Turn := Deep;
+END_METHOD
+PROPERTY Speed : INT
+GET Speed := Top; END_GET
+END_PROPERTY
+T1.Level := In;
+ACTION Stop: Out := Shared; END_ACTION
+END_FUNCTION_BLOCK
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+END_FUNCTION
+PROGRAM Main
+VAR P1 : Pump; m : Mode; t : TON; a AT D10 : INT; END_VAR
+P1(); P1.Stop(); a := P1.Turn(); a := P1.Speed; t(IN := TRUE); m := On; a := Twice(ABS(a)); %MW7 := a;
+LADDER
+LD P_On
+MOV D3 D200
+END_LADDER
+END_PROGRAM
+"""
+
+
+@each_of("line, colours", [
+    (1, "Mode:type declaration, Off:enumMember declaration, On:enumMember declaration, Tank:type declaration, "
+        "Level:property declaration"),
+    (2, "Top:variable declaration readonly static"), (3, "Shared:variable declaration static"), (4, "Pump:class declaration"),
+    (5, "In:parameter declaration"), (6, "Out:parameter declaration"), (7, "Both:parameter declaration"),
+    (8, "Deep:variable declaration readonly"), (9, "T1:variable declaration, Tank:type"), (10, "Turn:method declaration"),
+    (11, "Turn:method modification, Deep:variable readonly"), (13, "Speed:property declaration"),
+    (14, "Speed:property modification, Top:variable readonly static"),
+    (16, "T1:variable, Level:property modification, In:parameter"),
+    (17, "Stop:method declaration, Out:parameter modification, Shared:variable static"), (19, "Twice:function declaration"),
+    (20, "x:parameter declaration"), (22, "Main:class declaration"),
+    (23, "P1:variable declaration, Pump:class, m:variable declaration, Mode:type, t:variable declaration, "
+         "TON:class defaultLibrary, a:variable declaration, D10:macro"),
+    (24, "P1:variable, P1:variable, Stop:method, a:variable modification, P1:variable, Turn:method, a:variable modification, "
+         "P1:variable, Speed:property, t:variable, IN:parameter defaultLibrary modification, m:variable modification, "
+         "On:enumMember, a:variable modification, Twice:function, ABS:function defaultLibrary, a:variable, %MW7:macro, "
+         "a:variable"),
+    (26, ""), (27, ""),
+])
+def test_each_name_of_a_text_has_one_colour(line: int, colours: str) -> None:
+    program = plant(text=COLOURS)
+    source, found = program.files["pump.st"].source, tokens(program, program.files["pump.st"])
+    assert ", ".join(f"{COLOURS[each.start:each.end]}:{' '.join([each.type, *sorted(each.modifiers)])}" for each in found
+                     if source.place(each.start)[0] == line) == colours
+
+
+@each_of("declared, body, shown", [
+    ("a AT D5 : INT; b : INT;", "a := b;", ["a D5"]), ("a AT D5.3 : BOOL;", "a := TRUE;", ["a D5.03"]),
+    ("a AT D100 : ARRAY [1..4] OF INT;", "a[1] := a[4];", ["] D100", "] D103"]),
+    ("a AT D100 : ARRAY [-1..1] OF WORD;", "a[-1] := a[1];", ["] D100", "] D102"]),
+    ("a AT CIO 5 : ARRAY [0..2] OF INT;", "a[1] := 1;", ["] CIO 6"]),
+    ("a AT %MW4 : ARRAY [0..3] OF INT;", "a[2] := 0;", ["] %MW6"]),
+    ("a AT D1 : ARRAY [0..1] OF DINT;", "a[1] := 0;", []), ("a AT D1 : ARRAY [0..3] OF SINT;", "a[1] := 0;", []),
+    ("a AT D1 : ARRAY [0..1, 0..1] OF INT;", "a[1, 1] := 0;", []),
+    ("a AT %MD4 : ARRAY [0..3] OF INT;", "a[2] := 0;", []), ("a AT %MB4 : ARRAY [0..3] OF INT;", "a[2] := 0;", []),
+    ("a AT %MB4 : ARRAY [0..3] OF BYTE;", "a[2] := 0;", []), ("a AT %QX0.0 : ARRAY [0..3] OF BOOL;", "a[2] := TRUE;", []),
+    ("a : ARRAY [0..3] OF INT;", "a[2] := 0;", []), ("a AT D1 : ARRAY [0..3] OF INT; i : INT;", "a[i] := 0;", []),
+])
+def test_only_words_of_arrays_with_one_index_have_addresses_of_their_own(declared: str, body: str, shown: list[str]) -> None:
+    start = f"PROGRAM Main VAR {declared} END_VAR "
+    program = plant(text=f"{start}{body} END_PROGRAM\n")
+    hints = address_hints(program, program.files["pump.st"], len(start), len(start) + len(body))
+    assert [f"{(start + body)[each.at - 1]} {each.text}" for each in hints] == shown

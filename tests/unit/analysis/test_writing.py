@@ -87,6 +87,38 @@ def test_completion_in_a_section_offers_types_and_free_addresses(line: str, some
     assert some <= {item.label for item in complete(program, "pump.st", offset)}
 
 
+@each_of("declared, dialect, free", [
+    ("", "standard", []), ("a AT D10 : INT;", "standard", ["D11"]), ("a AT D10 : DINT;", "standard", ["D12"]),
+    ("a AT D10 : SINT;", "standard", ["D11"]), ("a AT D10 : ARRAY [0..4] OF SINT;", "standard", ["D13"]),
+    ("a AT D4.15 : BOOL;", "standard", ["D5"]), ("a AT D12 : LREAL; b AT D9 : INT;", "standard", ["D16"]),
+    ("a AT CIO 5 : WORD; b AT W3 : WORD;", "standard", ["CIO 6", "W4"]), ("a AT T5 : WORD;", "standard", ["T6"]),
+    ("a AT TF5 : BOOL;", "standard", ["TF6"]), ("a AT T0008 : BOOL;", "standard", ["TF9"]),
+    ("a AT %MW3 : INT;", "standard", ["%MW4"]), ("a AT %MD3 : DINT;", "standard", ["%MW8"]),
+    ("a AT %ML1 : LINT;", "standard", ["%MW8"]), ("a AT %MB3 : BYTE;", "standard", ["%MW2"]),
+    ("a AT %MB4 : BYTE;", "standard", ["%MW3"]), ("a AT %MW3.9 : BOOL;", "standard", ["%MW4"]),
+    ("a AT %QX0.7 : BOOL;", "standard", ["%QW1"]), ("a AT %IX2.0 : BOOL;", "standard", ["%IW2"]),
+    ("a AT %MW3 : INT;", "matiec", ["%MW4"]), ("a AT %MD3 : DINT;", "matiec", ["%MD4"]),
+    ("a AT %ML1 : LINT;", "matiec", ["%ML2"]), ("a AT %MB3 : BYTE;", "matiec", ["%MB4"]),
+    ("a AT %QX1.7 : BOOL; b AT %QB4 : BYTE;", "matiec", ["%QX2", "%QB5"]),
+])
+def test_the_first_address_behind_the_variables_of_an_area_is_offered(declared: str, dialect: str, free: list[str]) -> None:
+    program, offset = at_mark(f"PROGRAM Main VAR {declared} x AT ‸ : INT; END_VAR END_PROGRAM\n", dialect)
+    offered = complete(program, "pump.st", offset)
+    assert [item.label for item in offered if item.rank == 1] == free
+    kind = "place" if dialect == "matiec" else "word"
+    assert {item.detail.partition(": ")[0] for item in offered if item.rank == 1} <= {f"the next free {kind}"}
+
+
+def test_all_areas_are_offered_as_addresses() -> None:
+    shared = ["CF", "CIO", "W", "H", "A", "TF", "CNF", "T", "C"]
+    sized = [f"%{area}{size}" for area in "IQM" for size in "XBWDL"]
+    for dialect, areas in (("standard", [*shared, "%I", "%Q", "%M", "D"]), ("matiec", [*shared, "D", *sized])):
+        program, offset = at_mark("PROGRAM Main VAR x AT ‸ : INT; END_VAR END_PROGRAM\n", dialect)
+        offered = complete(program, "pump.st", offset)
+        assert [(item.label, item.kind, item.rank) for item in offered] == [(area, "address", 2) for area in areas]
+        assert offered[1].detail == "inputs, outputs and words of units"
+
+
 @each_of("text, offered", [
     ("PROGRAM Other VAR Level : INT; END_VAR END_PROGRAM\n"
      "PROGRAM Main VAR x : INT; END_VAR x := Other.‸ END_PROGRAM\n", ["Level"]),
