@@ -93,7 +93,7 @@ def signature(program: Program, name: str, offset: int) -> Signature | None:
         parameters = [f"{pin.name} {describe.SHORT[pin.kind]} {pin.type}" for pin in listed]
         names = [fold(pin.name) for pin in listed]
         result = f" : {pou.result.type}" if pou.result is not None else ""
-        said = describe.comment(pou.source, pou.tree)
+        said = describe.comment(pou.source, pou.tree.name)
         return _signature(pou.name, parameters, names, result, said, current, position)
     folded = fold(call.path)
     if not functions.is_standard(folded):

@@ -100,7 +100,7 @@ def _removals(program: Program, name: str, diagnostic: Diagnostic) -> Iterator[F
     for declared in _variables(part):
         if len(declared.names) == 1 and declared.names[0].start == at:
             start, end = declared.start + part.base, declared.end + part.base
-            end += len(text[end:]) - len(text[end:].lstrip(" \t;")) if not text[:end].endswith(";") else 0
+            end += len(text[end:]) - len(text[end:].lstrip(" \t"))
             line, behind = text.rfind("\n", 0, start) + 1, text.find("\n", end) + 1 or len(text)
             alone = not text[line:start].strip() and not text[end:behind].strip()
             yield Fix(f"Remove {declared.names[0].text}", diagnostic, ((line, behind, "") if alone else (start, end, ""),))

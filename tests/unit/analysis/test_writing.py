@@ -256,3 +256,84 @@ def test_a_warning_can_be_mended_or_suppressed() -> None:
         program.replace("pump.st", applied(program.files["pump.st"].text, fix.edits))
         program.check_all()
         assert program.diagnostics("pump.st") == []
+
+
+@each_of("declared, left", [
+    ("VAR\n    ‸u : INT;\n    b : BOOL;\nEND_VAR", "VAR\n    b : BOOL;\nEND_VAR"),
+    ("VAR\n    b : BOOL;\n    ‸u : INT;  \n\nEND_VAR", "VAR\n    b : BOOL;\n\nEND_VAR"),
+    ("VAR\n\n    ‸u : INT;\n  b : BOOL;\nEND_VAR", "VAR\n\n  b : BOOL;\nEND_VAR"),
+    ("VAR ‸u : INT; b : BOOL; END_VAR", "VAR b : BOOL; END_VAR"),
+    ("VAR b : BOOL; ‸u : INT; END_VAR", "VAR b : BOOL; END_VAR"),
+    ("VAR b : BOOL;\n    ‸u : INT; END_VAR", "VAR b : BOOL;\n    END_VAR"),
+    ("VAR ‸u : INT;\n    b : BOOL;\nEND_VAR", "VAR \n    b : BOOL;\nEND_VAR"),
+    ("VAR\n    b : BOOL; ‸u : INT;\nEND_VAR", "VAR\n    b : BOOL; \nEND_VAR"),
+    ("VAR\n    b : BOOL;\n    ‸u : INT ; // said\nEND_VAR", "VAR\n    b : BOOL;\n    // said\nEND_VAR"),
+    ("VAR\n    ‸u, v : INT;\n    b : BOOL;\nEND_VAR", None),
+])
+def test_a_declaration_that_nobody_uses_is_removed_with_its_line_if_it_has_one(declared: str, left: str | None) -> None:
+    program, offset = at_mark(f"PROGRAM Main\n{declared}\nb := NOT b;\nEND_PROGRAM\n")
+    found = [fix for fix in fixes(program, "pump.st", offset, offset) if not fix.title.startswith("Suppress")]
+    assert [(fix.title, fix.best, applied(program.files["pump.st"].text, fix.edits)) for fix in found] == \
+        ([] if left is None else [("Remove u", True, f"PROGRAM Main\n{left}\nb := NOT b;\nEND_PROGRAM\n")])
+
+
+@each_of("line, made", [
+    ("b := TRUE‸\nn := 1;", [("Insert ;", True, "b := TRUE;\nn := 1;")]),
+    ("n := (1 + 2‸;", [("Insert )", True, "n := (1 + 2);")]),
+    ("IF b THEN\n  n := 1;\n  ‸END_PROGRAM\nPROGRAM Next", [
+        ("Insert END_IF", True, "IF b THEN\n  n := 1;\n  END_IF;\n  END_PROGRAM\nPROGRAM Next"),
+        ]),
+    ("‸n = 1;", [("Write :=", True, "n := 1;")]), ("b ‸== TRUE;", [("Write =", True, "b = TRUE;")]),
+])
+def test_what_is_expected_is_written_where_it_is_missing(line: str, made: list[tuple[str, bool, str]]) -> None:
+    head = "PROGRAM Main\nVAR b AT %QX0.0 : BOOL; n AT %QW1 : INT; END_VAR\n"
+    program, offset = at_mark(f"{head}{line}\nEND_PROGRAM\n")
+    found = fixes(program, "pump.st", offset, offset)
+    assert [(fix.title, fix.best, applied(program.files["pump.st"].text, fix.edits)) for fix in found] == [
+        (title, best, f"{head}{text}\nEND_PROGRAM\n") for title, best, text in made]
+
+
+def test_instructions_are_offered_with_their_operands_as_places_to_fill_in() -> None:
+    program, offset = at_mark("PROGRAM Main\nLADDER\n‸\nEND_LADDER\nEND_PROGRAM\n")
+    offered = {item.label: item for item in complete(program, "pump.st", offset)}
+    assert [(item.kind, item.insert, item.rank) for item in map(offered.get, ("LD", "MOV", "*", "END")) if item is not None] == [
+        ("instruction", "LD ${1:B}", 5), ("instruction", "MOV ${1:S} ${2:D}", 5), ("instruction", "* ${1:Md} ${2:Mr} ${3:R}", 5),
+        ("instruction", "END", 5)]
+    assert offered["LD"].detail == "Begins a block with a bit."
+
+
+def test_what_completion_says_of_names_is_how_they_are_declared() -> None:
+    program, offset = at_mark(
+        "FUNCTION Twice : INT\nVAR_INPUT x : INT; END_VAR\nTwice := x;\nEND_FUNCTION\nTYPE Mode : (Off, Run); END_TYPE\n"
+        "VAR_GLOBAL g AT D5 : INT; END_VAR\n"
+        "PROGRAM Main\nVAR i : INT; s AT D3 : WORD; END_VAR\n‸\nACTION Go: ; END_ACTION\nEND_PROGRAM\n")
+    offered = {item.label: (item.kind, item.detail, item.insert, item.rank) for item in complete(program, "pump.st", offset)}
+    wanted = {"Twice": ("function", "FUNCTION Twice : INT", "Twice($0)", 4), "Off": ("enumerator", "Mode", "", 4),
+              "g": ("variable", "VAR_GLOBAL INT AT D5", "", 3), "i": ("variable", "VAR INT", "", 2),
+              "s": ("variable", "VAR WORD AT D3", "", 2), "Go": ("action", "ACTION", "Go();", 3),
+              "ABS": ("function", "ABS(IN : T) : T  (T: ANY_NUM)", "ABS($0)", 6), "AND": ("keyword", "", "", 7)}
+    assert {name: offered[name] for name in wanted} == wanted
+
+
+@each_of("text, said", [
+    ("FUNCTION F : INT // doubles\nVAR_INPUT x : INT; END_VAR\nEND_FUNCTION // of F\n", "doubles"),
+    ("// above it\nFUNCTION F : INT\nVAR_INPUT x : INT; END_VAR\nEND_FUNCTION // of F\n", "above it"),
+    ("FUNCTION F : INT\nVAR_INPUT x : INT; END_VAR\nEND_FUNCTION // of F\n", ""),
+])
+def test_the_signature_of_a_call_has_the_comment_at_the_head(text: str, said: str) -> None:
+    program, offset = at_mark(text + "PROGRAM Main VAR i : INT; END_VAR i := F(‸); END_PROGRAM\n")
+    shown, hovered = signature(program, "pump.st", offset), hover(program, "pump.st", offset - 1)
+    assert shown is not None and shown.documentation == said
+    assert hovered is not None and hovered.markdown.rpartition("```")[2].strip() == said
+
+
+@each_of("call, parameters", [
+    ("P1(‸", ("Level := INT", "Runs => BOOL")), ("D[0] := ABS(‸", ("IN : T",)),
+    ("D[0] := SEL(‸", ("G : BOOL", "IN0 : T", "IN1 : T")), ("D[0] := ADD(‸", ("IN1", "IN2")),
+])
+def test_the_parameters_of_a_call_are_pieces_of_its_label(call: str, parameters: tuple[str, ...]) -> None:
+    program, offset = at_mark(f"{HEAD}{call}\nEND_PROGRAM\n")
+    shown = signature(program, "pump.st", offset)
+    assert shown is not None
+    assert shown.parameters == parameters and all(each in shown.label for each in parameters)
+    assert shown.documentation == ("moves water" if call.startswith("P1") else "")
