@@ -178,7 +178,9 @@ def test_sources_within_a_container_stand_at_places_of_it(tmp_path: Path) -> Non
     shown = [(rows[place.document.place(place.start)[0] - 1].strip(), place.where) for place in found if place is not None]
     assert ("OUT 100.00", "program NewProgram1, section Pumping, rung 0, step 2 (OUT 100.00)") in shown
     assert projects.place_in_container(Source(str(folder / "a.st"), "x"), 0) is None
-    assert projects.place_in_container(Source(name, "\n" * 500), 499) is None, "behind the end"
+    places = made.containers[folder / "line3.cxt"].places[name]
+    behind = [projects.place_in_container(Source(name, "\n" * 500), len(places) + more) for more in (-1, 0)]
+    assert behind == [places[-1], None], "the last line, and what is behind the end"
     assert projects.forget_regrouped(folder / "line3.cxt") == []
 
 
