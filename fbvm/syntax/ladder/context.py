@@ -9,14 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.mnemonics import Line
 from fbvm.syntax.ladder.operands import OperandError, Operands
+from fbvm.syntax.st.builder import CHAIN_LIMIT
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Assign, Binary, Block, Expr, If, NameRef, Statement, Unary
 from fbvm.syntax.tree.ladder import Edge, Element
+
+Operation = TypeVar("Operation", Binary, Unary, Edge, Element)
 
 
 class StepRefused(Exception):
@@ -75,6 +79,8 @@ class RungContext:
         self.branches: dict[str, str] = {}
         """TR bits that the rung has written, each with the variable of its last value: a later one has a variable of its own."""
         self.step = 0
+        self._depths: dict[Expr, int] = {}
+        """How many operations of conditions stand in one another, by the outermost."""
         self._computed: dict[str, tuple[Statement, Expr]] = {}
         self._position = 0
 
@@ -192,19 +198,26 @@ class RungContext:
 
     def edge(self, of: Expr, falling: bool) -> Edge:
         """TRUE in the cycle in which `of` rises, or with `falling` falls."""
-        return Edge(self.start, self.end, of, self.variable(self.name("was")), falling)
+        return self._over(Edge(self.start, self.end, of, self.variable(self.name("was")), falling), of)
 
     def element(self, value: Expr) -> Element:
-        return Element(self.start, self.end, self.step, value)
+        return self._over(Element(self.start, self.end, self.step, value), value)
 
     def assign(self, target: Expr, value: Expr) -> Statement:
         return Assign(self.start, self.end, (target,), ":=", value)
 
     def binary(self, operator: str, left: Expr, right: Expr) -> Expr:
-        return Binary(self.start, self.end, operator, left, right, self.start)
+        return self._over(Binary(self.start, self.end, operator, left, right, self.start), left, right)
 
     def negated(self, value: Expr) -> Expr:
-        return Unary(self.start, self.end, "NOT", value)
+        return self._over(Unary(self.start, self.end, "NOT", value), value)
+
+    def _over(self, made: Operation, *parts: Expr) -> Operation:
+        """An operation over parts.  Raises StepRefused if too many stand in one another."""
+        depth = self._depths[made] = 1 + max(self._depths.pop(part, 0) for part in parts)
+        if depth > CHAIN_LIMIT:
+            raise StepRefused(f"more than {CHAIN_LIMIT} conditions are joined", "write what is joined so far to a bit")
+        return made
 
     def number(self, value: int) -> Expr:
         return tree.Literal(self.start, self.end, "int", value, None, str(value))

@@ -7,6 +7,7 @@ from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.il import lowering
+from fbvm.syntax.ladder import context
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st import builder
 from fbvm.syntax.st.automaton import STACK_LIMIT
@@ -28,6 +29,22 @@ def test_an_expression_is_as_deep_as_it_may_be(head: str, part: str, tail: str, 
         patch.setattr(builder, "CHAIN_LIMIT", 20)
         assert codes(head + part * deepest + tail) == []
         assert codes(head + part * (deepest + 1) + tail) == ["S0106"]
+
+
+@each_of(("step", "deepest"), (
+    ("AND b", 18), ("OR b", 18), ("ANDNOT b", 18), ("NOT", 18), ("UP", 9), ("LD b\nLD c\nANDLD\nORLD", 17)))
+def test_a_rung_joins_as_many_conditions_as_it_may(step: str, deepest: int) -> None:
+    """The first and the last of what is allowed are the contact of LD and the coil."""
+
+    def said(count: int) -> list[str]:
+        steps = "\n".join(["LD a", *[step] * count, "OUT a"])
+        text = f"PROGRAM p\nVAR a, b, c : BOOL; END_VAR\nLADDER\n{steps}\nEND_LADDER\nEND_PROGRAM"
+        return [found.message for found in parse(Source("x", text))[1]]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(context, "CHAIN_LIMIT", 20)
+        assert said(deepest) == []
+        assert said(deepest + 1) == ["more than 20 conditions are joined"]
 
 
 def test_a_list_does_not_know_the_instances_of_the_pou_before() -> None:
