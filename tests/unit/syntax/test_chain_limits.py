@@ -32,7 +32,7 @@ def test_an_expression_is_as_deep_as_it_may_be(head: str, part: str, tail: str, 
 
 
 @each_of(("step", "deepest"), (
-    ("AND b", 18), ("OR b", 18), ("ANDNOT b", 18), ("NOT", 18), ("UP", 9), ("LD b\nLD c\nANDLD\nORLD", 17)))
+    ("AND b", 18), ("OR b", 18), ("ANDNOT b", 17), ("NOT", 18), ("UP", 9), ("LD b\nLD c\nANDLD\nORLD", 17)))
 def test_a_rung_joins_as_many_conditions_as_it_may(step: str, deepest: int) -> None:
     """The first and the last of what is allowed are the contact of LD and the coil."""
 
