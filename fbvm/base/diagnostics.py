@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 import re
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -45,8 +46,8 @@ class Source:
 
     def inside(self, surroundings: Surroundings) -> Source:
         """The same text with other namespaces around it: places in it are those of the whole text."""
-        made = Source(self.name, self.text, self.library, self.first_line, surroundings)
-        made.whole = self.whole
+        made = copy(self)
+        made.surroundings = surroundings
         return made
 
     @cached_property

@@ -184,15 +184,18 @@ def _result(method: Pou) -> Type | None:
 def all_methods(pou: Pou) -> dict[str, Pou]:
     """All methods that a POU has or promises, by key: its own, inherited ones, those of its interfaces."""
     found: dict[str, Pou] = {}
-    for parent in (*pou.interfaces, *((pou.base,) if pou.base is not None else ())):
-        found |= all_methods(parent)
-    return found | pou.methods
+    for each in [*pou.lineage()][::-1]:
+        if each.interfaces:
+            found = {key: method for parent in each.interfaces for key, method in all_methods(parent).items()} | found
+        found |= each.methods
+    return found
 
 
 def _unimplemented(pou: Pou) -> Iterator[Pou]:
     """The methods that a block inherits or promises, and that have no body in it."""
+    own = {key: method for each in [*pou.lineage()][::-1] for key, method in each.methods.items()}
     for key, method in all_methods(pou).items():
-        meant = pou.method(key) or method
+        meant = own.get(key) or pou.method(key) or method
         if meant.block is not None and (meant.block.kind == "INTERFACE" or "ABSTRACT" in meant.modifiers):
             yield meant
 

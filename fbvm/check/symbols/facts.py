@@ -215,10 +215,9 @@ class Pou:
 
     def method(self, key: str) -> Pou | None:
         """Its method of that key, its own or an inherited one; of an interface one of those that it extends."""
-        if key in self.methods:
-            return self.methods[key]
-        parents = self.interfaces if self.kind == "INTERFACE" else [self.base] if self.base is not None else []
-        return next((found for parent in parents if (found := parent.method(key)) is not None), None)
+        if self.kind != "INTERFACE" or key in self.methods:
+            return next((pou.methods[key] for pou in self.lineage() if key in pou.methods), None)
+        return next((found for parent in self.interfaces if (found := parent.method(key)) is not None), None)
 
     def action(self, name: str) -> Pou | None:
         """Its ACTION of that folded name, its own or an inherited one."""

@@ -36,6 +36,8 @@ class Namespaces:
         inner = made.surroundings
         assert inner is not None
         for level in inner.levels():
+            if level is source.surroundings:
+                break  # what is around it is declared
             if level.space:
                 self.declared.setdefault(fold(level.space), level.space)
         if any(word.text == "INTERNAL" for word in node.modifiers):

@@ -188,8 +188,20 @@ def of_far_jumps(count: int) -> str:
     return f"PROGRAM Main VAR n : INT; END_VAR\n{jumps}{''.join(f'l{at}: n := {at};' for at in range(count))}\nEND_PROGRAM\n"
 
 
+def of_bases(count: int) -> str:
+    """A block that extends one that extends another, each with a method of its own."""
+    parts = "".join(f"FUNCTION_BLOCK F{at + 1} EXTENDS F{at} METHOD M{at} : INT M{at} := 1; END_METHOD END_FUNCTION_BLOCK\n"
+                    for at in range(count))
+    return f"FUNCTION_BLOCK F0 END_FUNCTION_BLOCK\n{parts}PROGRAM Main VAR f : F{count}; END_VAR f(); END_PROGRAM\n"
+
+
+def of_namespaces(count: int) -> str:
+    """Namespaces inside one another, and a program beside them."""
+    return f"{'NAMESPACE a ' * count}{'END_NAMESPACE ' * count}\nPROGRAM Main END_PROGRAM\n"
+
+
 @pytest.mark.slow
-@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500), (of_far_jumps, 100)])
+@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500), (of_far_jumps, 100), (of_bases, 50), (of_namespaces, 500)])
 def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int) -> None:
     def took_s(count: int) -> float:
         text = made(count)
