@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,8 @@ class _Verbs(click.Group):
             except SystemExit as end:
                 if end.code != status.INTERRUPTED:
                     raise
-                say(ending.sentence(), err=True)
+                with suppress(OSError):  # the terminal may have gone
+                    say(ending.sentence(), err=True)
                 sys.exit(ending.exit_status())
 
     def _run(self, *arguments: Any, **options: Any) -> Any:
@@ -123,8 +125,11 @@ class _Verbs(click.Group):
             sys.exit(status.OUTPUT_CLOSED)
         except OSError as error:
             give_up_output()
+            if ending.by_other_than_ctrl_c():  # such as the end of its terminal, to which nothing can be written any more
+                sys.exit(ending.exit_status())
             said = f"{named(error.filename)} cannot be used" if error.filename else "the output cannot be written"
-            say(f"{said}: {reason(error)}", err=True)
+            with suppress(OSError):
+                say(f"{said}: {reason(error)}", err=True)
             sys.exit(status.USAGE)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:

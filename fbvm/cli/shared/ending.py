@@ -87,8 +87,9 @@ def _end_at_once(number: int, frame: FrameType | None) -> None:
     global _asked
     if not by_other_than_ctrl_c():  # else this Ctrl-C is another signal that was passed on
         _asked = signal.Signals(number)
-    sys.stderr.write(f"{sentence()}\n")
-    sys.stderr.flush()
+    with suppress(OSError):
+        sys.stderr.write(f"{sentence()}\n")
+        sys.stderr.flush()
     os._exit(exit_status())
 
 
@@ -125,7 +126,8 @@ def _exit_now(said: str = "") -> NoReturn:
 
     An ordinary end would be one by SIGINT if the KeyboardInterrupt has passed through an `exec`, whoever has caught it."""
     ignore((signal.SIGINT, *ending_signals()))
-    sys.stderr.write(said)
+    with suppress(OSError):
+        sys.stderr.write(said)
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):

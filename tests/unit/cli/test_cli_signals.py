@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import socket
 import subprocess
@@ -199,3 +201,25 @@ def test_sigterm_is_named_also_while_the_signals_are_being_taken_over_one_by_one
     with ending.heard(), handling([signal.SIGINT], ending._end_at_once):
         signal.raise_signal(signal.SIGTERM)
     assert (ended, capsys.readouterr().err) == ([143], "terminated\n")
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="the system has no SIGHUP")
+@pytest.mark.parametrize("interrupts", [True, False])
+def test_a_verb_whose_terminal_has_gone_ends_with_the_status_of_that(interrupts: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing can be written to it, neither what the verb prints at the end nor that it has gone."""
+    def gone(*_: object, **__: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    def hung_up(ctx: click.Context) -> None:
+        try:
+            signal.raise_signal(signal.SIGHUP)
+        finally:
+            if not interrupts:
+                gone()  # takes the place of the KeyboardInterrupt
+
+    monkeypatch.setattr(click.Group, "invoke", lambda self, ctx: hung_up(ctx))
+    monkeypatch.setattr("fbvm.cli.main.say", gone)
+    monkeypatch.setattr("fbvm.cli.main.give_up_output", lambda: None)
+    with pytest.raises(SystemExit) as end:
+        main.main(["list"])
+    assert end.value.code == 128 + signal.SIGHUP
