@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
-from rows import first_quick
+from rows import each_of, first_quick
 from test_many_scans import IMAGE
 from test_units_in_code import MS, Rig, image, way
 
 from fbvm import Plc
+from fbvm.base.areas import NEVER
 from fbvm.engine.native import engine as native
 from fbvm.machine.fast.paths import ProgramAlone
 from fbvm.machine.fast.units_in_code import WithUnits
@@ -66,6 +69,135 @@ def test_a_burst_is_its_scans_one_by_one(delays_ns: tuple[int, ...], latency_ns:
         scans += len(times)
     assert isinstance(way(fast), WithUnits if is_inside else ProgramAlone)
     assert scans > 80 and fast.plc.read("D20001") > 3  # type: ignore[operator]
+
+
+# --- the program alone, beside units and machine code that say what is asked of them ---------------------------------------
+
+
+class Units:
+    """The I/O refresh of one PLC, whose units are idle, want a scan at `unit_at_ns`, and are refreshed or skipped."""
+
+    def __init__(self, **state: Any) -> None:
+        self.units: list[Any] = []
+        self.watched: Any = []
+        self.idle, self.after, self.unit_at_ns = True, True, NEVER
+        self.skipped, self.changed_words, self.recorder = 0, False, None
+        self.told: list[Any] = []
+        vars(self).update(state)
+
+    def refresh(self, now_ns: int, journal: Any = None, seen: Any = None) -> bool:
+        self.told.append(("refresh", now_ns))
+        self.skipped = 0
+        return self.after
+
+    def is_idle(self, now_ns: int) -> bool:
+        return self.idle
+
+    def unit_ns(self, latest_ns: int) -> int:
+        return min(self.unit_at_ns, latest_ns)
+
+    def wake_ns(self, latest_ns: int) -> int:
+        return 0 if self.changed_words else self.unit_ns(latest_ns)
+
+
+def alone(units: Units, is_idle: bool = True, **answers: Any) -> ProgramAlone:
+    """A path whose machine code does the scans that it is asked for and ends at `point`, as far as `answers` say nothing else."""
+    def run(most: int, *asked: int) -> tuple[int, int]:
+        units.told.append(("run", most, *asked))
+        return answers.get("done", most), answers.get("point", 0)
+
+    def once(now_ns: int, budget: int) -> int:
+        units.told.append(("scan", now_ns, budget))
+        return int(answers.get("point", 0))
+
+    scans = SimpleNamespace(
+        run=run, once=once, changed=answers.get("changed", False), expect=None, parameters=SimpleNamespace(scan_budget=0),
+        load_times=lambda: units.told.append("times loaded"), store_times=lambda: units.told.append("times stored"))
+    machine: Any = SimpleNamespace(scans=lambda *given: scans, trap_at=lambda point: f"trap at {point}")
+    as_refresh: Any = units
+    path = ProgramAlone(as_refresh, machine, [])
+    path._idle = is_idle
+    return path
+
+
+@each_of(("is_idle", "units", "answers", "result", "told", "skipped"), [
+    (True, {}, {}, (5, None), [("run", 5, 120, 20, 70, 7)], 5),
+    (True, {"changed_words": True}, {}, (5, None), [("run", 5, 120, 20, 70, 7)], 5),
+    (False, {}, {}, (0, None), [], 0),
+    (True, {"idle": False}, {}, (0, None), [], 0),
+    (True, {"unit_at_ns": 160}, {}, (2, None), [("run", 2, 120, 20, 70, 7)], 2),
+    (True, {"unit_at_ns": 161}, {}, (3, None), [("run", 3, 120, 20, 70, 7)], 3),
+    (True, {"unit_at_ns": 121}, {}, (1, None), [("run", 1, 120, 20, 70, 7)], 1),
+    (True, {"unit_at_ns": 120}, {}, (0, None), [], 0),
+    (True, {"unit_at_ns": 100}, {}, (0, None), [], 0),
+    (True, {"skipped": 4}, {"done": 3, "point": 8}, (3, "trap at 8"), [("run", 5, 120, 20, 70, 7)], 6),
+    (True, {"skipped": 4}, {"done": 3, "changed": True, "point": 8}, (3, "trap at 8"), [("run", 5, 120, 20, 70, 7)], 6),
+    (True, {}, {"done": 3, "changed": True}, (3, None), [("run", 5, 120, 20, 70, 7), ("refresh", 160)], 0),
+])
+def test_many_scans_end_before_a_unit_wants_one(is_idle: bool, units: dict[str, Any], answers: dict[str, Any], result: Any,
+                                                told: list[Any], skipped: int) -> None:  # fmt: skip
+    io = Units(**units)
+    assert alone(io, is_idle, **answers).many(5, 100, 20, 70, 7) == result
+    assert (io.told, io.skipped, io.changed_words) == (told, skipped, False)
+
+
+def test_who_records_is_told_before_many_scans() -> None:
+    io = Units()
+    io.recorder = SimpleNamespace(before=lambda now_ns: io.told.append(("before", now_ns)))
+    assert alone(io).many(2, 100, 20, 70, 7) == (2, None)
+    assert io.told == [("before", 120), ("run", 2, 120, 20, 70, 7)]
+
+
+@each_of(("is_idle", "units", "answers", "trap", "refreshed", "skipped"), [
+    (True, {}, {}, None, False, 1), (False, {}, {}, None, True, 0), (True, {"idle": False}, {}, None, True, 0),
+    (True, {}, {"changed": True}, None, True, 0), (True, {}, {"point": 8}, "trap at 8", False, 0),
+])
+def test_a_refresh_is_left_out_where_it_would_change_nothing(is_idle: bool, units: dict[str, Any], answers: dict[str, Any],
+                                                             trap: Any, refreshed: bool, skipped: int) -> None:  # fmt: skip
+    io = Units(changed_words=True, **units)
+    assert alone(io, is_idle, **answers).once(100, 70) == trap
+    assert (io.told, io.skipped) == ([("scan", 100, 70), *[("refresh", 100)] * refreshed], skipped)
+    assert io.changed_words == (refreshed or trap is not None)
+
+
+@each_of(("units", "answers", "most", "times", "trap", "told"), [
+    ({}, {}, 3, [11], None, [("scan", 11, 70)]),
+    ({"unit_at_ns": 11}, {}, 3, [11, 12, 13], None, [("scan", 11, 70), ("scan", 12, 70), ("scan", 13, 70)]),
+    ({"unit_at_ns": 12}, {}, 3, [11], None, [("scan", 11, 70)]),
+    ({"skipped": 2}, {}, 1, [11], None, [("scan", 11, 70)]),
+    ({"skipped": 2, "idle": False}, {}, 1, [11], None, [("1 skipped", 11), ("scan", 11, 70), ("0 skipped", 11)]),
+    ({"idle": False, "changed_words": True}, {}, 2, [11, 12], None,
+     [("scan", 11, 70), ("0 skipped", 11), ("scan", 12, 70), ("0 skipped", 12)]),
+    ({"idle": False, "changed_words": True}, {"point": 8}, 2, [11], "trap at 8", [("scan", 11, 70)]),
+])
+def test_a_burst_goes_on_while_units_have_changed_words(units: dict[str, Any], answers: dict[str, Any], most: int,
+                                                        times: list[int], trap: Any, told: list[Any]) -> None:  # fmt: skip
+    """The refresh that was left out last is done first: those before it alone count as skipped."""
+    io, ticks, seen = Units(**units), iter(range(11, 20)), list[int]()
+    path = alone(io, **answers)
+
+    def refresh(now_ns: int, journal: Any = None) -> None:
+        io.told.append((f"{io.skipped} skipped", now_ns))
+        io.skipped = 0
+
+    path.refresh = refresh  # type: ignore[method-assign]
+    clock: Any = SimpleNamespace(now=lambda: next(ticks))
+    assert path.burst(seen, most, 5, clock, 70) == trap
+    assert (seen, io.told) == (times, told)
+
+
+@each_of(("is_idle", "idle"), [(True, True), (True, False), (False, True), (False, False)])
+def test_only_a_plc_with_nothing_to_do_enters_a_batch(is_idle: bool, idle: bool) -> None:
+    io = Units(idle=idle, unit_at_ns=500)
+    path = alone(io, is_idle)
+    entered = path.enter_batch(100, 70)
+    if is_idle and idle:
+        assert entered == (path._scans, 500) and path._scans.parameters.scan_budget == 70 and io.told == ["times loaded"]
+    else:
+        assert (entered, io.told) == (None, [])
+    io.skipped, io.changed_words = 4, True
+    path.leave_batch(3)
+    assert (io.told[-1], io.skipped, io.changed_words) == ("times stored", 7, False)
 
 
 def test_the_page_names_tests_that_there_are() -> None:
