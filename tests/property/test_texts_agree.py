@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from datetime import date, timedelta
 from functools import cache
 from typing import Any
 
@@ -17,7 +18,7 @@ from rows import each_of
 from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import Undefined, single
 from fbvm.base.memory import STRUCTS
-from fbvm.base.types import ELEMENTARY, SHORT_NAMES
+from fbvm.base.types import DAY_NS, ELEMENTARY, SHORT_NAMES
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.library import literals, reading, routines
 from fbvm.syntax.st import texts
@@ -97,7 +98,9 @@ MORE = """
     1970-01-01-24:00 1970-02-30-00:00 -00:00 2262-04-11-23:47:16.854775806 1677-09-22-00:00:00 DT# 9999-01-01-00:00
     1970-01-01-10:3 9999-01-01-10 9999-01-01-10: 1111111111111111111s 0.555555555555555555555555555555
     9223372036854775808us 18446744073709551615us 9223372036854775809s 1d9223372036854775808ns
-    18446744073709551615ns 1s9223372036854775807ns
+    18446744073709551615ns 1s9223372036854775807ns -1us9223372036854774808ns -1us9223372036854774809ns 1us9223372036854774807ns
+    1us9223372036854774808ns 1us9223372036854774809ns -9223372036854775.808us -9223372036854775.809us -9223372036854775.810us
+    9223372036854775.807us 9223372036854775.808us 9223372036854775.809us
     BOOL INT REAL LREAL TIME LTIME DATE LDATE TOD LTOD DT LDT STRING TIME_OF_DAY DATE_AND_TIME T 1T
 """
 SEEDS += [*MORE.split(), "CHAR#'a'", "WSTRING#\"a\"", "a" * 401, "0" * 401]
@@ -200,6 +203,15 @@ def test_values_are_written_by_the_routine_itself(data_type: str) -> None:
         if OUT.raw[:length] != texts.to_text(data_type, value):
             differing.append((value, OUT.raw[:length]))
     assert differing == []
+
+
+@each_of("year", [1700, 1900, 1968, 1969, 1970, 1999, 2000, 2001, 2100, 2260])
+def test_the_first_and_the_last_day_of_each_month_are_written_by_the_routine_itself(year: int) -> None:
+    first = [date(year, month, 1) for month in range(1, 13)]
+    for day in [*first, *(day - timedelta(1) for day in first)]:
+        for behind in (0, DAY_NS - 1):
+            length = routines.put_ldate(ctypes.addressof(OUT), (day - date(1970, 1, 1)).days * DAY_NS + behind)
+            assert OUT.raw[:length].decode() == f"LD#{day}", (day, behind)
 
 
 @pytest.mark.slow

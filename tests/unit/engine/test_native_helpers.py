@@ -52,6 +52,16 @@ def test_the_helper_process_answers_each_job_until_they_end(done: list[str], lar
     assert done == ["gives way", *["searches less"] * large, "one at 2", "wrong at 2", "three at 2"]
 
 
+def test_the_helper_process_keeps_no_answer_back(done: list[str]) -> None:
+    """The one who asked waits for each answer before the next job."""
+    class Kept(io.BytesIO):
+        def flush(self) -> None:
+            done.append(f"{len(self.getvalue())} bytes")
+
+    worker.serve(io.BytesIO(job("one") + job("wrong")), Kept())
+    assert done == ["gives way", "one at 2", "11 bytes", "wrong at 2", "19 bytes"]
+
+
 def test_a_process_for_one_module_answers_that(done: list[str]) -> None:
     answer = io.BytesIO()
     worker.serve_one(io.BytesIO(b"one"), answer, 1)
@@ -115,7 +125,7 @@ def test_a_damaged_object_is_none(tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(("digits", "size", "found", "value"), [
     ("5", 1000, GOOD, 500), ("250", 1000, GOOD, 250), ("1_25", 1000, GOOD, 125), ("000", 1000, GOOD, 0), ("", 1000, GOOD, 0),
     ("0001", 1000, OUTSIDE, 0), ("123456789", 10**9, GOOD, 123456789), ("1" * 16, 10**16, GOOD, int("1" * 16)),
-    ("1" * 17, 10**17, OUTSIDE, 0),
+    ("1" * 17, 10**17, OUTSIDE, 0), ("5" + "0" * 20, 1000, GOOD, 500), ("25_0" + "_0" * 20, 1000, GOOD, 250),
 ])
 def test_a_fraction_of_a_unit(digits: str, size: int, found: int, value: int) -> None:
     out, text = data(bytes(8) + b"out"), digits.encode() + b"."
