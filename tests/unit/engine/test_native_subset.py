@@ -104,7 +104,7 @@ def test_a_part_calls_only_parts_before_it() -> None:
 
 
 WIDE = ["", "a", "ab", "a\xe9", "a\u20acb", "\U0001f600", "a\U0001f600b\U0001f600", "\ud83d", "\ud83dx", "\ude00\ud83d",
-        "\ud83d\ud83d\ude00", "b"]
+        "\ud83d\ud83d\ude00", "\udbff\udfff", "b"]
 
 
 def at(content: bytes) -> int:
@@ -142,8 +142,8 @@ def test_texts_are_ordered_by_their_codes(width: int) -> None:
 
 
 def test_characters_are_made_wide_and_narrow() -> None:
-    out = at(bytes(16))
-    assert routines.widen(out, at(b"a\xe9"), 2) == 2 and ctypes.string_at(out, 5) == b"a\0\xe9\0\0"
+    wide = at(b".....")
+    assert routines.widen(wide, at(b"a\xe9"), 2) == 2 and ctypes.string_at(wide, 5) == b"a\0\xe9\0."
     narrow = at(b"....")
     assert routines.narrow(narrow, at("a\u20ac\xe9".encode("utf-16-le")), 3) == 3
     assert ctypes.string_at(narrow, 4) == b"a?\xe9."
@@ -177,6 +177,16 @@ def found(routine: Any, text: bytes, wanted: bytes, width: int) -> int:
 def expected(text: bytes, wanted: bytes, width: int) -> int:
     form = {1: "latin-1", 2: "utf-16-le"}[width]
     return text.decode(form).find(wanted.decode(form)) + 1 if wanted else 0
+
+
+@each_of(("text", "wanted", "place"), [
+    (b"ababbaabba", b"aabba", 6), (b"ababaab", b"aab", 5), (b"bbaaaba", b"aba", 5), (b"baa", b"a", 2), (b"baa", b"", 0),
+    (b"", b"a", 0), (b"a", b"a", 1), (b"ab", b"aba", 0), (b"abc", b"c", 3),
+])
+def test_a_search_leaves_no_place_out(text: bytes, wanted: bytes, place: int) -> None:
+    assert found(routines.text_find, text, wanted, 1) == place
+    wide = [one.decode().encode("utf-16-le") for one in (text, wanted)]
+    assert found(routines.text_find, *wide, 2) == place
 
 
 @pytest.mark.slow
