@@ -6,6 +6,7 @@ import json
 
 import pytest
 from browsers import HOST, PORT, TOKEN, Page, answered, connected, frame, request, said
+from rows import each_of
 
 from fbvm.live.connection import MOST_REQUEST_BYTES, Connection
 from fbvm.live.guard import Guard
@@ -45,6 +46,39 @@ def test_with_bind_to_all_a_name_gets_nothing_all_the_same(name: str) -> None:
                                    f"?token={TOKEN}&token=x", "?token=%FF%FE", "?token=é"])  # fmt: skip
 def test_without_the_token_there_is_no_socket(query: str) -> None:
     assert answered(request(f"/live{query}".encode("ascii", "replace").decode()))[0] == 403
+
+
+OWN = f"http://{HOST}"
+SOCKET = f"/live?token={TOKEN}"
+NO_HOST, OTHER_SITE = "this server answers to the address", "another site's page"
+NO_TOKEN = "the token is missing or wrong"
+
+
+@each_of(("bind", "name", "is_own"), (
+    *(("127.0.0.1", name, True) for name in ("127.0.0.1", "localhost", "LocalHost", "[::1]")),
+    *(("127.0.0.1", name, False) for name in ("", "0.0.0.0", "192.168.1.7", "::1", "localhost.")),
+    *(("192.168.1.7", name, True) for name in ("192.168.1.7", "localhost")), ("192.168.1.7", "192.168.1.8", False),
+    *(("0.0.0.0", name, True) for name in ("0.0.0.0", "localhost", "1.2.3.4", "255.255.255.255")),
+    *(("0.0.0.0", name, False) for name in ("1.2.3", "1.2.3.4.5", "1.2.3.", "1.2.3.256", "256.2.3.4", "1.2.3.0004", "1.2.3.a",
+                                            "1.2.3.-4", "1.2.3.²", "1.2.3.٤", "1.2.3. 4"))))  # fmt: skip
+def test_a_server_knows_its_own_names_and_if_it_is_open_any_ipv4_address(bind: str, name: str, is_own: bool) -> None:
+    refused = Guard(PORT, bind, TOKEN).refusal("/", [f"{name}:{PORT}"], [])
+    assert (refused is None) == is_own
+    assert Guard(PORT, bind, TOKEN).refusal("/", [f"{name}:{PORT + 1}"], []) is not None
+
+
+@each_of(("path", "hosts", "origins", "status", "said"), (
+    ("/", [HOST], [], None, ""), ("/", [HOST], [OWN], None, ""), ("/", [HOST], [OWN, OWN], None, ""),
+    ("/live.js?token=x", [HOST], [], None, ""), ("/", [HOST], ["null"], 403, OTHER_SITE),
+    ("/", [HOST], [OWN, "http://evil.example"], 403, OTHER_SITE), ("/", [], [], 421, NO_HOST),
+    ("/", [HOST, HOST], [], 421, NO_HOST),
+    (SOCKET, [HOST], [OWN], None, ""), (SOCKET, [HOST], [], None, ""), (SOCKET, [HOST], [OWN, OWN], 403, OTHER_SITE),
+    (SOCKET, ["localhost"], [OWN], 421, NO_HOST), (SOCKET, [f"localhost:{PORT}"], [OWN], 403, OTHER_SITE),
+    ("/live", [HOST], [OWN], 403, NO_TOKEN), (f"{SOCKET}&token={TOKEN}", [HOST], [OWN], 403, NO_TOKEN),
+    (f"/live?a=1&token={TOKEN}", [HOST], [OWN], None, "")))
+def test_why_a_request_is_refused(path: str, hosts: list[str], origins: list[str], status: int | None, said: str) -> None:
+    refused = Guard(PORT, token=TOKEN).refusal(path, hosts, origins)
+    assert (refused and refused[0], said in (refused[1] if refused else "")) == (status, True)
 
 
 def test_a_query_of_more_fields_than_a_page_sends_has_no_token() -> None:
