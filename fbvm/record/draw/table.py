@@ -136,7 +136,6 @@ class ScanTable:
         elif isinstance(event, Return):
             self._reads.pop(event.frame, None)
         elif isinstance(event, Cut):
-            self._finish(plc)
             self._cut_scans.add(plc.scans)
         elif isinstance(event, Write) and self._names.at(event.offset) is None:
             self._nameless[event.offset] = dict(islice(self._reads.get(event.frame, {}).items(), MOST_READS))

@@ -209,7 +209,6 @@ class Window:
         if scan < self.shown_from:
             self._lead_in += 1
             if self._lead_in > MOST_IN_SCAN:
-                self._lead_in = 0
                 raise TooManyRows(scan)
             return
         if scan not in self.rows:
