@@ -122,6 +122,10 @@ def test_the_scans_in_which_a_variable_may_have_changed_end_where_it_did() -> No
     assert isinstance(early, Place) and isinstance(late, Place)
     assert source.may_change([early], range(60)) == range(28), "the stretch with scan 4; in the 32 behind it nothing changed"
     assert source.may_change([early], range(5, 60)) == range(5, 5) == source.may_change([late], range(5, 60))
+    lamp, other = (source.find(f"CIO 100.0{bit}") for bit in (3, 4))
+    assert isinstance(lamp, Place) and isinstance(other, Place)
+    assert source.may_change([lamp], range(60)) == range(0), "only the bit beside it changed"
+    assert source.may_change([lamp, other], range(60)) == range(60)
 
 
 @pytest.mark.slow
