@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import shutil
+import tempfile
 from pathlib import Path
 
 import pytest
 
 from fbvm import Plc, Recording, RecordingWriter, compile_text
+from fbvm.code.image import Image
 from fbvm.record.recording import library_texts as module
 from fbvm.record.recording.file_reader import RecordingFile
 from fbvm.record.recording.file_scans import FileScans
@@ -22,8 +24,9 @@ CONSTANTS = "VAR_GLOBAL CONSTANT Step : INT := 3; END_VAR\n"
 
 
 @pytest.fixture
-def own(tmp_path: Path) -> Path:
-    """A folder with one library."""
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with one library; no image of a program with it is known from other runs."""
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "cache"))
     folder = tmp_path / "own" / "acme" / "sums"
     folder.mkdir(parents=True)
     (folder / "library.toml").write_text('globals = ["Constants.st"]\n', encoding="utf-8")
@@ -46,14 +49,24 @@ def recorded(own: Path) -> bytes:
 
 
 @pytest.mark.slow
-def test_a_recording_opens_where_the_libraries_are_not(own: Path) -> None:
+def test_a_recording_opens_where_the_libraries_are_not(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written = recorded(own)
     shutil.rmtree(own)
-    for _ in range(2):  # the second time from the cache
+    for temporary in (None, str(own / "nowhere")):  # the second time from the cache, with no library written out
+        monkeypatch.setattr(tempfile, "tempdir", temporary)
         source = FileScans(RecordingFile(io.BytesIO(written))["pump"])
         assert [source.at(scan).read("Main.n") for scan in (0, 1, 9)] == [3, 9, 3069]
         assert source.warning == ""
         assert source.texts["acme/sums/Doubled.st"] == DOUBLED
+
+
+def test_libraries_that_cannot_be_written_are_a_reason(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = ProgramText((("text.st", PROGRAM),), (str(own),), library_texts([own]))
+    monkeypatch.setattr(tempfile, "tempdir", str(own / "nowhere"))
+    found = program.compiled()
+    assert isinstance(found, str)
+    assert found.startswith("the libraries that it holds cannot be written to a temporary folder: ")
+    assert isinstance(program.compiled([own]), Image), "a folder that is named takes their place"
 
 
 def test_what_has_been_changed_since_is_not_looked_at(own: Path) -> None:
