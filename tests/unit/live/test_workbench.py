@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 from typing import Any
 
@@ -141,6 +142,31 @@ def test_the_present_is_gone_on_with_from_the_past(page: Page) -> None:
     assert page.ask("branch", plc="pump")["error"].startswith("the past of these PLCs cannot be done again")
     page.done("step", scans=1)
     assert page.update()["state"] == "run" and page.control.steps == 1
+
+
+@each_of(("do", "fields", "state"), (
+    ("run", {}, "run"), ("step", {"scans": 1}, "run"), ("statement", {"plc": "pump"}, "run"), ("view", {"plc": "pump"}, "run")))
+def test_who_leaves_the_past_is_shown_all_of_the_present_at_once(do: str, fields: dict[str, Any], state: str) -> None:
+    page = opened()
+    page.done("look", plc="pump", names=["Main.Level"])
+    page.scan(10)
+    page.done("view", plc="pump", scan=9)
+    seen = page.update()
+    assert (seen["state"], seen["scan"], seen["values"]) == ("past", 9, {"Main.Level": "30"})
+    page.done(do, **fields)
+    text = page.session.update(page.now_ns)
+    assert text is not None
+    found = json.loads(text)["update"]
+    assert (found["state"], found["scan"], found["values"]) == (state, 9, {"Main.Level": "30"})
+
+
+def test_who_sees_the_present_and_goes_on_is_told_what_has_changed_and_in_time(page: Page) -> None:
+    page.done("look", plc="pump", names=["Main.Level"])
+    page.scan(10)
+    page.update()
+    page.done("run")
+    assert page.session.update(page.now_ns) is None
+    assert "values" not in page.update()
 
 
 def test_the_instances_of_a_program_are_listed_from_outside_inwards() -> None:
