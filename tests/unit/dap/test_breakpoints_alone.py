@@ -8,7 +8,7 @@ from typing import Any
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
-from fbvm.dap.breakpoints import BreakpointRequests, Wanted
+from fbvm.dap.breakpoints import BreakpointRequests, Wanted, _codes
 from fbvm.machine.breakpoints import Breakpoint
 from fbvm.machine.plc import Plc
 from fbvm.step.facts import ProgramFacts
@@ -108,3 +108,17 @@ def test_a_step_of_a_chart_is_a_condition_of_the_first_instance(name: str, when:
     debugged.plc = lambda name: SimpleNamespace(facts=facts)  # type: ignore[method-assign]
     made = BreakpointRequests(debugged)._function("one", name, when, "3")  # type: ignore[arg-type]
     assert (made.kind, made.where, made.when, made.hits) == (*row, "3")
+
+
+@each_of(("condition", "codes"), [
+    ("", set()), ("  ", set()), ("2", {2}), (" 16#0302 ", {0x302}), ("code = 2", {2}), ("Code=2, 3,16#10", {2, 3, 16}),
+    ("= 7", {7}), ("0", {0}),
+    *((text, None) for text in ("x", "TRUE", "1.5", "2,", "code", "codes = 2", "2 = code", "'2'"))])  # fmt: skip
+def test_the_condition_of_a_filter_names_codes(condition: str, codes: set[int] | None) -> None:
+    debugged = Debugged()
+    debugged.running.plcs = {}
+    made = BreakpointRequests(debugged)  # type: ignore[arg-type]
+    (answer,) = made.set_exceptions({"filterOptions": [{"filterId": "modbus", "condition": condition}]})["breakpoints"]
+    assert (answer["verified"], made.is_on("modbus")) == (codes is not None, codes is not None), answer
+    if codes is not None:
+        assert _codes(condition) == codes
