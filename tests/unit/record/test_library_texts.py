@@ -103,6 +103,36 @@ def test_a_file_cannot_have_others_written(path: str) -> None:
         LibraryTexts.of(["own", [[path, DOUBLED]]])
 
 
+def test_a_path_has_sixteen_parts_at_most() -> None:
+    for parts, is_held in ((1, True), (15, True), (16, True), (17, False)):
+        data = ["own", [["/".join(["a"] * (parts - 1) + ["b.st"]), DOUBLED]]]
+        if is_held:
+            assert LibraryTexts.of(data).as_data() == ["own", ((data[1][0][0], DOUBLED),)]
+        else:
+            with pytest.raises(ValueError, match=r"^'a/a/.*/b\.st' is no file of a library$"):
+                LibraryTexts.of(data)
+
+
+def test_libraries_are_held_in_their_order_up_to_a_size_and_with_names_that_every_system_takes(
+        own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = tmp_path / "more" / "own"
+    (other / "b" / "c").mkdir(parents=True)
+    for path, text in (("b/c/Z.st", "z"), ("b/Y.toml", "yy"), ("A.st", "aaa"), ("X.ST", "no source")):
+        (other / path).write_text(text, encoding="utf-8")
+    (other / "Odd.st").write_bytes(b"\x00\xff\xfe\x00")
+    both = library_texts([other, own])
+    assert [held.name for held in both] == ["own", "own"]
+    assert both[0].files == (("A.st", "aaa"), ("b/Y.toml", "yy"), ("b/c/Z.st", "z"))
+    with unpacked(both) as folders:
+        assert library_texts(folders) == both and len(set(folders)) == 2
+    for most, found in ((6, 1), (5, 0)):
+        monkeypatch.setattr(module, "MOST_CHARACTERS", most)
+        assert len(library_texts([other])) == found
+    monkeypatch.undo()
+    (other / "b" / "|.st").write_text("x", encoding="utf-8")
+    assert library_texts([other]) == ()
+
+
 @pytest.mark.parametrize("name", ["..", ".", "", "a/b", "C:"])
 def test_the_name_of_a_folder_leads_nowhere(name: str) -> None:
     with pytest.raises(ValueError, match=r"is no file of a library|sources and their descriptions only"):
