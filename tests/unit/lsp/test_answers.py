@@ -154,6 +154,7 @@ def test_a_call_shows_its_pins_and_what_its_block_says(folder: Path) -> None:
     async def about(desk: Desk) -> None:
         pump = await desk.at("signatureHelp", "main.st", 2, 21)
         assert pump["signatures"] == [{"label": "Pump(Level := INT, Runs => BOOL)", "activeParameter": 0,
+                                       "documentation": "moves water",
                                        "parameters": [{"label": "Level := INT"}, {"label": "Runs => BOOL"}]}]
         ton = await desk.at("signatureHelp", "main.st", 4, 25)
         assert (ton["activeSignature"], ton["activeParameter"]) == (0, 1)
