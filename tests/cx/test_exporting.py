@@ -119,17 +119,33 @@ def test_a_new_symbol_has_as_many_fields_as_the_format_of_its_file(version: str,
     assert f"+    {row};" in difference(cxt, made)
 
 
+ANEW = "save the project anew"
+
+
 @pytest.mark.slow
-def test_what_has_no_place_is_refused_and_nothing_is_written() -> None:
-    for old, new, words in (
-            ("PROGRAM NewProgram1", "PROGRAM Other", "no program Other"), ("SECTION END", "SECTION Last", "no section Last"),
-            ("FBCALL  DOUBLE Dbl1 X:=D100 Y=>D101", "FBCALL  DOUBLE Dbl1 X:=D200 Y=>D101", "stored as cells"),
-            ("++(590) Runs", "++(590) X", "function blocks are not written"), ("// start button", "// кнопка", "cp1252"),
-            ("Helper : BOOL", "Helper : TON", "no type TON")):  # fmt: skip
-        made = exported(SAMPLE, (old, new))
-        assert made.data is None, words
-        assert all((d.code, d.end - d.start) in (("X0402", 1), ("X0402", 0)) for d in made.diagnostics)
-        assert any(words in d.message for d in made.diagnostics), [d.message for d in made.diagnostics]
+@each_of(("old", "new", "file", "place", "message", "hint"), [
+    ("PROGRAM NewProgram1", "PROGRAM Other", "NewProgram1.st", (1, 9, "O"),
+     "the project that was saved has no program Other", f"insert it in CX-Programmer, and {ANEW}"),
+    ("SECTION END", "SECTION Last", "NewProgram1.st", (1, 9, "N"),
+     "program NewProgram1 has no section Last in the project that was saved", f"insert it in CX-Programmer, and {ANEW}"),
+    ("FBCALL  DOUBLE Dbl1 X:=D100 Y=>D101", "FBCALL  DOUBLE Dbl1 X:=D200 Y=>D101", "NewProgram1.st", (18, 5, "R"),
+     "a rung that calls a function block is stored as cells, not written",
+     "leave the rung as it was saved, and change it in CX-Programmer"),
+    ("++(590) Runs", "++(590) X", "DOUBLE.st", (1, 1, "F"),
+     "DOUBLE differs from what was saved, and function blocks are not written", ""),
+    ("FUNCTION_BLOCK DOUBLE", "FUNCTION_BLOCK TRIPLE", "DOUBLE.st", (1, 1, "F"),
+     "the project that was saved has no TRIPLE", f"make the function block in CX-Programmer, and {ANEW}"),
+    ("// start button", "// кнопка", "globals.st", (1, 1, ""),
+     "the character '\\u043a' is not in cp1252, the code page of the project", "write the comment in letters of that code page"),
+    ("Helper : BOOL", "Helper : TON", "NewProgram1.st", (6, 5, "H"),
+     "symbol of NewProgram1 Helper: a table of symbols has no type TON; instances are made in CX-Programmer", "")])
+def test_what_has_no_place_is_refused_and_nothing_is_written(old: str, new: str, file: str, place: tuple[int, int, str],
+                                                             message: str, hint: str) -> None:
+    made = exported(SAMPLE, (old, new))
+    assert (made.data, made.changed) == (None, [])
+    said, = made.diagnostics
+    assert (said.code, said.source.name, said.message, said.hint) == ("X0402", file, message, hint)
+    assert (said.line, said.column, said.source.text[said.start : said.end]) == place
 
 
 @pytest.mark.slow

@@ -296,6 +296,44 @@ def test_a_selection_of_beremiz_is_tested_in_the_order_in_which_its_generator_me
     assert states(import_xml(document(FORKED), order=order), "x y", ["", "go=1"]) == seen
 
 
+FIRST_RIGHT, FIRST_LEFT = "1 0", "0 1"
+
+
+@each_of(("joins", "seen"), [
+    (node("selectionConvergence", 9, "7 8"), FIRST_RIGHT), (node("selectionConvergence", 9, "8 7"), FIRST_LEFT),
+    (node("selectionConvergence", 9, "12 7") + node("simultaneousConvergence", 12, "8"), FIRST_RIGHT),
+    (node("selectionConvergence", 9, "12 7") + node("selectionDivergence", 12, "13") + node("simultaneousDivergence", 13, "8"),
+     FIRST_RIGHT),
+    (node("selectionConvergence", 9, "12 13") + node("selectionConvergence", 12, "8") + node("selectionConvergence", 13, "7"),
+     FIRST_LEFT),
+    (node("selectionConvergence", 9, "9 8 7"), FIRST_LEFT), (node("selectionConvergence", 9, "99 8 7"), FIRST_LEFT)])
+def test_the_generator_of_beremiz_goes_along_the_wires_of_a_convergence_as_they_are_listed(joins: str, seen: str) -> None:
+    text = FORKED.replace(node("selectionConvergence", 9, "7 8"), joins)
+    assert states(import_xml(document(text), order="document"), "x y", ["", "go=1"]) == ["0 0", seen]
+
+
+@each_of(("first", "seen"), [
+    ("", FIRST_RIGHT), (jump(10, "8", "s"), FIRST_LEFT), (jump(10, "7", "s"), FIRST_RIGHT),
+    (transition(8, "6", inline("back")), FIRST_LEFT), (step(6, "left", "5"), FIRST_LEFT),
+    (node("selectionDivergence", 2, "1"), FIRST_RIGHT)])
+def test_the_generator_of_beremiz_begins_with_what_is_written_first(first: str, seen: str) -> None:
+    parts = [step(1, "s", first=True), node("selectionDivergence", 2, "1"), transition(3, "2", inline("go")),
+             step(4, "right", "3"), transition(5, "2", inline("go")), step(6, "left", "5"), transition(7, "4", inline("back")),
+             transition(8, "6", inline("back")), jump(9, "7", "s"), jump(10, "8", "s"),
+             actions(11, "4", does("x")), actions(12, "6", does("y"))]
+    text = pou(first + "".join(part for part in parts if part != first), "go back x y", language="SFC")
+    assert states(import_xml(document(text), order="document"), "x y", ["", "go=1"]) == ["0 0", seen]
+
+
+def test_a_function_with_en_in_front_of_a_transition_keeps_its_result_while_en_is_off() -> None:
+    made = chart(step(1, "s", first=True), transition(2, "1", wires("5.OUT")), step(3, "e", "2"), actions(4, "3", does("x")),
+                 transition(9, "3", inline("back")), jump(10, "9", "s"), value(6, "n"), value(7, "INT#1"), value(8, "on"),
+                 block(5, "GT", "EN=8 IN1=6 IN2=7", "ENO,OUT"), declared=f"{''.join(map(variable, ('x', 'on', 'back')))}"
+                 + variable("n", "INT"))
+    assert made.errors == []
+    assert states(made, "x", ["n=2", "on=1", "on=0 n=-3", "back=1", ""]) == ["0", "1", "1", "0", "1"]
+
+
 @each_of(("order", "found"), [("document", ["X0292"]), ("network", ["X0203"])])
 def test_a_transition_that_no_step_leads_to_is_left_out_as_beremiz_does(order: str, found: list[str]) -> None:
     text = pou(step(1, "s", first=True) + transition(2, "1", inline("go")) + step(3, "t", "2") + actions(4, "3", does("x"))

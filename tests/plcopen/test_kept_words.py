@@ -245,3 +245,14 @@ def test_pragmas_and_addresses_that_are_lost_are_warnings() -> None:
     assert [(found.code, found.severity) for found in made.diagnostics] == [("X0390", "warning")] * 2
     inside = export_xml([Source("Main.st", text.replace("VAR a", "VAR {info 'here'} a", 1))])
     assert [(found.code, found.severity) for found in inside.diagnostics] == [("X0190", "warning")] + [("X0390", "warning")] * 2
+
+
+@each_of(("pragma", "code"), [
+    ("info 'here'", "X0190"), (" region Pumps ", "X0190"), ("attribute 'hide'", "X0190"), ("", "X0190"),
+    ("attribute 'qualified_only'", "X0301"), ("ATTRIBUTE 'Pack_Mode' := '1'", "X0301"), ("attribute 'pack_mode' := '3'", "X0301"),
+    ("attribute 'odd'", "X0301"), ("odd", "X0301"), ("?", "X0301")])
+def test_a_pragma_that_is_lost_is_an_error_if_it_changes_what_the_program_does(pragma: str, code: str) -> None:
+    text = f"PROGRAM Main VAR a : BOOL; END_VAR {{{pragma}}} VAR b : BOOL; END_VAR a := b; END_PROGRAM"
+    found, = export_xml([Source("Main.st", text)]).diagnostics
+    assert (found.code, text[found.start : found.end], found.message) == \
+        (code, f"{{{pragma}}}", f"the pragma {{{pragma.strip()}}} is not exported")

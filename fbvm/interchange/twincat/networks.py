@@ -180,9 +180,10 @@ class _Network:
         """Both of two values."""
         if not power or not behind:
             return power or behind
-        pins = [_variable(tree, name, 0) for name in ("IN1", "IN2")]
-        for pin, feeds in zip(pins, (power, behind), strict=True):
-            pin.content.append(self._point(tree, feeds))
+        pins = []
+        for name, feeds in (("IN1", power), ("IN2", behind)):
+            pins.append(_variable(tree, name, 0))
+            pins[-1].content.append(self._point(tree, feeds))
         return ((self._add("block", tree, {"typeName": "AND"}, pins_of("inputVariables", tree, pins),
                            pins_of("outputVariables", tree, [_variable(tree, "OUT", 0)])), "OUT"),)
 

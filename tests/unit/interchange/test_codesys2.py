@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from codesys2_files import EXPORT, LIBRARY
+from codesys2_files import EXPORT, LIBRARY, binary_object
 from growth import least_s
 from rows import each_of
 
-from fbvm.base.diagnostics import Source
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.codesys2.importing import import_codesys2, read_export
@@ -67,10 +67,34 @@ def test_a_library_is_read_and_found_by_name(tmp_path: Path) -> None:
     assert (plc.read("Main.n"), plc.read("Main.top"), plc.read("Main.t.m")) == (5, 5, 10)
 
 
-def test_a_project_whose_programs_are_diagrams_says_so(tmp_path: Path) -> None:
-    made = import_codesys2(LIBRARY, "own.pro")
-    assert [error.message for error in made.errors] == \
-        ["the body of PROGRAM Demo is a diagram, which is not read from own.pro"]
+NO_TEXT = "open the project in CODESYS 3 and export it as PLCopen XML"
+
+
+@each_of(("name", "declared", "code", "message", "hint"), [
+    ("own.pro", "PROGRAM P", "X0203", "the body of PROGRAM P is a diagram, which is not read from own.pro", NO_TEXT),
+    ("a.lib", "FUNCTION_BLOCK P", "X0203", "the body of FUNCTION_BLOCK P is a diagram, which is not read from a.lib", NO_TEXT),
+    ("a.lib", "FUNCTIONBLOCK P", "X0203", "the body of FUNCTION_BLOCK P is a diagram, which is not read from a.lib", NO_TEXT),
+    ("own.lib", "PROGRAM P", "X0190", "the PROGRAM P of the library is a diagram and is left out", ""),
+    ("OWN.LIB", "PROGRAM P", "X0190", "the PROGRAM P of the library is a diagram and is left out", "")])
+def test_a_pou_whose_body_is_a_diagram_is_named(name: str, declared: str, code: str, message: str, hint: str) -> None:
+    data = b"CoDeSys+" + bytes(50) + binary_object("L", "VAR_GLOBAL\n\tg : INT;\nEND_VAR\n") \
+        + binary_object("P", f"{declared}\nVAR x : INT; END_VAR\n", "not text", kind=0x29)
+    made = import_codesys2(data, name)
+    assert made.diagnostics == [Diagnostic(code, Source(name, ""), 0, 0, message, hint)]
+    assert made.files == {"L.st": "VAR_GLOBAL\n\tg : INT;\nEND_VAR\n"} and not made.is_text
+    assert (made.family, made.because) == ("codesys2", f"{name} is a file of CODESYS 2.3")
+
+
+def test_an_export_of_one_pou_without_marks_begins_at_its_first_character() -> None:
+    text = "PROGRAM P\nVAR x : INT; END_VAR\nx := 1;\nEND_PROGRAM\n"
+    made = import_codesys2(text.encode(), "own.exp")
+    assert (made.files, made.diagnostics, made.is_text) == ({"P.st": text}, [], True)
+
+
+def test_a_file_without_declarations_says_how_to_export_it() -> None:
+    made = import_codesys2(b"CoDeSys+" + bytes(50), "own.pro")
+    assert made.diagnostics == [Diagnostic("X0105", Source("own.pro", ""), 0, 0, "own.pro has no declaration that can be read",
+                                           "export the project as text from CODESYS: Project > Export")] and not made.files
 
 
 def test_a_damaged_library_is_refused() -> None:
