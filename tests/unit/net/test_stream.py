@@ -9,9 +9,9 @@ import pytest
 from rows import each_of
 
 from fbvm.net.faults import Fault
-from fbvm.net.relays import Relay, RelayedPort, Relays
+from fbvm.net.relays import Opening, Relay, RelayedPort, Relays
 from fbvm.net.stream import WINDOW_BYTES, End
-from fbvm.wire.link import Broken, Close, Event, Failed, Grant, Peer, PeerClosed, Received, Request, Send, SendTo, Sent
+from fbvm.wire.link import Broken, Close, Event, Failed, Grant, Opened, Peer, PeerClosed, Received, Request, Send, SendTo, Sent
 from fbvm.wire.tap import TapKind
 
 CLIENT, SERVER = Peer("192.168.250.2", 1024), Peer("192.168.250.1", 502)
@@ -226,3 +226,29 @@ def test_a_relay_whose_unit_hears_nothing_any_more_gives_its_connection_up() -> 
 def test_of_which_scan_a_fault_between_two_is(links: dict[str, int], before: bool, scan: int) -> None:
     made = {host: SimpleNamespace(refreshes=refreshes) for host, refreshes in links.items()}
     assert Relays.scan_of(SimpleNamespace(_links=made, _before_refresh=before), CLIENT, SERVER) == scan  # type: ignore[arg-type]
+
+
+@each_of(("event", "wanted"), [
+    (Failed(9, "open", "ECONNREFUSED"), [("tap", 25, TapKind.RST, False), ("refused", 25, "ECONNREFUSED")]),
+    (Failed(9, "open", "EHOSTUNREACH"), [("refused", 25, "EHOSTUNREACH")]),
+    (Opened(9, 40_000, SERVER), [("lead", 9), ("answered", 25, Peer(CLIENT.host, 40_000), SERVER, "", True)]),
+    (Sent(9, 1), []), (None, [("refused", 20, "ETIMEDOUT")])])
+def test_the_answer_to_an_open_under_faults_comes_a_latency_later(event: Event | None, wanted: list[object]) -> None:
+    said, due = list[object](), list[tuple[int, Callable[[int], None]]]()
+    relays = SimpleNamespace(
+        now_ns=20, fault=lambda one, other: Fault(latency_ns=5), latency_ns=lambda fault: fault.latency_ns,
+        at=lambda due_ns, call: due.append((due_ns, call)), lead=lambda channel, link, end: said.append(("lead", channel)),
+        tell_unit=lambda unit, what, local, remote, out: said.append(("tap", due[0][0], what, out)))
+    connection = SimpleNamespace(
+        link=None, refused=lambda error, now_ns: said.append(("refused", now_ns, error)),
+        answered=lambda end, error, active, now_ns: said.append(("answered", now_ns, end.local, end.remote, error, active)))
+    opening = Opening(relays, connection, CLIENT, SERVER)  # type: ignore[arg-type]
+    if event is None:
+        opening.time_out(20)
+    else:
+        opening.told(event, 20)
+        assert not opening.is_over
+    for due_ns, call in due:
+        call(due_ns)
+    assert said == wanted
+    assert opening.is_over is isinstance(event, Failed | None)
