@@ -64,6 +64,9 @@ def test_static_variables_are_those_that_a_pou_calls_global_and_variables_of_a_m
     assert "VAR_STAT\n    all : INT;" in made.files["Count.st"]
     assert "    VAR_INST\n        kept : INT;" in made.files["Count.st"]
     again = export_xml([Source("a.st", made.files["Count.st"].replace("VAR_INST", "VAR")), Source("b.st", made.files["Main.st"])])
+    assert [(found.code, found.source.text[found.start : found.start + 8], found.message.partition(";")[0])
+            for found in again.diagnostics if "VAR_STAT" in found.message] == \
+        [("X0390", "VAR_STAT", "VAR_STAT is written as CODESYS and TwinCAT have it")]
     assert again.errors == []
     assert again.text is not None
     for sources, kept in ((made.sources, 4), (import_xml(again.text.encode()).sources, 2)):
@@ -72,3 +75,13 @@ def test_static_variables_are_those_that_a_pou_calls_global_and_variables_of_a_m
         plc = Plc(compiled.image)
         plc.scan()
         assert [plc.read("Main.n"), plc.read("Main.m"), plc.read("Main.b.many")] == [kept, 2, 5]
+
+
+def test_a_variable_that_two_texts_of_a_declaration_have_is_declared_once() -> None:
+    """The texts differ in a blank, so they are no copies of one another; what only the second one has is added."""
+    text = STATIC[STATIC.index('<data name="http://www.3s-software.com/plcopenxml/interfaceasplaintext"'):STATIC.index("</addData></pou>")]
+    other = text.replace("many : INT", "Many :  INT").replace("END_VAR</xhtml>", "  more : INT;\nEND_VAR</xhtml>")
+    made = import_xml(STATIC.replace(text, text + other).encode())
+    assert made.errors == []
+    lines = [" ".join(line.split()) for line in made.files["Count.st"].splitlines()]
+    assert [line for line in lines if "many" in line.lower() or "more" in line] == ["many : INT := 5;", "more : INT;"]
