@@ -208,6 +208,21 @@ def test_a_timer_in_the_diagram_of_a_named_transition_runs_in_every_scan() -> No
     assert phases(made, "x", 60) == [6] * 9
 
 
+@each_of(("more", "lost"), [
+    (contact(9, "3.Q", "y"), []), (value(9, "after"), []),
+    (f'<outVariable localId="9">{wires("3.Q")}<expression>y</expression></outVariable>', ["y"]),
+    (block(9, "TON", "IN=1 PT=2", "Q,ET", "u") + f'<coil localId="8">{wires("9.Q")}<variable>y</variable></coil>', ["TON", "y"])])
+def test_what_the_diagram_of_a_named_transition_writes_beside_its_condition_is_named(more: str, lost: list[str]) -> None:
+    drawn = value(1, "red.X") + value(2, "T#100ms") + block(3, "TON", "IN=1 PT=2", "Q,ET", "t") \
+        + f'<outVariable localId="4">{wires("3.Q")}<expression>AFTER</expression></outVariable>' + more
+    made = chart(step(1, "red", first=True), transition(2, "1", does("after")), step(3, "green", "2"),
+                 declared="".join(variable(name, "TON") for name in "tu") + variable("y"),
+                 more=f'<transitions><transition name="after"><body><FBD>{drawn}</FBD></body></transition></transitions>')
+    assert [(found.code, found.message.partition(": ")[2]) for found in made.diagnostics] == [
+        ("X0203", f"{name} does not belong to the condition of transition after, and is not taken over") for name in lost]
+    assert "TRANSITION FROM red TO green := t.Q;" in made.files["Main.st"]
+
+
 def test_a_function_in_front_of_a_transition_is_one_scan_late_as_beremiz_has_it() -> None:
     text = document(pou("".join((step(1, "s", first=True), transition(2, "1", wires("5")), step(3, "e", "2"),
                                  actions(4, "3", does("x")), value(6, "n"), value(7, "INT#1"),

@@ -18,6 +18,9 @@ from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.interchange.plcopen.read.statements import Statements
 from fbvm.interchange.plcopen.read.values import Unexecutable
 
+_WRITING = ("coil", "outVariable", "inOutVariable", "block")
+"""Kinds of objects that change something beside the condition of a transition."""
+
 
 class NotImportable(Exception):
     """The chart cannot be taken over; the arguments are an element, a message and a hint."""
@@ -58,6 +61,11 @@ class Conditions:
         sinks = [item for item in diagram.objects if item.kind in ("coil", "outVariable") and item.text.upper() == name.upper()]
         if len(sinks) != 1 or not self._needs_statements(sinks[0]):
             return ""
+        fed = set(feeding(sinks))
+        for item in diagram.objects:
+            if item.kind in _WRITING and item not in fed:
+                self.reading.report("X0203", item.element, f"{item.text or item.kind} does not belong to the condition of "
+                                    f"transition {name}, and is not taken over")
         sinks[0].kind = "condition"
         return self._written(sinks, self.statements, apart=True)[sinks[0]]
 
