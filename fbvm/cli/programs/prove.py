@@ -52,8 +52,8 @@ def _cycle(value: str) -> tuple[int, int]:
 
 def _unit(value: str) -> tuple[int, int]:
     """The number of a unit and of one of its sockets.  Raises BadParameter."""
-    unit, colon, socket = value.partition(":")
-    if not colon or not unit.isdecimal() or not socket.isdecimal() or int(unit) > 15 or int(socket) not in range(1, 9):
+    unit, _, socket = value.partition(":")
+    if not unit.isdecimal() or not socket.isdecimal() or int(unit) > 15 or int(socket) not in range(1, 9):
         raise click.BadParameter(f"{value!r} is not UNIT:SOCKET, a unit number 0 to 15 and a socket 1 to 8: write 0:1")
     return int(unit), int(socket)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 from rows import each_of
@@ -153,6 +154,16 @@ def test_wrong_use_has_status_2(arguments: list[str]) -> None:
     result = proved(INTERLOCK, *arguments)
     assert result.exit_code == 2, result.output
     assert "Error: " in result.stderr
+
+
+@each_of("text, unit", [("0:1", (0, 1)), ("15:8", (15, 8)), *((text, None) for text in (
+    "16:1", "0:0", "0:9", "0", "01", ":1", "0:", "a:1", "0:b", "-1:1", "0:1:1", ""))])
+def test_a_unit_is_a_number_to_15_and_a_socket_of_1_to_8(text: str, unit: tuple[int, int] | None) -> None:
+    if unit is not None:
+        assert prove._unit(text) == unit
+    else:
+        with pytest.raises(click.BadParameter, match=f"^'{text}' is not UNIT:SOCKET, .*: write 0:1$"):
+            prove._unit(text)
 
 
 @pytest.mark.parametrize("kind", ["STRING[3]", "WSTRING[3]"])
