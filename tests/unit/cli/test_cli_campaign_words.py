@@ -150,7 +150,7 @@ def test_how_a_fleet_ends(figures: Figures, said: str, ended: int) -> None:
         patch.setattr(fleet, "_places", lambda *_: None)
         patch.setattr(fleet, "_conducted", lambda *_: {0: ("here", figures)})
         patch.setattr(fleet, "_print", lambda told: None)
-        patch.setattr(fleet, "say", lambda text, **style: errors.append(f"{text}\n"))
+        patch.setattr(fleet, "say", lambda text, fg, err=False: errors.append(f"{text}\n" if err else "not among the errors"))
         with pytest.raises(SystemExit) as exit_:
             fleet.command.callback(None, json_lines=False)  # type: ignore[misc]
     assert (exit_.value.code, "".join(errors)) == (ended, said)

@@ -111,7 +111,7 @@ def test_the_plc_of_the_demo_reaches_the_server_by_the_address_of_its_program() 
 # --- the run ----------------------------------------------------------------------------------------------------------
 
 
-def shown(body: str, registers: list[int], reason: str = "") -> tuple[int, str, list[str]]:
+def shown(body: str, registers: list[int], reason: str = "", limit_ns: int = 50_000_000) -> tuple[int, str, list[str]]:
     """The status of a run of a program with this body beside these registers, what was printed, and what was done."""
     image = compile_text(PROGRAM.format(body)).image
     assert image is not None
@@ -122,7 +122,7 @@ def shown(body: str, registers: list[int], reason: str = "") -> tuple[int, str, 
     other = SimpleNamespace(registers=lambda first, count: registers[first : first + count])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(demo, "_plc", lambda program, server: (plc, SimpleNamespace(close=lambda: done.append("closed"))))
-        patch.setattr(demo, "LIMIT_NS", 50_000_000)
+        patch.setattr(demo, "LIMIT_NS", limit_ns)
         patch.setattr(demo, "_next", lambda program: "what next")
         if reason:
             patch.setattr("fbvm.run.loop.run", lambda *_, **__: reason)
@@ -148,6 +148,12 @@ def test_what_is_said_behind_the_run_and_the_status(body: str, registers: list[i
     assert "connect to the server" in text and ("all three exchanges are over" in text) and "Reply, first word" in text
     assert ("PLC" in text and "register" in text.rpartition("Each column")[2]) == (said in (
         "The data differs.\n", "Equal on both sides.\nwhat next\n"))
+
+
+@pytest.mark.slow
+def test_the_chart_of_a_demo_leaves_out_quiet_stretches() -> None:
+    _, text, done = shown("Step := 5; Done := n = 400;", [7, 8, 9, 0, 1], limit_ns=5_000_000_000)
+    assert done == ["closed", "400 scans"] and "~" in text.partition("~ a quiet stretch.")[2]
 
 
 def test_a_demo_that_is_interrupted_has_the_status_of_that() -> None:

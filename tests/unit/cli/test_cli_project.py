@@ -67,6 +67,15 @@ def test_a_project_is_named_by_its_folder_or_file(folder: Path, monkeypatch: pyt
 
 
 @pytest.mark.slow
+def test_what_is_warned_of_in_a_program_is_told_before_the_run(folder: Path) -> None:
+    text = PROGRAM.replace("divisor :", "unused : INT; divisor :")
+    (folder / "counter.st").write_text(text, encoding="utf-8")
+    result = run()
+    assert (result.exit_code, result.stdout) == (0, SAID)
+    assert "warning" in result.stderr and "unused" in result.stderr
+
+
+@pytest.mark.slow
 def test_values_that_differ_are_a_range(folder: Path) -> None:
     (folder / "counter.st").write_text(PROGRAM.replace("step : INT", "step AT D1 : INT"), encoding="utf-8")
     (folder / "client.st").write_text("""

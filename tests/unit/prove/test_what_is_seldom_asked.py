@@ -3,6 +3,7 @@ limits an answer."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import pairwise
 from random import Random
@@ -275,13 +276,34 @@ def test_random_times_lie_between_the_bounds() -> None:
     assert [next(fixed) for _ in range(3)] == [0, 10 * MS, 20 * MS]
 
 
-def test_a_handshake_is_asked_of_an_instance() -> None:
-    block = "FUNCTION_BLOCK B VAR_OUTPUT Done, Busy : BOOL; END_VAR END_FUNCTION_BLOCK "
-    names = Names(image_of(f"{block} PROGRAM Main VAR b : B; n : INT; END_VAR b(); END_PROGRAM"))
-    assert handshake(names, "Main.b").text == "(Main.b.Done) AND (Main.b.Busy)"
-    for path in ("Main.n", "D0..D1"):
-        with pytest.raises(UnknownPlace, match=f"{path} is no instance of a function block"):
-            handshake(names, path)
+def names_beside(outputs: str) -> Names:
+    block = f"FUNCTION_BLOCK B VAR_OUTPUT {outputs} : BOOL; END_VAR END_FUNCTION_BLOCK"
+    return Names(image_of(f"{block} PROGRAM Main VAR b : B; n : INT; END_VAR b(); END_PROGRAM"))
+
+
+@each_of("outputs, pairs, told", [
+    ("Done, Busy", ["Done Busy"], "Busy, Done"), ("BUSY, done, Other", ["done BUSY"], "BUSY, done"),
+    ("Done, Busy, ENO", ["Done Busy"], "Busy, Done"), ("ENO, Error", ["ENO Error"], "ENO, Error"),
+    ("Done, ENO, Error", ["Done Error", "ENO Error"], "Done, ENO, Error"),
+    ("CommandAborted, Error, Busy", ["Busy Error", "Busy CommandAborted", "Error CommandAborted"], "Busy, CommandAborted, Error"),
+])
+def test_a_handshake_is_asked_of_an_instance(outputs: str, pairs: list[str], told: str) -> None:
+    asked = handshake(names_beside(outputs), "Main.b", ("Main.n = 0",), ("Main.n",))
+    assert asked.text == " OR ".join("(Main.b.{}) AND (Main.b.{})".format(*pair.split()) for pair in pairs)
+    assert (asked.kind, asked.title) == (NEVER, f"handshake of Main.b ({told})")
+    assert (asked.assumptions, asked.free) == (("Main.n = 0",), ("Main.n",))
+
+
+@each_of("path, outputs, said", [
+    ("Main.n", "Done, Busy", "Main.n is no instance of a function block"),
+    ("D0..D1", "Done, Busy", "D0..D1 is no instance of a function block"),
+    *(("Main.b", outputs,
+       "Main.b is of B, which has no two of the outputs Done, Busy, Error, CommandAborted, and no ENO and Error") for outputs in (
+        "Done, ENO", "Error", "Done : BOOL; END_VAR VAR_INPUT Busy")),
+])
+def test_without_two_outputs_of_a_handshake_there_is_none(path: str, outputs: str, said: str) -> None:
+    with pytest.raises(UnknownPlace, match=f"^{re.escape(said)}$"):
+        handshake(names_beside(outputs), path)
 
 
 BYTES = """PROGRAM Main VAR_INPUT In : BYTE; END_VAR VAR b, c : BOOL; p : POINTER TO BYTE; n : INT; END_VAR
