@@ -282,7 +282,7 @@ def test_what_is_said_of_the_programs_of_a_fleet_is_shown(monkeypatch: pytest.Mo
     monkeypatch.setattr("fbvm.campaign.planning.images_of", lambda project: ([], WRONG.diagnostics))
     monkeypatch.setattr("fbvm.campaign.work.packed", raising(Enough()))
     with pytest.raises(Enough):
-        fleet._places(None, {"shards": 2})
+        fleet._places(None, {"shards": 2, "doors_file": None})
     assert shown == WRONG.diagnostics
 
 
