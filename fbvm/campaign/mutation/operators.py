@@ -109,6 +109,8 @@ def _binary(text: str, node: Node) -> Iterator[Replacement]:
     assert isinstance(node, tree.Binary)
     written = _WORD.match(text, node.op_start) if node.op not in ("<=", ">=", "<>", "**") else None
     end = written.end() if written else node.op_start + len(node.op)
+    if node.op in ("=", "<>") and text[node.op_start : end] != node.op:  # a jump is made of comparisons that nobody wrote
+        return
     for operator, table in _OPERATORS.items():
         for new in table.get(node.op, ()):
             yield operator, node.op_start, end, new
@@ -148,7 +150,7 @@ def _assigned(text: str, node: Node) -> Iterator[Replacement]:
 
 def _literal(text: str, node: Node) -> Iterator[Replacement]:
     assert isinstance(node, tree.Literal)
-    for new in _values(node):
+    for new in _values(node) if text[node.start : node.end] == node.text else ():  # jumps hold numbers that nobody wrote
         yield "CRO", node.start, node.end, new
 
 
