@@ -29,6 +29,7 @@ _OPERATORS = {"ROR": _RELATIONS, "LRO": _LOGICAL, "ARO": _ARITHMETIC}
 """What stands for an operator, by the name of the mutation operator."""
 
 _WORD = re.compile(r"[A-Z_]+|\S", re.I)
+_JUMP = re.compile(r"JMP\b", re.I)
 
 
 def changes(text: str, node: tree.Pou) -> Iterator[Change]:
@@ -58,10 +59,18 @@ def _replacements(text: str, pou: tree.Pou) -> Iterator[Replacement]:
 def _of_node(text: str, part: Node) -> Iterator[Replacement]:
     """What is tried at a node by its class, and with the statements in it."""
     for kind, rule in _RULES:
-        if isinstance(part, kind):
+        if isinstance(part, kind) and not _is_made(part):
             yield from rule(text, part)
     for name in names_of(part) if not isinstance(part, Ladder | Sfc | InstructionList) else ():
         yield from _of_statements(text, getattr(part, name))
+
+
+def _is_made(node: Node) -> bool:
+    """True for what a jump and its label are made of: stores and comparisons of a variable that nobody wrote, and the IF or the
+    loop that such a comparison decides."""
+    test = node.branches[0][0] if isinstance(node, tree.If) else node.until if isinstance(node, tree.Repeat) else node
+    name = test.left if isinstance(test, tree.Binary) else test.targets[0] if isinstance(test, tree.Assign) else None
+    return isinstance(name, tree.NameRef) and name.text.startswith("$")
 
 
 def _specs(pou: tree.Pou) -> dict[str, tuple[int, int]]:
@@ -109,8 +118,6 @@ def _binary(text: str, node: Node) -> Iterator[Replacement]:
     assert isinstance(node, tree.Binary)
     written = _WORD.match(text, node.op_start) if node.op not in ("<=", ">=", "<>", "**") else None
     end = written.end() if written else node.op_start + len(node.op)
-    if node.op in ("=", "<>") and text[node.op_start : end] != node.op:  # a jump is made of comparisons that nobody wrote
-        return
     for operator, table in _OPERATORS.items():
         for new in table.get(node.op, ()):
             yield operator, node.op_start, end, new
@@ -199,7 +206,7 @@ def _of_statements(text: str, part: object) -> Iterator[Replacement]:
         yield from _of_statements(text, inner)
     if not all(isinstance(each, tree.Statement) for each in part):
         return
-    simple = [each for each in part if isinstance(each, _SIMPLE)]
+    simple = [each for each in part if isinstance(each, _SIMPLE) and not (_is_made(each) and not _JUMP.match(text, each.start))]
     for each in simple:
         yield "SDL", each.start, each.end, ";"
     for first, second in pairwise(part):

@@ -40,6 +40,13 @@ STATEMENTS = {
         "SDL IF a THEN ;; ELSIF b THEN ; ELSE n := 0; END_IF", "SDL IF a THEN RETURN; ELSIF b THEN ; ELSE ;; END_IF",
         "CRO IF a THEN RETURN; ELSIF b THEN ; ELSE n := 1; END_IF"},
     "IF a THEN ; END_IF": {"NIO IF NOT (a) THEN ; END_IF"},
+    "IF a THEN JMP x; END_IF; b := c; x: n := 0;": {
+        "NIO IF NOT (a) THEN JMP x; END_IF; b := c; x: n := 0;", "SDL IF a THEN ;; END_IF; b := c; x: n := 0;",
+        "SDL IF a THEN JMP x; END_IF; ;; x: n := 0;", "SDL IF a THEN JMP x; END_IF; b := c; x: ;;",
+        "CRO IF a THEN JMP x; END_IF; b := c; x: n := 1;"},
+    "x: a := b; IF c THEN JMP x; END_IF": {
+        "SDL x: ;; IF c THEN JMP x; END_IF", "NIO x: a := b; IF NOT (c) THEN JMP x; END_IF", "SDL x: a := b; IF c THEN ;; END_IF",
+        "SDL x: a := b; ;"},
 }
 
 
