@@ -1,9 +1,9 @@
 """Step costs: how much of the step budget each piece of a body charges.
 
 A *region* is a body, or the body of a loop, without the loops inside.  A region charges at its start the number of its
-statements; or, if that is more, what its work comes to: the operations of long expressions and the bytes and characters of
-values that are moved, compared and searched, by the sizes that are declared.  A single statement that moves much charges for
-itself, so that a copy of a large array costs nothing where the program does not come to it.
+statements; or, if that is more, what its work comes to: the operations of long expressions, functions that take longer than an
+operator, and the bytes and characters of values that are moved, compared and searched, by the sizes that are declared.  A single
+statement that moves much charges for itself, so that a copy of a large array costs nothing where the program does not come to it.
 
 All of this is known when a body is lowered, so every engine charges the same, and the default budget ends any loop within
 about a second: a step is the time of a simple statement, and so is the work that is counted as one."""
@@ -28,6 +28,9 @@ LARGE = 16 * UNITS_A_STEP
 MOVED_BYTE, TEXT_BYTE, READ_BYTE = 1, 2, 8
 """Units of a byte that is copied as it is; of a byte of a text, whose end has to be found; of one that is searched or read as a
 literal."""
+CALCULATED, TEXT_MADE, VALUE_WRITTEN, VALUE_READ = 128, 2 * UNITS_A_STEP, 8 * UNITS_A_STEP, 32 * UNITS_A_STEP
+"""Units that do not depend on a size: of a function such as SIN or EXPT; of one that makes a text of another; of a value that is
+written as a text, and of one that is read from a text.  They are measured in Python, where these take longest."""
 
 _LOOPS = tree.For | tree.While | tree.Repeat
 _PLAIN = frozenset((tree.Assign, tree.CallStatement))
@@ -179,6 +182,10 @@ def _moved(costs: _Costs, node: Node) -> int:
     return TEXT_BYTE * costs.bytes_of(node)
 
 
+def _made(costs: _Costs, node: Node) -> int:
+    return TEXT_MADE + _moved(costs, node)
+
+
 def _read(costs: _Costs, node: Node) -> int:
     return READ_BYTE * costs.bytes_of(node)
 
@@ -197,8 +204,12 @@ def _loaded(costs: _Costs, node: Node) -> int:
 
 _SIZED: dict[Any, _Cost] = {
     "load_text": _loaded,
-    **dict.fromkeys(("left", "right", "mid", "concat", "insert", "delete", "replace", "recode", "length", "store_text"), _moved),
-    **dict.fromkeys(("find", "from_text", "from_leading", "characters", "units_of"), _read),
+    **dict.fromkeys(("left", "right", "mid", "concat", "insert", "delete", "replace", "recode"), _made),
+    **dict.fromkeys(("length", "store_text"), _moved),
+    **dict.fromkeys(("find", "characters", "units_of"), _read),
+    **dict.fromkeys(("from_text", "from_leading"), lambda costs, node: VALUE_READ + _read(costs, node)),
+    **dict.fromkeys(("to_text", "enum_text"), lambda costs, node: VALUE_WRITTEN),
+    **dict.fromkeys(("math", "atan2", "pow"), lambda costs, node: CALCULATED),
     **dict.fromkeys(("eq", "ne", "lt", "le", "gt", "ge"), _compared),
     **dict.fromkeys(("select", "mux", "min", "max", "let"), _chosen),
     "copy": lambda costs, node: MOVED_BYTE * int(node[3]),

@@ -43,10 +43,11 @@ N = const("i16", 1)
     (("copy", AT, AT, 500), 96 + 500), (("fill", AT, b"1234"), 64 + 4), (("reverse", AT, 10), 64 + 20),
     (("eq", "b", "i16", N, N), 96), (("eq", "b", "s8", FIVE, NINE), 96 + 2 * 14), (("lt", "b", "s16", WIDE, WIDE), 96 + 2 * 20),
     (("select", "i16", N, N, N), 128), (("select", "s8", N, FIVE, NINE), 128 + 2 * (14 + 9)),
-    (("concat", "s8", FIVE, NINE), 96 + 2 * (14 + 14)), (("length", "i16", FIVE), 64 + 10),
+    (("concat", "s8", FIVE, NINE), 96 + 2048 + 2 * (14 + 14)), (("length", "i16", FIVE), 64 + 10),
     (("find", "i16", FIVE, NINE), 96 + 8 * 14),
-    (("from_text", "i16", "INT", FIVE, 0), 64 + 8 * 5), (("left", "s8", NINE, N, 0), 96 + 2 * 18),
-    (("to_text", "s8", "INT", N), 64), (("store_text", AT, 80, FIVE), 96 + 10), (("let", 1, "s8", FIVE), 64),
+    (("from_text", "i16", "INT", FIVE, 0), 64 + 32 * 1024 + 8 * 5), (("left", "s8", NINE, N, 0), 96 + 2048 + 2 * 18),
+    (("to_text", "s8", "INT", N), 64 + 8 * 1024), (("math", "f64", "sin", const("f64", 1.0)), 64 + 128),
+    (("store_text", AT, 80, FIVE), 96 + 10), (("let", 1, "s8", FIVE), 64),
     (("mux", "s8", N, (FIVE, NINE), 0), 32 + 32 + 32 + 64 + 2 * (14 + 9)),
 ])
 def test_what_an_operation_costs(node: Node, units: int) -> None:

@@ -67,6 +67,19 @@ def test_work_is_charged_by_its_size(declarations: str, body: str, expected: lis
     assert charged(declarations, body) == expected
 
 
+@each_of(("body", "expected"), [
+    ("s := CONCAT(s, t);", [3]),
+    ("s := LEFT(RIGHT(s, 5), 3);", [5]),
+    ("s := REAL_TO_STRING(r);", [8]),
+    ("IF a > 1 THEN s := INT_TO_STRING(a); END_IF;", [8]),
+    ("a := STRING_TO_INT(s);", [2, 32]),
+    ("r := SIN(r) + COS(r) + EXP(r);", [2]),
+    ("r := SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(SIN(r))))))))))))))))))));", [3]),
+])  # fmt: skip
+def test_functions_that_take_longer_than_a_statement_charge_for_that(body: str, expected: list[int]) -> None:
+    assert charged(NUMBERS, body) == expected
+
+
 @pytest.mark.slow
 def test_long_expressions_are_more_than_a_step() -> None:
     assert charged("a : DINT; b : DINT;", f"a := {' + '.join(['b'] * 1000)};")[0] > 50
@@ -94,6 +107,8 @@ ENDLESS = {
     "text that is put together": ("s, t : STRING[65_534];", "s := CONCAT(s, t);"),
     "text that is cut": ("s : STRING[65_534];", "s := DELETE(s, 1, 1);"),
     "text that is read": ("s : STRING[65_534] := '1'; n : LREAL;", "n := STRING_TO_LREAL(s);"),
+    "short text that is read": ("s : STRING := 'T#1h2m'; t : TIME;", "t := STRING_TO_TIME(s);"),
+    "values that are written": ("s : STRING; r : REAL := 1.5;", "s := CONCAT(REAL_TO_STRING(r), REAL_TO_STRING(-r));"),
     "initial values": ("x : INT;", "x := Fresh();"),
     "a long expression": ("x : DINT;", f"x := {' + '.join(['x'] * 900)};"),
 }
