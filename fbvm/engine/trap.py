@@ -64,6 +64,8 @@ ENDLESS = "a loop waits for what does not change within a scan, or there is too 
 """The usual causes of R0104."""
 _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} outside {1}..{2}"}
 """R0105 by the number of its values: BCD, text and data type, value and limits."""
+SHOWN_CHARACTERS = 60
+"""Characters of a text in a message, which is one line: texts may have 65,534."""
 
 
 def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), instance: int = NO_INSTANCE,
@@ -99,7 +101,9 @@ def _of_heap(objects: Objects, reference: int, memory: Memory) -> str:
 
 
 def _shown(value: Any) -> Any:
-    return value.decode("latin-1") if isinstance(value, bytes) else value
+    """A value for a message; of a long text the beginning."""
+    text = value.decode("latin-1") if isinstance(value, bytes) else value
+    return f"{text[:SHOWN_CHARACTERS]}..." if isinstance(text, str) and len(text) > SHOWN_CHARACTERS else text
 
 
 def too_long(ended: Trap, watch_ns: int) -> Trap:
