@@ -87,6 +87,13 @@ def test_a_store_that_changes_its_own_subscript_is_told_where_it_went() -> None:
     assert list(engine.observations(0))[1] == written
 
 
+def test_what_was_told_before_a_subscript_that_traps_is_kept() -> None:
+    """A statement that reads a[1 / 0]."""
+    place = at(0, (1, ("div", "u8", const("u8", 1), load("u8", 8), 5)))
+    engine = engine_of((("observe", "statement", 3, None), ("observe", "read", 3, ("u8", place, 255))))
+    assert [each.kind for each in engine.observations(0)] == ["call", "statement"]
+
+
 def test_the_memory_is_that_of_each_moment_and_then_that_of_the_end() -> None:
     engine = engine_of((store("u8", 0, const("u8", 1)), ("observe", "statement", 3, None), store("u8", 0, const("u8", 2))))
     told = engine.observations(0)

@@ -8,9 +8,12 @@ from depth import times
 from etn21_rig import CIO, D, Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_of
 
+from fbvm import Plc, compile_text
+from fbvm.machine.plc import Phase
 from fbvm.prove.encoding.terms import Terms
-from fbvm.prove.unit_rules import KINDS, MOST_BYTES, Rule, Word, free_words, rules
+from fbvm.prove.unit_rules import KINDS, MOST_BYTES, Rule, Watch, Word, free_words, offset_of, rules
 from fbvm.units.etn21.map import Switch
 from fbvm.units.etn21.unit import Etn21, Fault
 from fbvm.wire.link import Event, Peer, Request, Sent
@@ -124,3 +127,23 @@ def test_every_kind_of_rule_has_a_source_and_is_used() -> None:
     assert all(rule.source.startswith(("W420", "W421")) for rule in rules(15, 8))
     with pytest.raises(ValueError, match="socket 9"):
         rules(0, 9)
+
+
+@each_of("phase, kept", [(None, True), (Phase.INPUTS, True), (Phase.PROGRAM, False), (Phase.REFRESH, False)])
+def test_what_a_run_writes_behind_its_program_has_to_keep_the_rules(phase: Phase | None, kept: bool) -> None:
+    plc = Plc(compile_text("PROGRAM Main VAR n AT %D100 : UINT; END_VAR n := n + 1; END_PROGRAM").image, engine="python")
+    watch = Watch(plc, (Rule(("D", 100), "keeps", 0xFFFF, "here"), Rule(("D", 200), "at most", 9, "here")))
+    plc.phases += [watch.phase, lambda plc, over: plc.write("D100", 50) if over is phase else None]
+    plc.run(scans=3)
+    assert watch.is_kept == kept
+
+
+def test_a_write_is_judged_by_the_rules_of_its_word() -> None:
+    plc = Plc(compile_text("PROGRAM Main VAR n : UINT; END_VAR n := n + 1; END_PROGRAM").image, engine="python")
+    watch = Watch(plc, (Rule(("D", 100), "keeps", 0xFF00, "here"), Rule(("D", 200), "at most", 9, "here")))
+    at, other = offset_of(("D", 100)), offset_of(("D", 200))
+    for wrong, allowed in (("D100", [False, False, True, True]), ("D200", [True, True, False, False])):
+        for value, expected in ((7, [True] * 4), (0x107, allowed), (0, [True] * 4)):
+            plc.write(wrong, value)
+            assert [watch.allows(plc, offset) for offset in (at, at + 1, other, other + 1)] == expected
+    assert watch.allows(plc, at - 1) and watch.allows(plc, at + 2)

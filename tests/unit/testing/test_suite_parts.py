@@ -11,6 +11,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.types import BOOL
 from fbvm.code.image import Site
 from fbvm.record.trace.events import Call, Frame, Return
 from fbvm.testing.subject import SubjectError
@@ -82,6 +83,21 @@ def test_flags_say_in_which_scan_a_test_has_failed(monkeypatch: pytest.MonkeyPat
     memory[5], plc.scans = 1, 9
     failed.look()
     assert failed.scans == {("A", 2): 4, ("B", 1): 8}
+
+
+@each_of("bit, hops, found", [(None, (), True), (None, (9,), False), (0, (), False), (0, (9,), False)])
+def test_a_flag_is_looked_at_where_it_is_a_byte_at_a_fixed_place(bit: int | None, hops: tuple[int, ...], found: bool) -> None:
+    plc = cast(Any, SimpleNamespace(image=SimpleNamespace(symbols={}), memory=SimpleNamespace(areas={})))
+    places = iter([results.Place("Tests[1].TestIsFailed", BOOL, 7, bit, hops)])
+
+    def find(*given: Any) -> Any:
+        for place in places:
+            return place
+        raise UnknownPlace("no more")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "find", find)
+        assert results._flags(plc, ["A"]) == ({("A", 1): 7} if found else {})
 
 
 @each_of("scan, before", [(50, 30), (20, 0), (21, 1), (5, 0)])

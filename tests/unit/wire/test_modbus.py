@@ -232,6 +232,7 @@ def test_registers_survive_packing(values: list[int]) -> None:
         ("10 00 01 00 01 02 00 00", "10 00 01 00 02", "quantity 2 instead of 1"),
         ("08 00 00 A5 37", "08 00 00 A5 38", "data not echoed"),
         ("03 03 E8 00 03", "83 02", ""),
+        ("03", "03 02 00 00", "2 data bytes instead of 0"),
     ],
 )
 def test_replies_that_do_not_fit(request_hex: str, reply_hex: str, why: str) -> None:
