@@ -31,6 +31,8 @@ def sections(scope: Scope, pou: Pou) -> Iterator[tree.VarSection]:
             yield section
         elif _is_right(scope, section):
             yield changed(section, kind="VAR")
+        else:
+            pou.failed_names.update(fold(name.text) for declared in section.variables for name in declared.names)
 
 
 def _is_right(scope: Scope, section: tree.VarSection) -> bool:
