@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -198,6 +199,42 @@ def test_only_a_plc_with_nothing_to_do_enters_a_batch(is_idle: bool, idle: bool)
     io.skipped, io.changed_words = 4, True
     path.leave_batch(3)
     assert (io.told[-1], io.skipped, io.changed_words) == ("times stored", 7, False)
+
+
+@each_of(("unfinished", "events", "is_recorded", "more", "told"), [
+    (0, [7], True, False, [("skipped told",), ("passed", 1), ("post", [7]), ("recorded", 1, [7])]),
+    (2, [7], True, True, [("skipped told",), ("submit", 90), ("passed", 1), ("post", [7]), ("recorded", 1, [7])]),
+    (2, [7], False, False, [("skipped told",), ("submit", 90), ("passed", 1), ("post", [7])]),
+    (0, [], True, False, [("skipped told",), ("passed", 1)]),
+])
+def test_what_a_unit_has_asked_goes_out_before_it_is_told_more(unfinished: int, events: list[int], is_recorded: bool, more: bool,
+                                                               told: list[Any]) -> None:  # fmt: skip
+    """Ctrl-C may have come between machine code, which left a request, and its submission."""
+    said, path = list[Any](), object.__new__(WithUnits)
+    link = SimpleNamespace(is_quiet=False, submit=lambda requests, now_ns: said.append(("submit", now_ns)))
+    link.events = lambda now_ns: setattr(link, "is_quiet", not more) or events
+    quiet = SimpleNamespace(is_quiet=True, pass_by=lambda count: said.append(("passed", count)))
+    unit: Any = SimpleNamespace(finish=lambda: ["asked"], post=lambda events: said.append(("post", events)))
+    recorder = SimpleNamespace(received=lambda *row: said.append(("recorded", *row)))
+    io = Units(skipped=3, report_skipped=lambda: said.append(("skipped told",)), recorder=recorder if is_recorded else None)
+    parameters: Any = SimpleNamespace(unfinished=unfinished, faulty=0)
+    rows: Any = [(0, unit, quiet), (1, unit, link)]
+    vars(path).update(_io=io, _parameters=parameters, _rows=rows)
+    assert path._collect_events(90) == more
+    assert (said, parameters.unfinished) == (told, 0)
+
+
+@each_of("begin_anew", [Plc.warm_start, Plc.cold_start, lambda plc: plc.restore(plc.snapshot())])
+def test_a_start_or_a_restore_makes_the_path_anew(begin_anew: Callable[[Plc], None]) -> None:
+    """With what its machine code still had to tell of the scan that a trap has ended."""
+    plc = Plc(IMAGE, MS, engine="native")
+    plc.run(scans=3)
+    before = plc.fast_path()
+    plc.run(scans=3)
+    assert before is not None and plc.fast_path() is before
+    begin_anew(plc)
+    plc.run(scans=3)
+    assert isinstance(plc.fast_path(), ProgramAlone) and plc.fast_path() is not before
 
 
 def test_the_page_names_tests_that_there_are() -> None:
