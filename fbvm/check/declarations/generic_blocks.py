@@ -42,8 +42,9 @@ def _is_right(scope: Scope, section: tree.VarSection) -> bool:
         return False
     for declared in section.variables:
         if _span(scope, declared.spec) is None:
-            scope.error("S0205", declared.spec, f"{scope.text(declared.spec)} is no type of a generic constant",
-                        "its type is an integer, or a subrange of one")
+            if not isinstance(declared.spec, tree.SubrangeSpec):  # else what is wrong with a bound is reported
+                scope.error("S0205", declared.spec, f"{scope.text(declared.spec)} is no type of a generic constant",
+                            "its type is an integer, or a subrange of one")
             return False
     return True
 
