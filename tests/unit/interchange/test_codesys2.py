@@ -44,6 +44,13 @@ def test_an_import_of_an_export_makes_a_file_of_each_object() -> None:
     assert compile_sources(made.sources, runnable=True, dialect="codesys2").image is not None
 
 
+def test_an_object_without_a_declaration_makes_no_file() -> None:
+    objects = ("PROGRAM P\nVAR n : INT; END_VAR\nn := 1;\nEND_PROGRAM\n", "n := 1;\n", "", "VAR_GLOBAL\nEND_VAR\n",
+               "VAR_GLOBAL\na : INT;\nEND_VAR\n")  # fmt: skip
+    made = import_codesys2("".join(f"(* @PATH := '' *)\n{each}" for each in objects).encode(), "project.exp")
+    assert made.files == {"P.st": objects[0], "Globals.st": objects[4]} and not made.diagnostics
+
+
 def test_a_diagram_of_an_export_is_refused_by_name() -> None:
     made = import_codesys2(DIAGRAM.encode(), "project.exp")
     error, = made.errors
