@@ -70,7 +70,6 @@ def _listen(bind: str, port: int) -> None:
     """Serves editors one after the other, until Ctrl-C."""
     listener = Listener(bind, port)
     say(f"the debugger listens at {bind}:{listener.port}")
-    sys.stdout.flush()
     try:
         while True:
             with listener.accept() as stream:

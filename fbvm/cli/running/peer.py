@@ -72,7 +72,6 @@ async def _listen(host: str, port: int, trace: bool) -> None:
         raise OSError("pymodbus says no more")
     _, bound_port = server.transport.sockets[0].getsockname()[:2]
     say(f"{LISTENING}{host}:{bound_port}")
-    sys.stdout.flush()
     try:
         await server.serving
     finally:
@@ -93,5 +92,4 @@ def device() -> Any:
 def _trace(sending: bool, data: bytes) -> bytes:
     if data:
         say(f"{'->' if sending else '<-'} {data.hex(' ').upper()}")
-        sys.stdout.flush()
     return data

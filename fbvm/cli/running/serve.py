@@ -281,7 +281,6 @@ def _start(plc: Plc, network: TcpNetwork, signals: Signals, fins: FinsDoor | Non
         unusable(OSError(f"{doors[0].real} cannot be used: {doors[0].error}"))
     elif doors:
         say(f"{LISTENING}{doors[0].real}")
-        sys.stdout.flush()
     return reason
 
 

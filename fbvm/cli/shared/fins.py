@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from ipaddress import IPv4Address
@@ -92,4 +91,3 @@ def try_fins(network: TcpNetwork, door: FinsDoor) -> None:
 def say_fins(door: FinsDoor, real: Peer) -> None:
     """Says where FINS is served, as soon as it is: a datagram that came before would be lost."""
     say(f"FINS: {LISTENING}{real}, node {door.node or 'any'}")
-    sys.stdout.flush()

@@ -12,8 +12,8 @@ from fbvm.base.printable import one_line, printable
 
 
 def say(text: object = "", *, err: bool = False, nl: bool = True, fg: str | None = None, bold: bool | None = None) -> None:
-    """Prints a text on stdout, or on stderr with `err`; in a colour or bold on a terminal.  Control and escape characters in
-    it are shown as escapes."""
+    """Prints a text on stdout, or on stderr with `err`; in a colour or bold on a terminal; it is written at once.  Control and
+    escape characters in it are shown as escapes."""
     click.secho(printable(str(text)), err=err, nl=nl, fg=fg, bold=bold)
 
 

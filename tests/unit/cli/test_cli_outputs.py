@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import socket
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,6 +28,7 @@ from fbvm.cli.shared.live.origins import FileOrigin
 from fbvm.cli.shared.live.page import PageOptions
 from fbvm.cli.shared.run_result import RunProgress
 from fbvm.cli.shared.streams import give_up_output
+from fbvm.cli.shared.terminal import say
 from fbvm.cli.shared.traces import LAST_SCAN, ScanRange
 from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
@@ -76,7 +78,8 @@ def bar(monkeypatch: pytest.MonkeyPatch, terminal: io.StringIO, scans: int | Non
         progress.update(plc)
         progress.update(plc)
         shown = terminal.getvalue()
-    assert not shown or terminal.getvalue() != shown, "the bar goes at the end"
+    at_the_end = terminal.getvalue()[len(shown):]
+    assert not shown or at_the_end.rpartition("\x1b[2K")[1:] == ("\x1b[2K", ""), f"the bar goes at the end: {at_the_end!r}"
     return shown
 
 
@@ -95,6 +98,13 @@ def test_a_pipe_and_a_run_without_a_plc_show_nothing(monkeypatch: pytest.MonkeyP
     with RunProgress(None, 40, None) as progress:
         progress.update(cast(Plc, SimpleNamespace(scans=30, elapsed_ns=0)))
     assert terminal.getvalue() == ""
+
+
+def test_what_is_said_into_a_pipe_is_there_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BufferedWriter(cast(Any, raw), 4096), encoding="utf-8"))
+    say("listening on 127.0.0.1:1502")
+    assert raw.getvalue() == b"listening on 127.0.0.1:1502\n"
 
 
 def test_an_output_that_nobody_reads_any_more_takes_all_that_comes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,6 +252,15 @@ def test_a_peer_says_that_its_port_cannot_be_used_also_if_the_host_would_give_it
     with pytest.raises(SystemExit) as ended:
         peer._unusable("127.0.0.1", 0)
     assert ended.value.code == 5 and capsys.readouterr().err == "127.0.0.1:0 cannot be used\n"
+
+
+def test_a_peer_says_who_has_its_port(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        with pytest.raises(SystemExit) as ended:
+            peer._unusable("127.0.0.1", port)
+    assert (ended.value.code, capsys.readouterr().err) == (
+        5, f"127.0.0.1:{port} cannot be used: somebody else listens there\n")
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -61,7 +60,6 @@ def serve_page(origin: Origin, control: Control, options: PageOptions, recording
                 say(f"--bind {bind}: who reaches this address and has the token can write into the PLC; nothing is encrypted",
                     fg="yellow", err=True)  # fmt: skip
             say(page.host.address)
-            sys.stdout.flush()
             port = page.debug_port(options.debug_port) if options.debug_port is not None else None
             if port:
                 stack.callback(port.close)
