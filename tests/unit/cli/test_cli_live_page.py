@@ -86,9 +86,12 @@ def served(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Hos
             left.pop(0)(host, runs, control)
 
         monkeypatch.setattr(page, "run_interactive", run)
-        page.serve_page(origin, control or Control(), options or PageOptions(), **more)
+        built = page.serve_page(origin, control or Control(), options or PageOptions(), **more)
         assert not left
-        return Host.made[-1]
+        host = Host.made[-1]
+        assert {name: seen.plc for name, seen in built.plcs.items()} == {
+            name: seen.plc for name, seen in host.workbench.plcs.items()}, "what ran last"
+        return host
 
     return serve
 
@@ -289,7 +292,7 @@ def test_what_matters_of_the_file_of_a_project(tmp_path: Path, monkeypatch: pyte
     assert origin.mistakes() == [] and origin.project is not None
     assert not origin.matters([file]) and origin.matters([Path("a.st")]) and origin.matters([Path("a.st"), file])
     programs = origin.programs()
-    assert len(programs) == 2
+    assert [list(cast(Any, program).sources()) for program in programs] == [[Path("a.st")]] * 2
     file.write_text(PROJECT + "# nothing else\n", encoding="utf-8")
     assert not origin.matters([file]) and origin.pictures() == ()
     file.write_text(PROJECT.replace("20ms", "30ms"), encoding="utf-8")

@@ -96,11 +96,13 @@ class Served:
         self._signals = signals
 
         def run_all(runs: list[Any], record: Any, until: Any) -> None:
+            assert not until()
             reason, heard = self._ends.pop(0)
             if heard == "log":
                 raise OutputError(Path("log"), OSError("full"))
             runs[0].reason = reason
             self._signals.save, self._signals.end = heard == "save", heard == "end"
+            assert until() == (heard in ("save", "end"))
 
         monkeypatch.setattr("fbvm.run.loop.run_all", run_all)
         monkeypatch.setattr(serve, "_save", lambda plc, image: self.saved.append(image) or image != Path("bad"))  # type: ignore[func-returns-value]
@@ -126,6 +128,7 @@ def test_a_debugger_that_wants_the_end_has_it(plc: Plc, wants_end: bool, heard: 
 
     def serving(debugged: Any, meanwhile: Any) -> bool:
         served.extend(each.name for each in debugged())
+        assert meanwhile() == signals.end
         return wants_end
 
     with pytest.MonkeyPatch.context() as patch:
@@ -133,6 +136,20 @@ def test_a_debugger_that_wants_the_end_has_it(plc: Plc, wants_end: bool, heard: 
         debugging = cast(Any, SimpleNamespace(is_called=False, serve=serving))
         assert serve._serve(plc, "", signals, debugging, Path("image"), lambda: None) == ("", True)
     assert served == ["plc"] * runs and stand_in.saved == [Path("image")] and signals.end
+
+
+@each_of("is_called", [False, True])
+def test_scans_stand_still_for_a_debugger_that_calls(plc: Plc, is_called: bool) -> None:
+    asked: list[bool] = []
+
+    def run_all(runs: list[Any], record: Any, until: Any) -> None:
+        asked.append(until())
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fbvm.run.loop.run_all", run_all)
+        debugging = cast(Any, SimpleNamespace(is_called=is_called, serve=lambda debugged, meanwhile: True))
+        serve._serve(plc, "", serve.Signals(), debugging, None, lambda: None)
+    assert asked == [is_called]
 
 
 def test_a_run_that_a_trap_has_ended_at_the_start_is_not_begun(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:

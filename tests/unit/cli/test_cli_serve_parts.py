@@ -57,7 +57,7 @@ class Serving:
             return self._served
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(serve.Signals, "installed", lambda signals: nullcontext())
+            patch.setattr(serve.Signals, "installed", lambda signals: nullcontext(note("signals")))
             patch.setattr(serve, "_shipped", lambda settings: note(("settings", settings)) or self.plc)
             patch.setattr(serve, "_own", lambda files, program, libraries, allowed, settings:
                           note(("own", files, set(allowed), settings)) or (self.plc, self.runtime))  # fmt: skip
@@ -87,7 +87,7 @@ def test_the_shipped_program_is_served_with_its_settings(plc: Plc) -> None:
     result = serving("--sockets", "3", "--read-only", "--idle", "5s", "--port", "0", "--no-backlog", "--watch-cycle", "70ms")
     assert (result.exit_code, result.output) == (0, "")
     assert serving.calls == [
-        ("settings", USUAL | {"sockets": 3, "read_only": True, "idle_ns": 5_000_000_000}),
+        "signals", ("settings", USUAL | {"sockets": 3, "read_only": True, "idle_ns": 5_000_000_000}),
         ("network", "127.0.0.1", 0, False, None), ("units", None), ("attach", True, True), ("record", NO_FILES),
         ("start", True, True, None), ("serve", "", None, None, True), "closed"]
     assert plc.watch_cycle.time_ns == 70_000_000 and serving.network.tap is None and plc.watchers == []
@@ -103,8 +103,9 @@ def test_a_program_of_ones_own_with_fins_an_image_a_log_and_a_debugger(plc: Plc,
     assert (result.exit_code, result.output) == (0, "")
     door = FinsDoor(Peer("127.0.0.1", 9600), 9, "full")
     assert serving.calls == [
-        ("own", (file,), {"read_only"}, USUAL), ("load", Path("memory.json")), ("network", "127.0.0.1", 1502, True, door),
-        ("units", door.unit), ("attach", True, True), ("attach", "runtime", True), ("fins", True, door),
+        "signals", ("own", (file,), {"read_only"}, USUAL), ("load", Path("memory.json")),
+        ("network", "127.0.0.1", 1502, True, door), ("units", door.unit),
+        ("attach", True, True), ("attach", "runtime", True), ("fins", True, door),
         ("record", {"trace": Path("t"), "journal": None, "verify": True}), ("start", True, True, door),
         ("serve", "", "port 4711", Path("memory.json"), True), "closed"]
     assert serving.network.tap is not None and len(plc.watchers) == 1 and log.exists()
