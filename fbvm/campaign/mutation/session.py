@@ -136,7 +136,7 @@ def _check_revision(folder: Path, revision: str) -> None:
 def _git(command: Sequence[str], folder: Path) -> str:
     """What git answers.  Raises NotPossible."""
     try:
-        said = subprocess.run(command, cwd=folder, capture_output=True, text=True, encoding="utf-8", check=False)
+        said = subprocess.run(command, cwd=folder, capture_output=True, encoding="utf-8", check=False)
     except OSError as error:
         raise NotPossible(f"git cannot be started: {error}") from None
     if said.returncode:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from contextlib import nullcontext
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,6 +35,22 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
     project = program_project([Path("count.st")], written.about, Path())
     images, _ = images_of(project)
     return Bench.of(plan_of(written, project, images), images)
+
+
+def test_the_workers_of_a_cluster_keep_what_was_sent_until_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    from fbvm.campaign import cluster
+
+    kept: dict[str, object] = {}
+    client = SimpleNamespace(register_plugin=lambda plugin: kept.update({plugin.name: plugin.bench}),
+                             nthreads=lambda: {"a": 2, "b": 1}, unregister_worker_plugin=kept.pop)  # fmt: skip
+    monkeypatch.setattr(cluster, "connected", lambda address, jobs: nullcontext(client))
+    bench: Any = SimpleNamespace(mark="bench 1")
+    with cluster.Cluster(bench, cluster.LOCAL, 2) as executor:
+        assert (kept, executor.count) == ({"bench 1": bench}, 3)
+    assert kept == {}
+    client.unregister_worker_plugin = lambda mark: kept["gone"]
+    with cluster.Cluster(bench, cluster.LOCAL, 2):
+        """The scheduler goes away meanwhile."""
 
 
 def test_a_cluster_gives_the_same_results_though_a_worker_is_killed(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -344,6 +344,16 @@ def test_a_project_is_copied_without_what_is_no_part_of_it(tmp_path: Path, monke
         pack_project(tmp_path / "p")
 
 
+def test_a_project_without_files_is_an_empty_folder(tmp_path: Path) -> None:
+    (tmp_path / "p").mkdir()
+    copy_project(tmp_path / "p", tmp_path / "deep" / "copy")
+    unpack_project(pack_project(tmp_path / "p"), tmp_path / "deep" / "unpacked")
+    assert [[*(tmp_path / "deep" / name).iterdir()] for name in ("copy", "unpacked")] == [[], []]
+    for make in (lambda folder: copy_project(tmp_path / "p", folder), lambda folder: unpack_project(b"", folder)):
+        with pytest.raises(FileExistsError):
+            make(tmp_path / "deep")
+
+
 def test_a_variant_names_the_value_of_an_axis(program: tuple[Project, Any]) -> None:
     made = plan(program, axes=(axis_from_text("Main.Limit=1,2,3"), axis_from_text("Main.Step=1,2")))
     assert [Variant(0, 0, (2, 1)).value(made, at) for at in (0, 1)] == [3, 2] and made.combinations == 6

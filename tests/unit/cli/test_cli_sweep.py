@@ -42,6 +42,11 @@ def test_each_combination_of_values_is_a_row() -> None:
         "2          6           6       FALSE     good         30ms"]
 
 
+def test_a_failing_run_is_executed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fbvm.campaign.runs._shrink", lambda *given: pytest.fail("a failing run was made smaller"))
+    assert sweep("gain.st", "--vary", "Main.Gain=4,5", "--for", "50ms").exit_code == 4
+
+
 def test_a_trap_has_status_4_and_its_place() -> None:
     result = sweep("gain.st", "--vary", "Main.Gain=1,4", "--for", "50ms", "--show", "Main.n", "--json", "--csv", "out.csv")
     assert (result.exit_code, json.loads(result.stdout)) == (4, {"runs": 2, "rows": [
