@@ -63,6 +63,20 @@ def test_sources_that_say_the_same_change_no_byte() -> None:
         assert made.changed == []
 
 
+def test_a_program_without_symbols_of_its_own_and_sections_without_rungs_stay_as_they_are() -> None:
+    saved = Cxt(sections=(("One", ("LD 0.00\nOUT 1.00",)), ("Two", ("",)), ("Three", ()))).bytes()
+    data = re.sub(rb"(?s) *LocalVariables:=.*? END;\s+(?=TaskID)", b"", saved)
+    assert b"LocalVariables" not in data and len(data) < len(saved)
+    files = import_project(data, "line.cxt").files
+    for old, new, changed in (("", "", []), ("LD      0.00", "LDNOT   0.00", ["NewProgram1, section One: 1 rung changed"])):
+        made = export_into(data, "line.cxt", [Source(name, text.replace(old, new)) for name, text in files.items()], False)
+        assert (made.diagnostics, made.changed, made.data == data) == ([], changed, not changed)
+    with_symbol = files | {"NewProgram1.st": files["NewProgram1.st"].replace("    LADDER", "VAR n : INT; END_VAR\n    LADDER")}
+    made = export_into(data, "line.cxt", [Source(name, text) for name, text in with_symbol.items()], False)
+    assert made.data is None and [(said.code, said.message) for said in made.diagnostics] == [
+        ("X0402", "symbol of NewProgram1 n: the project that was saved has no table of symbols for it")]
+
+
 def test_one_rung_that_changes_changes_that_rung_only() -> None:
     made = exported(LATER, ("LD      Start\n", "LD      Start\n        ANDNOT  Pump\n"))
     assert difference(LATER, made) == ["+ ANDNOT Pump"]

@@ -107,10 +107,9 @@ class _Writer:
                 self.refuse(source, at, f"{words.split(' ')[1]} differs from what was saved, and function blocks are not written")
         table = self.plc.value.get("GlobalVariables", "VariableList")
         symbols = {key: one for key, (_, one) in self.new.symbols.items() if not one.name.endswith("_initial")}
-        if table is not None:
-            where = next(iter(self.new.symbols.values()))[0] if self.new.symbols else self.text.source
-            known = {key: one for key, (_, one) in self.old.symbols.items()}
-            yield from self._rows(table, self.plc.value.get("GlobalVariables"), known, symbols, where, "global symbol")
+        where = next(iter(self.new.symbols.values()))[0] if self.new.symbols else self.text.source
+        known = {key: one for key, (_, one) in self.old.symbols.items()}
+        yield from self._rows(table, self.plc.value.get("GlobalVariables"), known, symbols, where, "global symbol")
         saved = {spelling(program.name).casefold(): program for program in self.plc.programs}
         for name, program in self.new.programs.items():
             if name not in saved:
@@ -119,8 +118,13 @@ class _Writer:
                 continue
             yield from self._program(saved[name], self.old.programs.get(name), program)
 
-    def _rows(self, table: Value, holder: Value | None, old: dict[str, Declared], new: dict[str, Declared], source: Source,
+    def _rows(self, table: Value | None, holder: Value | None, old: dict[str, Declared], new: dict[str, Declared], source: Source,
               what: str) -> Iterator[Edit]:
+        if table is None:
+            for one in (one for key, one in new.items() if old.get(key) != one):
+                self.refuse(source, one.at, f"{what} {one.name}: the project that was saved has no table of symbols for it",
+                            "insert it in CX-Programmer, and save the project anew")
+            return
         try:
             made = changed_rows(self.text, table, old, new)
         except RowError as error:
@@ -137,7 +141,7 @@ class _Writer:
 
     def _program(self, saved: SavedProgram, old: Program | None, new: Program) -> Iterator[Edit]:
         table = saved.value.get("LocalVariables", "VariableList")
-        if table is not None and old is not None:
+        if old is not None:
             yield from self._rows(table, saved.value.get("LocalVariables"), dict(old.declared), dict(new.declared), new.source,
                                   f"symbol of {saved.name}")
         sections = {" ".join(section.name.split()): section for section in saved.sections}
