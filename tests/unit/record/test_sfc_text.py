@@ -111,12 +111,31 @@ def test_selections_part_and_meet_at_single_lines() -> None:
     """)) == SELECTION.splitlines()
 
 
+BRANCHES = """PROGRAM Main
+VAR a : BOOL; END_VAR
+INITIAL_STEP S: END_STEP
+TRANSITION FROM S TO (S1, S2, S3, S4) := a; END_TRANSITION
+STEP S1: END_STEP STEP S2: END_STEP STEP S3: END_STEP STEP S4: END_STEP
+TRANSITION FROM (S1, S2, S3, S4) TO S := a; END_TRANSITION
+END_PROGRAM"""
+
+
 def test_wide_charts_are_broken_up() -> None:
     one = picture(BATCH)
     for width in (60, 40, 30):
         lines = sfc_text(one, width)
         assert max(map(len, lines)) <= width or width < 50
     assert "done: full AND hot" in "\n".join(sfc_text(one, 40))
+
+
+def test_branches_are_drawn_apart_until_the_chart_fits() -> None:
+    one, seen = picture(BRANCHES), set[str]()
+    for width in (28, 29, 34, 35):
+        lines = sfc_text(one, width)
+        widest = max(map(len, lines))
+        seen.add("\n".join(lines))
+        assert widest > width or lines == sfc_text(one, widest), "as wide as it is, it needs no more room"
+    assert len(seen) > 3
 
 
 class _Strict(Surface):
