@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +17,7 @@ from fbvm.engine.stops import LineStop, StopTable, Watchpoint
 llvm = pytest.importorskip("llvmlite.binding")
 
 from fbvm.engine.native.library import reading, times  # noqa: E402
-from fbvm.engine.native.library.reading import GOOD, OUTSIDE  # noqa: E402
+from fbvm.engine.native.library.reading import GOOD, MALFORMED, OUTSIDE  # noqa: E402
 from fbvm.engine.native.library.subset import data, peek_all  # noqa: E402
 from fbvm.engine.native.llvm import cache, compiler, worker  # noqa: E402
 
@@ -136,10 +137,27 @@ def test_a_fraction_of_a_unit(digits: str, size: int, found: int, value: int) ->
 
 @pytest.mark.parametrize(("text", "found"), [
     ("16#" + "F" * 255, GOOD), ("16#" + "F" * 256, OUTSIDE), ("16#1" + "0" * 255, GOOD), ("16#1" + "0" * 256, OUTSIDE),
+    ("16#FFFFFFFFFFFFF8" + "0" * 242, GOOD), ("16#FFFFFFFFFFFFFC" + "0" * 242, OUTSIDE), ("16#1" + "0" * 300, OUTSIDE),
+    ("2#" + "1" * 53 + "0" * 40, GOOD), ("2#" + "1" * 53 + "0" * 10 + "1", GOOD), ("2#1" + "0" * 52 + "1" + "0" * 9 + "1", GOOD),
+    ("2#1" + "0" * 52 + "1" + "0" * 10, GOOD), ("16#1", GOOD), ("2#" + "1" * 63, GOOD),
+    ("16#12_34", GOOD), ("16#0", GOOD), ("16#", MALFORMED), ("3#1", MALFORMED), ("16#G", MALFORMED),
 ])
 def test_a_real_with_a_base_is_below_the_greatest_one(text: str, found: int) -> None:
     out = data(bytes(500) + b"number")
-    assert reading.read_number(out, reading.LREAL, data(text.encode()), len(text)) == found
+    assert reading.read_number(out, reading.LREAL, data(text.encode() + b"7"), len(text)) == found
+    if found == GOOD:
+        base, _, digits = text.partition("#")
+        assert peek_all(out) == struct.unpack("<q", struct.pack("<d", float(int(digits, int(base)))))[0]
+
+
+@pytest.mark.parametrize(("text", "found"), [
+    ("16#FF", 255), ("8#17", 15), ("2#1_0", 2), ("16#" + "F" * 16, -1), ("16#1" + "0" * 16, None), ("8#1" + "7" * 21, -1),
+    ("8#2" + "0" * 21, None), ("2#" + "1" * 64, -1), ("2#1" + "0" * 64, None), ("16#0" + "F" * 16, -1),
+])
+def test_a_whole_number_with_a_base_has_64_bits(text: str, found: int | None) -> None:
+    out = data(bytes(500) + b"whole")
+    status = reading.read_number(out, reading.KINDS["ULINT"], data(text.encode() + b"7"), len(text))
+    assert status == OUTSIDE if found is None else (status, peek_all(out)) == (GOOD, found)
 
 
 # --- ends of runs -----------------------------------------------------------------------------------------------------------

@@ -154,3 +154,21 @@ def test_who_has_one_scan_left_or_whose_time_has_come_leaves_in_front_of_the_sca
     assert (done, gone) == (scanned, left)
     assert all(member.scans_left < 2 or member.batched.until_ns <= left[-1][0] for member in members)
     assert all(each.times[-1] == now_ns - 10 - 100 for now_ns, numbers in left for each in (members[at] for at in numbers))
+
+
+def test_a_batch_that_all_may_not_stay_in_is_used_for_others(kept: Batches) -> None:
+    run = Run()
+    batch = entered(kept, 0, run)
+    run.wants = True
+    assert kept.check() == [0] and not batch.members
+    assert entered(kept, 1, Run(due_ns=77)) is batch and batch.key[0] == 77
+    again = entered(kept, 2, Run())
+    assert again is not batch and list(again.members) == [2]
+
+
+def test_all_batches_are_brought_up_to_date(kept: Batches, monkeypatch: pytest.MonkeyPatch) -> None:
+    settled: list[Batch] = []
+    batches = [entered(kept, 0, Run()), entered(kept, 1, Run(due_ns=5))]
+    monkeypatch.setattr(Batch, "settle", lambda batch: settled.append(batch))
+    kept.settle()
+    assert settled == batches
