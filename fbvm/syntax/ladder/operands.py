@@ -116,7 +116,7 @@ class Operands:
             return Literal(start, end, "real" if real else "int", value, None, text)
         text = self.numbered.get(text.upper(), text)
         wanted = "b" if "." in text and not _SYMBOL.fullmatch(text) or text.upper() in SYMBOLS else "w"
-        if text[:1] not in "@*" and _SYMBOL.fullmatch(text) and not _is_address(text) and text.upper() not in SYMBOLS:
+        if _SYMBOL.fullmatch(text) and not _is_address(text) and text.upper() not in SYMBOLS:
             place = self._symbol(text, "b", start, end)
         else:
             place = self.expression(text, wanted, start, end)
