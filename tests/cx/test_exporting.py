@@ -63,6 +63,7 @@ def test_sources_that_say_the_same_change_no_byte() -> None:
         assert made.changed == []
 
 
+@pytest.mark.slow
 def test_a_program_without_symbols_of_its_own_and_sections_without_rungs_stay_as_they_are() -> None:
     saved = Cxt(sections=(("One", ("LD 0.00\nOUT 1.00",)), ("Two", ("",)), ("Three", ()))).bytes()
     data = re.sub(rb"(?s) *LocalVariables:=.*? END;\s+(?=TaskID)", b"", saved)
