@@ -39,6 +39,8 @@ RUNGS = {
     "a := b = c;": "LD b; AND c; LDNOT b; ANDNOT c; ORLD; OUT a",
     "a := b <> c;": "LD b; ANDNOT c; LDNOT b; AND c; ORLD; OUT a",
     "a := (b OR c) AND (d OR e OR f);": "LD b; OR c; LD d; OR e; OR f; ANDLD; OUT a",
+    "a := (b OR c) AND d OR e;": "LD b; OR c; AND d; OR e; OUT a",
+    "a := b OR c OR (d OR e) AND f;": "LD b; OR c; LD d; OR e; AND f; ORLD; OUT a",
     "a := n > 5 AND NOT (m = n + 1);": "LD> n 5; AND<> m n + 1; OUT a",
     "a := b := c;": "LD c; OUT a; OUT b",
     "a S= b; c R= NOT b;": "LD b; SET a",
