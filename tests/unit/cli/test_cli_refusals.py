@@ -73,6 +73,7 @@ def fbvm(*arguments: str) -> Any:
     ({"program": "counter.st", "set": [{"name": "Main.m", "value": 1}]}, "Main has no m; it has n", ""),
     ({"program": "counter.st", "force": {"Main.n": "x"}}, "", ""), ({"program": "counter.st", "engine": "steam"}, "steam", ""),
     ({"project": ".", "main": "Main", "cycle": "1ms"}, "cycle, main: with a project its file says that", ""),
+    ({"project": ".", "seed": 3}, "seed: with a project its file says that", ""),
     ({"project": "empty"}, "there is no fbvm.toml in {folder}/empty", ""),
     ({"project": "no.toml"}, "there is no file {folder}/no.toml", ""),
     ({"project": ".", "plc": "mixer"}, "there is no PLC mixer; there is pump, tank", ""),
@@ -111,6 +112,20 @@ def test_what_is_launched_is_forced_written_and_bounded(folder: Path) -> None:
     assert list(chosen.sessions) == ["tank", "pump"] and chosen.until_scan == 4
     chosen.sessions["tank"].scan(1)
     assert [chosen.sessions[name].plc.read("Main.n") for name in ("tank", "pump")] == [31, 0]
+
+
+def test_a_launch_without_timing_seed_and_engine_is_exact_with_seed_0(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[tuple[Any, ...]] = []
+
+    def noted(*arguments: Any) -> Any:
+        made.append(arguments[1:2] + arguments[3:5] + arguments[6:7])
+        raise LaunchError("noted")
+
+    monkeypatch.setattr(launch, "program_world", noted)
+    for more in ({}, {"cycle": "10ms", "timing": "exact", "seed": 0, "engine": "auto"}, {"timing": "real", "seed": 7}):
+        with pytest.raises(LaunchError, match="noted"):
+            launch.open_launch({"program": "counter.st", "cwd": str(folder)} | more)
+    assert made == [(10_000_000, "exact", 0, "auto")] * 2 + [(10_000_000, "real", 7, "auto")]
 
 
 def test_recordings_that_cannot_be_executed_are_noted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,7 +43,7 @@ LAUNCH: dict[str, tuple[type, ...]] = {
     "force": (dict,), "stopOnEntry": (bool,), "for": (str,), "scans": (int,), "noDebug": (bool,), "cwd": (str,), "test": (str,),
     "recording": (str,),
 }  # fmt: skip
-"""The keys of a launch configuration, and what their values are; `docs/guides/debugger.md` describes each."""
+"""The keys of a launch configuration, and what their values are; `docs/howto/debugger.md` describes each."""
 
 
 def open_launch(arguments: Mapping[str, Any]) -> Target:
@@ -156,7 +156,7 @@ def _test(node: str, folder: Path) -> Target:
 
 def _project(given: Mapping[str, Any], path: Path) -> Target:
     """The PLCs of a project, which share one time and one network in memory."""
-    own = {"main", "resource", "libraries", "dialect", "heap", "cycle", "engine", "timing", "map"} & set(given)
+    own = {"main", "resource", "libraries", "dialect", "heap", "cycle", "engine", "timing", "seed", "map"} & set(given)
     if own:
         raise LaunchError(f"{', '.join(sorted(own))}: with a project its file says that")
     project = _read_project(path)

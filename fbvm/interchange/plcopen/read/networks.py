@@ -192,7 +192,7 @@ def _rereads(group: list[Object], known: dict[Object, Access]) -> bool:
         for leaf in _leaves(item):
             since = first.setdefault(leaf, at)
             names = known[leaf].reads if leaf in known else frozenset()
-            if any(since <= written.get(name, -1) < at for name in names):
+            if any(since <= written.get(name, -1) for name in names):
                 return True
         written.update(dict.fromkeys(known[item].writes, at))
         first.setdefault(item, at + 1)
