@@ -58,6 +58,18 @@ def test_a_store_ends_what_is_evaluated_together() -> None:
     assert readings((contact(0, bit(0)), let, contact(1, tmp))) == [("mark", 0, 1, False), ("mark", 0, 4, False)]
 
 
+@each_of(("contacts", "of_its_own"), ((32, False), (33, True)))
+def test_a_state_follows_from_up_to_32_marks(contacts: int, of_its_own: bool) -> None:
+    """Contacts at variables of type BOOL have a mark each; the coil behind them is evaluated from a chain of ANDs."""
+    lets = tuple(("let", number, "b", load("b", number)) for number in range(contacts))
+    tmps = [("tmp", "b", number) for number in range(contacts)]
+    power: Node = tmps[0]
+    for tmp in tmps[1:]:
+        power = "and", "b", power, tmp
+    found = readings((*lets, *(contact(number, tmp) for number, tmp in enumerate(tmps)), contact(contacts, power)))
+    assert (found[-1] == ("mark", contacts, 1, False)) is of_its_own and found[-1][0] == ("mark" if of_its_own else "and")
+
+
 def several() -> Image:
     """A body that is called for two instances among the slots."""
     inner = (contact(0, ("load_bit", "b", own(0), 0)), contact(1, load("b", 9)))
