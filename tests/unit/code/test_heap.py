@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
-from fbvm.code.image import LARGEST_HEAP, USUAL_HEAP, Image
+from fbvm.code.image import LARGEST_HEAP, USUAL_HEAP, Image, Objects
 from fbvm.code.listing import listing
-from fbvm.code.operations import OFFSET_MASK, OFFSET_SHIFT
+from fbvm.code.operations import LEASED, OFFSET_MASK, OFFSET_SHIFT
 from fbvm.engine.native import engine as native
 from fbvm.machine.plc import Plc
 from fbvm.step.session import Session
@@ -97,6 +97,13 @@ def test_the_first_block_that_is_large_enough_is_taken(seed: int) -> None:
             full += offset is None
             assert found == (0 if offset is None else begin + offset)
     assert plc.read("Main.ok") is True and full > 2
+
+
+def test_the_number_of_an_object_says_whether_new_has_made_it() -> None:
+    """The heap's rows are the last ones; without any, a number belongs to what else is leased."""
+    first = LEASED + (2 << 21)  # of four rows the third
+    for rows, number, made in ((1, first, True), (2, first + 5, True), (1, first - 1, False), (0, first, False), (1, 2, False)):
+        assert Objects(leases=4, heap_rows=rows, heap_row=2).is_made(number) is made, (rows, number)
 
 
 def test_a_heap_has_as_many_bytes_as_are_asked_for() -> None:
