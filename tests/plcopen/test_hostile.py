@@ -50,6 +50,9 @@ def test_a_document_type_is_refused_before_anything_is_expanded_or_fetched(data:
     (b"<html/>", "X0104", "<html> of no namespace"),
     (b'<project xmlns="http://maven.apache.org/POM/4.0.0"/>', "X0104", "maven"),
     (b'<Project xmlns="www.iec.ch/public/TC65SC65BWG7TF10"/>', "X0104", "IEC 61131-10"),
+    (b'<Project xmlns="http://example.org/61131-10"/>', "X0104", "IEC 61131-10"),
+    (b'<Project xmlns="http://example.org/build"/>', "X0104", "<Project> of http://example.org/build, no PLCopen project"),
+    (b'<project xmlns="http://example.org/61131-10"/>', "X0104", "<project> of http://example.org/61131-10, no PLCopen project"),
 ])
 def test_what_is_no_project_says_what_it_is(data: bytes, code: str, says: str) -> None:
     found = only(data)
