@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,13 @@ def test_control_c_takes_back_a_line() -> None:
 def test_what_was_typed_is_kept(own_history: Path) -> None:
     assert typed("scan 3\r") == ["scan 3"]
     assert "scan 3" in own_history.read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="rights are others there")
+def test_what_was_typed_is_for_its_user_alone(own_history: Path) -> None:
+    typed("scan 3\r")
+    assert own_history.stat().st_mode & 0o777 == 0o600
 
 
 @pytest.mark.slow
