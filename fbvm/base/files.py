@@ -57,7 +57,12 @@ def open_file(path: Path | str) -> BinaryIO:
 def read_file(path: Path | str, most_bytes: int) -> bytes:
     """The contents of a regular file.  Raises OSError, which is Unreadable also for a file of more than `most_bytes` bytes."""
     with open_file(path) as file:
-        data = file.read(most_bytes + 1)
+        return read_all(file, most_bytes)
+
+
+def read_all(file: BinaryIO, most_bytes: int) -> bytes:
+    """All that a file or pipe holds.  Raises OSError, which is Unreadable for more than `most_bytes` bytes."""
+    data = file.read(most_bytes + 1)
     if len(data) > most_bytes:
         raise Unreadable(errno.EFBIG, f"it has more than {most_bytes // MIB} MiB")
     return data

@@ -23,6 +23,8 @@ from fbvm.cli.shared.files import OutputError
 from fbvm.cli.shared.streams import give_up_output, prepare_streams
 from fbvm.cli.shared.terminal import named, say
 
+NO_THREAD = "can't start new thread"
+"""What Python says if the system has no more threads for it."""
 VERB_GROUPS = {
     "running": ("Run PLCs", {
         "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
@@ -130,6 +132,12 @@ class _Verbs(click.Group):
             said = f"{named(error.filename)} cannot be used" if error.filename else "the output cannot be written"
             with suppress(OSError):
                 say(f"{said}: {reason(error)}", err=True)
+            sys.exit(status.USAGE)
+        except (MemoryError, RuntimeError) as error:
+            if isinstance(error, RuntimeError) and str(error) != NO_THREAD:
+                raise
+            lacking = "memory" if isinstance(error, MemoryError) else "threads"
+            say(f"the system gives fbvm no more {lacking} (`ulimit -a` shows its limits)", err=True)
             sys.exit(status.USAGE)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:

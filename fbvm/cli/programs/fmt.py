@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.diagnostics import Source, whole_lines
-from fbvm.base.files import SOURCE_BYTES, read_file, reason, write_file
+from fbvm.base.files import SOURCE_BYTES, read_all, read_file, reason, write_file
 from fbvm.check.spelling import OUTSIDE
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
@@ -99,15 +99,12 @@ def _left_alone(name: str, why: str) -> None:
 
 def _read(path: Path) -> tuple[Source | None, bytes]:
     """The text and the bytes of a file; without a text its error is printed."""
-    if path == STREAM:
-        data = sys.stdin.buffer.read()
-        source = decode(data, "stdin")
-    else:
-        try:
-            data = read_file(path, SOURCE_BYTES)
-            source = decode(data, str(path))
-        except OSError as error:
-            data, source = b"", refusal(str(path), reason(error))
+    name = "stdin" if path == STREAM else str(path)
+    try:
+        data = read_all(sys.stdin.buffer, SOURCE_BYTES) if path == STREAM else read_file(path, SOURCE_BYTES)
+        source = decode(data, name)
+    except OSError as error:
+        data, source = b"", refusal(name, reason(error))
     if isinstance(source, Source):
         return source, data
     show_diagnostic(source)

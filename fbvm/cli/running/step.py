@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic
+from fbvm.base.files import reason
 from fbvm.cli.shared import status
 from fbvm.cli.shared.debug.worlds import NetworkPackets, ProgramErrors, ProjectWorld, program_world
 from fbvm.cli.shared.e_banks import e_banks_in
@@ -34,6 +35,8 @@ from fbvm.step.session import Session
 from fbvm.step.stop_report import StopReport
 from fbvm.watch.places import parse_for
 
+SCRIPT_LINE_CHARACTERS = 1_000_000
+"""Longest line of a script."""
 PACKET_SCANS = 1000
 """Scans of a recording up to the present one whose packets `net` knows."""
 
@@ -181,7 +184,7 @@ def _interact(commands: Commands) -> None:
 
 
 def _script(commands: Commands) -> None:
-    for line in sys.stdin:
+    for line in _script_lines():
         if not line.strip() or line.lstrip().startswith("//"):
             continue
         say(f"> {line.strip()}")
@@ -193,6 +196,17 @@ def _script(commands: Commands) -> None:
             sys.exit(status.FAILED if isinstance(error, ExpectationError) else status.USAGE)
         if commands.ended:
             return
+
+
+def _script_lines() -> Iterator[str]:
+    """The lines of the standard input.  Raises UsageError for a line without an end, and if it cannot be read."""
+    try:
+        while line := sys.stdin.readline(SCRIPT_LINE_CHARACTERS + 1):
+            if len(line) > SCRIPT_LINE_CHARACTERS:
+                raise click.UsageError(f"a line of the standard input has more than {SCRIPT_LINE_CHARACTERS} characters")
+            yield line
+    except OSError as error:
+        raise click.UsageError(f"the standard input cannot be read: {reason(error)}") from None
 
 
 def _print(line: str) -> None:

@@ -11,6 +11,8 @@ ERRORS = "fbvm.ascii"
 """The name under which codecs find `_in_ascii`."""
 _PLAIN_ASCII = "fbvm-ascii"
 """ASCII under a name of its own: click takes a stream in `ascii` for a mistake and writes UTF-8 into it."""
+LAST_STREAM = 2
+"""The number of the standard error."""
 ASCII = {
     **dict.fromkeys(map(chr, range(0x2500, 0x2580)), "+"), **dict.fromkeys("─━═╌╴╶╸╺", "-"),
     **dict.fromkeys("│┃║╎╵╷╹╻╽╿├┝┠┣┤┥┨┫╞╟╠╡╢╣", "|"), **dict.fromkeys("↑▲", "^"), **dict.fromkeys("↓▼", "v"),
@@ -41,10 +43,16 @@ codecs.register(_plain_ascii)
 
 
 def prepare_streams() -> None:
-    """Makes the standard streams usable: a closed one reads nothing and writes nowhere, and every text can be written."""
+    """Makes the standard streams usable: a closed one reads nothing and writes nowhere, also in the processes that are started,
+    and every text can be read and written."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w", encoding="utf-8"))  # noqa: SIM115
+            nowhere = open(os.devnull, "r" if name == "stdin" else "w", encoding="utf-8")  # noqa: SIM115
+            setattr(sys, name, nowhere)
+            if nowhere.fileno() <= LAST_STREAM:  # the number of the closed one, which a new process inherits as its own
+                os.set_inheritable(nowhere.fileno(), True)
+    if isinstance(sys.stdin, io.TextIOWrapper):
+        sys.stdin.reconfigure(errors="backslashreplace")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             in_ascii = codecs.lookup(stream.encoding).name == "ascii"
@@ -57,5 +65,5 @@ def give_up_output() -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
-    except (OSError, ValueError):  # no file of the host, as in tests
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - to the end of the process
+    except (OSError, ValueError):  # no file of the host, as in tests, or no number for another file
+        sys.stdout = io.StringIO()

@@ -18,6 +18,8 @@ from rows import each_of, first_quick
 from fbvm.base.areas import AREAS, SLOTS_OFFSET
 from fbvm.base.memory import Memory
 from fbvm.cli.main import main
+from fbvm.cli.programs import fmt
+from fbvm.cli.running import step
 from fbvm.cli.shared import files, run_recording
 from fbvm.cli.shared.files import OutputError, growing_file
 from fbvm.cli.shared.streams import ASCII, prepare_streams
@@ -155,6 +157,52 @@ def test_messages_in_code_pages_of_windows(tmp_path: Path, encoding: str, shown:
     found = CliRunner(charset=encoding).invoke(main, ["check", str(tmp_path / "line.st")], catch_exceptions=False)
     assert found.exit_code == 3
     assert f"// {shown}" in found.output
+
+
+@on_posix
+@pytest.mark.slow
+@each_of("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_processes_of_a_verb_have_streams_where_its_own_are_closed(tmp_path: Path, closed: str) -> None:
+    (tmp_path / "test_counts.py").write_text("def test_counts():\n    assert 1 + 1 == 2\n")
+    done = subprocess.run(f'"{sys.executable}" -m fbvm test test_counts.py {closed}', shell=True, capture_output=True,
+                          cwd=tmp_path, timeout=60)  # fmt: skip
+    assert (done.returncode, b"Traceback" in done.stdout + done.stderr) == (0, False)
+
+
+def test_an_input_without_an_end_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(step, "SCRIPT_LINE_CHARACTERS", 20)
+    monkeypatch.setattr(fmt, "SOURCE_BYTES", 1 << 20)
+    done = CliRunner().invoke(main, ["step", DEMO], input="help\n" + 21 * "x")
+    assert (done.exit_code, done.stderr.splitlines()[-1]) == (
+        2, "Error: a line of the standard input has more than 20 characters")
+    done = CliRunner().invoke(main, ["fmt", "-"], input=(1 << 20) * b"x" + b"x")
+    assert (done.exit_code, done.stderr.splitlines()[0]) == (
+        3, "stdin:1:1: error S0107: stdin cannot be read: it has more than 1 MiB")
+
+
+@on_posix
+@pytest.mark.slow
+def test_an_input_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    for words, status, said in ((("step", DEMO), 2, "the standard input cannot be read: "),
+                                (("fmt", "-"), 3, "stdin cannot be read: ")):  # fmt: skip
+        with (tmp_path / "input").open("wb") as only_written:
+            done = subprocess.run([*FBVM, *words], stdin=only_written, capture_output=True, text=True, timeout=60)
+        assert (done.returncode, said in done.stderr, "Traceback" in done.stderr) == (status, True, False)
+
+
+def test_a_script_that_its_encoding_cannot_read_is_shown_with_its_bytes() -> None:
+    done = CliRunner(charset="ascii").invoke(main, ["step", DEMO], input=b"print \xff\n")
+    assert (done.exit_code, done.stdout.splitlines()[-1]) == (2, "> print \\xff")
+
+
+@each_of(("error", "lacking"), [(MemoryError(), "memory"), (RuntimeError("can't start new thread"), "threads")])
+def test_what_the_system_does_not_give_is_said(error: Exception, lacking: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(fmt, "_read", refused)
+    done = fbvm("fmt", DEMO)
+    assert (done.exit_code, done.stderr) == (2, f"the system gives fbvm no more {lacking} (`ulimit -a` shows its limits)\n")
 
 
 def test_closed_streams_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
