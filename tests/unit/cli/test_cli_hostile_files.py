@@ -200,8 +200,23 @@ def of_namespaces(count: int) -> str:
     return f"{'NAMESPACE a ' * count}{'END_NAMESPACE ' * count}\nPROGRAM Main END_PROGRAM\n"
 
 
+DRAWN = "PROGRAM Main\nVAR a, b : BOOL; END_VAR\nLADDER\n{}\nEND_LADDER\nEND_PROGRAM\n"
+
+
+def of_drawn_contacts(count: int) -> str:
+    """A drawn rung with contacts one behind the other."""
+    return DRAWN.format(f"    {'   a   ' * count}   b\n   |{'--| |--' * count}--( )--|")
+
+
+def of_drawn_coils(count: int) -> str:
+    """A drawn rung with coils one below the other."""
+    below = "\n   |       |       b\n   |       +------( )--|"
+    return DRAWN.format(f"       a           b\n   |--| |--+------( )--|{below * count}")
+
+
 @pytest.mark.slow
-@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500), (of_far_jumps, 100), (of_bases, 50), (of_namespaces, 500)])
+@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500), (of_far_jumps, 100), (of_bases, 50), (of_namespaces, 500),
+                           (of_drawn_contacts, 200), (of_drawn_coils, 200)])  # fmt: skip
 def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int) -> None:
     def took_s(count: int) -> float:
         text = made(count)

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 
 from fbvm.base.digits import whole_number
 from fbvm.syntax.ladder.drawing.box_lines import DOWN, LEFT, RIGHT, UP, WAY_WORDS
@@ -94,6 +96,7 @@ class Grid:
     def __init__(self, lines: Sequence[str]) -> None:
         self.lines = lines
         self.taken: set[Cell] = set()
+        self._rows: dict[int, list[tuple[int, int]]] = {}
         self.boxes: list[DrawnBox] = []
         self.elements: list[DrawnElement] = []
         self.links: list[tuple[int, int, int, int]] = []
@@ -285,7 +288,7 @@ class Grid:
             if not found or self._is_taken(x, found.end(), y) or not self._is_on_wire(x, found.end() - 1, y, is_coil):
                 continue
             known = (_COIL_KNOWN if is_coil else _KNOWN).fullmatch(line[x + 1:found.end() - 1])
-            if known or any(start < found.end() and x < end for start, end in self._texts(y - 1)):
+            if known or self._has_text(x, found.end(), y - 1):
                 continue  # its operand stands above
             if not is_coil and any(self._is_crossed(column, y) for column in (x, found.end() - 1)):
                 continue
@@ -327,9 +330,16 @@ class Grid:
             texts = self._label(element, wanted)
             element.operands = tuple(self.lines[element.y - 1][start:end] for start, end in texts)
             element.operand_at = texts
+        in_rows: dict[int, list[DrawnElement]] = {}
+        for element in sorted(self.elements, key=lambda each: each.x):
+            in_rows.setdefault(element.y, []).append(element)
         for y in range(len(self.lines)):
-            for start, end in self._texts(y):
-                above = [e for e in self.elements if e.y == y - 1 and e.x <= end + 1 and e.until >= start - 2]
+            row_above = in_rows.get(y - 1, [])
+            for start, end in self._row(y):
+                if self._is_taken(start, end, y):
+                    continue
+                above = row_above[bisect_left(row_above, start - 2, key=lambda e: e.until):
+                                  bisect_right(row_above, end + 1, key=lambda e: e.x)]
                 if not above:
                     text = self.lines[y][start:end]
                     self._take(start, end, y)
@@ -342,10 +352,12 @@ class Grid:
 
     def _label(self, element: DrawnElement, wanted: int) -> list[tuple[int, int]]:
         """The columns of the operands of a contact or coil: the `wanted` texts of the row above that are nearest to it."""
-        texts = [text for text in self._texts(element.y - 1) if not self.lines[element.y - 1].startswith("= ", text[0])]
-        choices = [texts[at:at + wanted] for at in range(len(texts) - wanted + 1)
-                   if all(b[0] - a[1] == 1 for a, b in zip(texts[at:at + wanted], texts[at + 1:at + wanted], strict=False))]
-        near = [c for c in choices if c[0][0] <= element.until + 2 and c[-1][1] >= element.x - 1]
+        texts, y = self._row(element.y - 1), element.y - 1
+        first = bisect_left(texts, element.x - 1, key=lambda text: text[1]) - wanted + 1
+        last = bisect_right(texts, element.until + 2, key=lambda text: text[0])
+        choices = [texts[at:at + wanted] for at in range(max(first, 0), min(last, len(texts) - wanted + 1))]
+        near = [c for c in choices if all(b[0] - a[1] == 1 for a, b in pairwise(c))
+                and not any(self._is_taken(*text, y) or self.lines[y].startswith("= ", text[0]) for text in c)]
         if not near:
             what = "coil" if element.is_coil else "contact"
             self.problems.append(DrawingError(
@@ -358,12 +370,19 @@ class Grid:
             self._take(start, end, element.y - 1)
         return chosen
 
-    def _texts(self, y: int) -> Iterator[tuple[int, int]]:
-        """The texts of a row that nothing has taken."""
-        if 0 <= y < len(self.lines):
-            for found in _TEXT.finditer(self.lines[y]):
-                if not self._is_taken(found.start(), found.end(), y) and not set(found[0]) <= set("-+"):
-                    yield found.span()
+    def _has_text(self, x: int, until: int, y: int) -> bool:
+        """Whether a text that nothing has taken stands in some columns of a row."""
+        texts = self._row(y)
+        first = bisect_right(texts, x, key=lambda text: text[1])
+        last = bisect_left(texts, until, key=lambda text: text[0])
+        return not all(self._is_taken(*text, y) for text in texts[first:last])
+
+    def _row(self, y: int) -> list[tuple[int, int]]:
+        """The places of the texts of a row, from left to right, that are more than a wire."""
+        if y not in self._rows:
+            found = _TEXT.finditer(self.lines[y]) if 0 <= y < len(self.lines) else ()
+            self._rows[y] = [each.span() for each in found if not set(each[0]) <= set("-+")]
+        return self._rows[y]
 
 
 RAIL = "│┃├┣┝┠┤┫┥┨|║╟╢┌└┐┘+"

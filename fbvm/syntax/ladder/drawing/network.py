@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter, defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn
@@ -46,6 +47,11 @@ class Nets(ABC):
         self.leaves: dict[Hashable, list[_Leaf]] = {}
         self._rows: dict[int, list[tuple[Order, Series]]] = {}
         """By parallel connection, its branches with their positions."""
+        self._from: defaultdict[Hashable, list[_Edge]] = defaultdict(list)
+        self._into: defaultdict[Hashable, list[_Edge]] = defaultdict(list)
+        """The edges that leave and enter each net, when all have been joined that can be."""
+        self._inputs: set[Hashable] = set()
+        """Nets of lower inputs that lead nowhere else."""
 
     def add_edge(self, start: Net, end: Hashable, part: Part) -> None:
         """An element through which power goes from one net to another."""
@@ -63,7 +69,12 @@ class Nets(ABC):
         """The bus bar with all elements that follow it.  Raises DrawingError."""
         while self._merge_branches() or self._merge_series():
             pass
+        self._from = self._leaving()
+        self._into = defaultdict(list)
+        for edge in self.edges:
+            self._into[edge.end].append(edge)
         self._check()
+        self._inputs = {name for name in self._others() if name not in self.leaves and not self._from[name]}
         bar = Point(Series())
         self._hang(bar, BUS, None)
         return bar
@@ -77,8 +88,9 @@ class Nets(ABC):
             if edge.end != SINK:
                 found.setdefault((edge.start, edge.end), []).append(edge)
         groups = [sorted(group, key=lambda edge: edge.order) for group in found.values() if len(group) > 1]
+        merged = {edge for group in groups for edge in group}
+        self.edges = [edge for edge in self.edges if edge not in merged]
         for group in groups:
-            self.edges = [edge for edge in self.edges if edge not in group]
             rows = sorted((row for edge in group for row in self._branches(edge)), key=lambda row: row[0])
             whole = Parallel([branch for _, branch in rows])
             self._rows[id(whole)] = rows
@@ -93,34 +105,48 @@ class Nets(ABC):
         return [(edge.order, Series(edge.parts))]
 
     def _merge_series(self) -> bool:
-        """Join two edges to a series at a net that has no other edge."""
-        kept = {BUS, SINK, *self.leaves, *(net.name for leaves in self.leaves.values() for leaf in leaves for net in leaf.others)}
+        """Join edges to a series at each net that one edge enters and one edge leaves."""
+        kept = {BUS, SINK, *self.leaves, *self._others()}
+        entering, leaving = Counter(edge.end for edge in self.edges), self._leaving()
+        merged: set[_Edge] = set()
         for before in self.edges:
-            behind = [edge for edge in self.edges if edge.start == before.end]
-            if before.end in kept or len(behind) != 1 or sum(edge.end == before.end for edge in self.edges) != 1:
-                continue
-            self.edges.remove(behind[0])
-            before.end = behind[0].end
-            before.parts = [*before.parts, *behind[0].parts]
-            return True
-        return False
+            while before not in merged and before.end not in kept and entering[before.end] == len(leaving[before.end]) == 1:
+                [behind] = leaving[before.end]
+                if behind is before:  # a ring
+                    break
+                merged.add(behind)
+                before.end = behind.end
+                before.parts += behind.parts
+        self.edges = [edge for edge in self.edges if edge not in merged]
+        return bool(merged)
+
+    def _leaving(self) -> defaultdict[Hashable, list[_Edge]]:
+        """The edges that leave each net."""
+        found: defaultdict[Hashable, list[_Edge]] = defaultdict(list)
+        for edge in self.edges:
+            found[edge.start].append(edge)
+        return found
 
     # --- checks and the tree ----------------------------------------------------------------------------------------
 
     def _check(self) -> None:
+        others = self._others()
         reached: set[Hashable] = {BUS}
-        while new := {edge.end for edge in self.edges if edge.start in reached} - reached - {SINK}:
+        waiting: list[Hashable] = [BUS]
+        while waiting:
+            new = {edge.end for edge in self._from[waiting.pop()]} - reached - {SINK}
             reached |= new
+            waiting += new
         for edge in self.edges:
             if edge.start not in reached:
                 self.bad(edge.parts[0], "this hangs on no bus bar", "a wire leads here from the left rail, through contacts")
-            if sum(other.end == edge.end != SINK for other in self.edges) > 1:
+            if edge.end != SINK and len(self._into[edge.end]) > 1:
                 self.bad(edge.parts[-1], "wires meet behind this that do not begin at one place",
                           "branches begin and end together; what else leads here has a rung of its own")
             if edge.end == SINK and isinstance(edge.parts[-1], Contact):
                 self.bad(edge.parts[-1], "there is no coil and no box behind this contact",
                           "draw ( ) in front of the right rail")
-            used = edge.end in self.leaves or any(other.start == edge.end for other in self.edges) or edge.end in self._others()
+            used = edge.end in self.leaves or self._from[edge.end] or edge.end in others
             if edge.end != SINK and not used:
                 self.bad(edge.parts[-1], "the wire behind this leads nowhere", "let it lead to a coil or to a box")
         for net, leaves in self.leaves.items():
@@ -133,7 +159,6 @@ class Nets(ABC):
 
     def _hang(self, point: Point, net: Hashable, before: Hashable) -> None:
         """Add to a point what follows its net, from above; `before` is the net of the point before."""
-        others = {name for name in self._others() if name not in self.leaves and all(edge.start != name for edge in self.edges)}
         outs: list[tuple[Order, Coil | Box | Point]] = []
         for leaf in self.leaves.get(net, ()):
             if leaf.others:
@@ -144,8 +169,8 @@ class Nets(ABC):
                     outs.append((leaf.order, Point(Series(), [leaf.out])))
                     continue
             outs.append((leaf.order, leaf.out))
-        for edge in self.edges:
-            if edge.start == net and edge.end not in others:
+        for edge in self._from[net]:
+            if edge.end not in self._inputs:
                 behind = Point(Series(edge.parts))
                 if edge.end != SINK:
                     self._hang(behind, edge.end, net)
@@ -154,14 +179,14 @@ class Nets(ABC):
 
     def _begins(self, net: Net) -> Hashable:
         """The net at which the condition of a lower input begins."""
-        return next((edge.start for edge in self.edges if edge.end == net.name), net.name)
+        return next((edge.start for edge in self._into[net.name]), net.name)
 
     def _input(self, net: Net, box: Box, branch: Hashable) -> Series:
         """The condition of a lower input of a box; it begins at the bus bar, or at the net `branch`."""
         if net.name in (BUS, branch):
             return Series([], net.name != BUS)
-        into = [edge for edge in self.edges if edge.end == net.name]
-        if net.name in self.leaves or any(edge.start == net.name for edge in self.edges) or into[0].start not in (BUS, branch):
+        into = self._into[net.name]
+        if net.name in self.leaves or self._from[net.name] or into[0].start not in (BUS, branch):
             self.bad(box, "a lower input of this box hangs on a wire that leads elsewhere, too",
                       "each of its inputs has a line of its own from the left rail")
         return Series(into[0].parts, into[0].start != BUS)

@@ -51,8 +51,8 @@ class Wires:
     # --- joining ----------------------------------------------------------------------------------------------------
 
     def _root(self, name: Hashable) -> Hashable:
-        while name in self._above and self._above[name] != name:
-            name = self._above[name]
+        while (above := self._above.get(name, name)) != name:
+            self._above[name] = name = self._above[above]  # half as long a way for those who ask next
         return name
 
     def _join(self, one: Hashable, other: Hashable) -> None:
