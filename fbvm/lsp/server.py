@@ -6,13 +6,11 @@ requests are answered.  A change of what others see begins with everything."""
 from __future__ import annotations
 
 import asyncio
-import logging
 from pathlib import Path
+from typing import Any
 
 from lsprotocol import types
-from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
-from pygls.protocol import JsonRPCProtocol
 
 from fbvm.analysis.garbage import Garbage
 from fbvm.analysis.parts import File
@@ -21,6 +19,7 @@ from fbvm.interchange.twincat import TASK_SUFFIX
 from fbvm.lsp import foreign, project_file
 from fbvm.lsp.positions import Positions
 from fbvm.lsp.projects import Project, Projects, Settings, path_of
+from fbvm.lsp.protocol import Protocol, Refused, tell_in_a_line
 from fbvm.run.project import FILE
 
 AFTER_KEY_S = 0.02
@@ -37,24 +36,24 @@ UNUSED = ("S0290", "S0291", "S0293")
 _SEVERITY = {"error": types.DiagnosticSeverity.Error, "warning": types.DiagnosticSeverity.Warning}
 
 
-def _is_fault(record: logging.LogRecord) -> bool:
-    """False for a refusal, which the editor gets as an answer: nobody has to look for its place in this program."""
-    return not (record.exc_info and isinstance(record.exc_info[1], JsonRpcException))
-
-
 class Server(LanguageServer):
     """One client's server.  The features are in `navigation`, `editing` and `appearance`."""
 
     def __init__(self, version: str) -> None:
-        super().__init__("fbvm", version, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
+        super().__init__("fbvm", version, text_document_sync_kind=types.TextDocumentSyncKind.Incremental, protocol_cls=Protocol)
         self.projects = Projects(self.open_text)
         self.open_paths: dict[Path, str] = {}
         """The files that the editor has open, and their URIs as it writes them."""
         self.told: dict[str, list[types.Diagnostic]] = {}
         """The diagnostics that the editor has of each URI, where there are any."""
         self._garbage = Garbage()
-        logging.getLogger(JsonRPCProtocol.__module__).addFilter(_is_fault)
+        tell_in_a_line()
         self._collection: asyncio.TimerHandle | None = None
+
+    def report_server_error(self, error: Exception, source: Any) -> None:
+        """Shows the editor what went wrong beside the answers to its requests."""
+        if not isinstance(error, Refused):
+            super().report_server_error(error, source)
 
     # --- texts ------------------------------------------------------------------------------------------------------
 
