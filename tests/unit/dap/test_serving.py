@@ -34,6 +34,8 @@ def keep(data: bytes) -> None:
     ([asked("initialize")], keep, ("", False)), ([], keep, ("", False)), ([asked("initialize")], gone, ("", False)),
     ([asked("initialize")[:-3]], keep, ("the client is gone in the middle of a message", False)),
     ([b"Content-Length: x\r\n\r\n"], keep, ("no length of a message: x", False)),
+    ([b"Content-Length: 16777217\r\n\r\n"], keep, ("no length of a message: 16777217", False)),
+    ([b"Content-Length: 16777216\r\n\r\n"], keep, ("the client is gone in the middle of a message", False)),
     ([asked("disconnect", terminateDebuggee=True)[:9], asked("disconnect", terminateDebuggee=True)[9:]], keep, ("", True)),
 ])  # fmt: skip
 def test_how_serving_a_client_ends(pieces: list[bytes], write: Callable[[bytes], None], ended: tuple[str, bool]) -> None:

@@ -10,7 +10,7 @@ from rows import each_of
 
 from fbvm.live.connection import MOST_REQUEST_BYTES, Connection
 from fbvm.live.guard import Guard
-from fbvm.live.messages import MOST_MESSAGE_BYTES, MOST_TEXT
+from fbvm.live.messages import MOST_MESSAGE_BYTES, MOST_TEXT, message_id
 
 FILE = {"path": "/", "origin": None, "upgrade": False}
 
@@ -120,6 +120,14 @@ def test_the_page_has_neither_inline_scripts_nor_inline_styles_nor_other_sites()
     assert " style=" not in text and " onclick" not in text and "<style" not in text
     assert "://" not in text
     assert text.count("<script") == text.count('<script type="module" src="/main.js">') == 1
+
+
+@each_of("text, number", [
+    ('{"id":9007199254740991}', 2**53 - 1), ('{"id":-9007199254740991}', 1 - 2**53), ('{"id":9007199254740992}', None),
+    ('{"id":true}', None), ('{"id":1.0}', None), ("[]", None), ("{", None), ("[" * 100_000, None),
+])  # fmt: skip
+def test_the_id_of_a_message_is_a_whole_number_that_javascript_holds(text: str, number: int | None) -> None:
+    assert message_id(text) == number
 
 
 def test_the_token_is_in_the_address_only_behind_the_number_sign() -> None:

@@ -247,9 +247,11 @@ def test_modes_and_starts_are_acts(page: Page) -> None:
     page.done("mode", plc="pump", mode="PROGRAM")
     page.scan(5)
     assert page.plc.read("Main.Level") == 25
-    page.done("start", plc="pump", kind="cold")
-    assert page.plc.read("Main.Level") == 20
-    assert [text for _, _, text in page.update()["acts"]] == ["mode PROGRAM", "cold start"]
+    page.plc.write("D100", 7)
+    for kind, kept in (("warm", 7), ("cold", 0)):
+        page.done("start", plc="pump", kind=kind)
+        assert (page.plc.read("Main.Level"), page.plc.read("D100")) == (20, kept)
+    assert [text for _, _, text in page.update()["acts"]] == ["mode PROGRAM", "warm start", "cold start"]
 
 
 def test_two_pages_see_the_same_plc_and_what_the_other_did(page: Page) -> None:

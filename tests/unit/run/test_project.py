@@ -15,7 +15,7 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.run import run_all
 from fbvm.run.fault_rows import FAULT
 from fbvm.run.plant import MANY, Plant
-from fbvm.run.project import PLC, RUN, SERVER, Project, project_file, read_project
+from fbvm.run.project import PLC, RUN, SERVER, Project, near, project_file, read_project
 from fbvm.run.toml_keys import span
 from fbvm.wire.link import Peer
 
@@ -356,6 +356,15 @@ def test_a_source_that_is_not_there_is_told_at_its_place(folder: Path) -> None:
         assert found[0].hint == hint
     found = Plant(project(folder, "[plc.a]\nsources = ['valve.st']\n")).diagnostics
     assert found[0].hint.startswith("there is ") and "counter.st" in found[0].hint
+
+
+def test_a_hint_names_five_sources_at_most(tmp_path: Path) -> None:
+    for number in range(1, 6):
+        (tmp_path / f"{number}.st").touch()
+    assert near(tmp_path / "valve.st") == "there is 1.st, 2.st, 3.st, 4.st, 5.st"
+    (tmp_path / "6.st").touch()
+    assert near(tmp_path / "valve.st") == "there is 1.st, 2.st, 3.st, 4.st, 5.st, ..."
+    assert near(tmp_path / "nowhere" / "valve.st") == ""
 
 
 def test_a_picture_that_is_not_there_is_told_at_its_place(folder: Path) -> None:
