@@ -11,6 +11,7 @@ from fbvm.interchange.plcopen.read.rung_parts import instruction
 from fbvm.interchange.plcopen.read.scope import SHARED
 from fbvm.interchange.plcopen.read.values import (
     ATOM,
+    CALL,
     CHAINED,
     EXTENSIBLE,
     INFIX,
@@ -202,7 +203,7 @@ class Calls:
         if folded in INFIX and (len(values) == 2 or len(values) > 2 and folded in CHAINED):
             return joined(folded, values)
         reads = frozenset().union(*(value.reads for value in values))
-        return Value(f"{name}({', '.join(value.text for value in values)})", ATOM - 1, reads)
+        return Value(f"{name}({', '.join(value.text for value in values)})", CALL, reads)
 
     def _enable(self, item: Object) -> Value | None:
         """The value at EN; None if EN is not connected or always TRUE."""
@@ -267,7 +268,7 @@ class Calls:
         wire = Wire(item, result.name if result else "")
         if condition is None and result is not None and self._is_expression(item, result, arguments):
             context.save_values(frozenset((SHARED,)))
-            value = Value(f"{item.text}({', '.join(arguments)})", ATOM - 1, self.reads | {SHARED})
+            value = Value(f"{item.text}({', '.join(arguments)})", CALL, self.reads | {SHARED})
             context.set_output(wire, negation(value) if result.negated else value)
             return
         self._as_statement(item, wire if context.is_used(wire) else None, condition, arguments, frozenset(writes))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from fbvm.interchange.plcopen.schema import SIGNS
 
-LOOSE, OR, XOR, AND, EQUAL, COMPARE, ADD, MULTIPLY, UNARY, ATOM = range(10)
-"""How tightly an operator binds, the weakest first (IEC 61131-3 table 71)."""
+LOOSE, OR, XOR, AND, EQUAL, COMPARE, ADD, MULTIPLY, UNARY, CALL, ATOM = range(11)
+"""How tightly an operator binds, the weakest first (IEC 61131-3 table 71); a name or a literal is an atom."""
 _LEVELS = {"OR": OR, "XOR": XOR, "AND": AND, "=": EQUAL, "<>": EQUAL, "<": COMPARE, ">": COMPARE, "<=": COMPARE, ">=": COMPARE,
            "+": ADD, "-": ADD, "*": MULTIPLY, "/": MULTIPLY, "MOD": MULTIPLY}
 INFIX = {name: (sign, _LEVELS[sign]) for name, sign in SIGNS.items()}
