@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 
 def least_s(work: Callable[[], object]) -> float:
-    """The processor time that the work takes in s: the least of three times, none of which looks for garbage of other tests."""
+    """The processor time that the work takes in s: the least of three times, none of which looks for garbage: that
+    takes time by what other tests have left."""
     took = []
     for _ in range(3):
-        gc.collect()
         gc.disable()
         began_s = time.process_time()
         try:

@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 import signal
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -199,14 +200,18 @@ def test_the_script_debugger(load: Load, capsys: pytest.CaptureFixture[str]) -> 
     assert "one step back in the last scan" in capsys.readouterr().out
 
 
-def test_the_script_recorder(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_script_recorder(load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     script = load("recorder")
     for name, scans in (("NATIVE_SCANS", 20), ("PYTHON_SCANS", 5), ("OBSERVED_SCANS", 2), ("TIMES", 1), ("LEAST_SCANS", 10),
                         ("WARM", 2)):  # fmt: skip
         monkeypatch.setattr(script, name, scans)
+    monkeypatch.setattr(script, "optimised", lambda plc: None)  # beside other tests that build takes a minute or two
     monkeypatch.setattr(script.shutil, "which", lambda name: None)
     monkeypatch.setattr(sys, "argv", ["recorder.py", "20"])
     script.main()
+    said = capsys.readouterr().out
+    assert re.search(r"events a scan; listener / python +2302; ", said)
+    assert "scans of which it has each statement                              0 to 19" in said
 
 
 def test_the_script_recorded_day(load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
