@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib.util
 import io
 import json
+import re
 import shutil
 import signal
-import re
 import sys
 import time
 from collections.abc import Callable
