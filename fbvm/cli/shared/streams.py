@@ -65,5 +65,5 @@ def give_up_output() -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
-    except (OSError, ValueError):  # no file of the host, as in tests, or no number for another file
-        sys.stdout = io.StringIO()
+    except (OSError, ValueError):  # no file of the host, as in tests
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - to the end of the process
