@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import NoReturn
+from typing import Literal, NoReturn
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Pin, Point, Series
@@ -69,10 +69,7 @@ class Nets(ABC):
         """The bus bar with all elements that follow it.  Raises DrawingError."""
         while self._merge_branches() or self._merge_series():
             pass
-        self._from = self._leaving()
-        self._into = defaultdict(list)
-        for edge in self.edges:
-            self._into[edge.end].append(edge)
+        self._from, self._into = self._by_net("start"), self._by_net("end")
         self._check()
         self._inputs = {name for name in self._others() if name not in self.leaves and not self._from[name]}
         bar = Point(Series())
@@ -107,7 +104,7 @@ class Nets(ABC):
     def _merge_series(self) -> bool:
         """Join edges to a series at each net that one edge enters and one edge leaves."""
         kept = {BUS, SINK, *self.leaves, *self._others()}
-        entering, leaving = Counter(edge.end for edge in self.edges), self._leaving()
+        entering, leaving = Counter(edge.end for edge in self.edges), self._by_net("start")
         merged: set[_Edge] = set()
         for before in self.edges:
             while before not in merged and before.end not in kept and entering[before.end] == len(leaving[before.end]) == 1:
@@ -120,11 +117,11 @@ class Nets(ABC):
         self.edges = [edge for edge in self.edges if edge not in merged]
         return bool(merged)
 
-    def _leaving(self) -> defaultdict[Hashable, list[_Edge]]:
-        """The edges that leave each net."""
+    def _by_net(self, side: Literal["start", "end"]) -> defaultdict[Hashable, list[_Edge]]:
+        """The edges that start, or end, at each net."""
         found: defaultdict[Hashable, list[_Edge]] = defaultdict(list)
         for edge in self.edges:
-            found[edge.start].append(edge)
+            found[getattr(edge, side)].append(edge)
         return found
 
     # --- checks and the tree ----------------------------------------------------------------------------------------
