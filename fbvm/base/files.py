@@ -128,6 +128,19 @@ def _beside(target: Path) -> Path:
     return target.with_name(f".fbvm.{os.getpid()}.part")
 
 
+def is_part(path: Path) -> bool:
+    """True for the name of a file that `new_file` writes first; a process that is killed leaves it behind."""
+    return path.name.startswith(".fbvm.") and path.suffix == ".part"
+
+
+def holds(path: Path, content: bytes) -> bool:
+    """True if a path is a regular file, not a link, with exactly these contents."""
+    try:
+        return not path.is_symlink() and read_file(path, len(content)) == content
+    except OSError:
+        return False
+
+
 def write_file(path: Path, content: bytes | str) -> None:
     """Writes all of a file, as `new_file` does; a text in UTF-8.  Raises OSError, and leaves what was there."""
     with new_file(path) as file:

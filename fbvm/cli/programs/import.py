@@ -4,7 +4,6 @@ CODESYS 2.3."""
 from __future__ import annotations
 
 import codecs
-import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ import click
 
 from fbvm.base.files import SOURCE_BYTES, read_file, write_file
 from fbvm.cli.shared import status
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import in_the_way, writing
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.cli.shared.terminal import say
@@ -51,9 +50,8 @@ def command(file: Path, folder: Path, force: bool, plc: str | None, encoding: st
         raise click.UsageError(f"{file} needs no import: `fbvm check {file}` and all other verbs on programs take TwinCAT's "
                                "files as they are")  # fmt: skip
     made = _imported(file, order or "", plc, encoding, memory)
-    there = [name for name in made.files if os.path.lexists(folder / name)]
-    if there and not force:
-        raise click.UsageError(f"{folder / there[0]} is there already; --force writes over it")
+    if not force and (there := in_the_way({folder / name: text for name, text in made.files.items()})):
+        raise click.UsageError(f"{there[0]} is there already; --force writes over it")
     if made.diagnostics or as_json:
         report_diagnostics(made.diagnostics, as_json)
     with writing(folder):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
 from fbvm.base.data import data_folder
-from fbvm.base.files import write_file
+from fbvm.base.files import is_part, write_file
 from fbvm.base.host import portable
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import in_the_way, writing
 from fbvm.cli.shared.terminal import say
 
 EXAMPLE = "project"
@@ -40,15 +41,22 @@ def command(name: str) -> None:
         raise click.UsageError(f"{name!r} cannot be the name of a project; use letters, digits, - and _")
     if portable(title) != title:
         raise click.UsageError(f"{name!r} cannot be the name of a project: Windows has no folder of this name")
-    if target.exists() and (not target.is_dir() or any(target.iterdir())):
-        raise click.UsageError(f"{name} is there already")
     source = data_folder("examples") / EXAMPLE
+    files = {target / path.relative_to(source): path.read_text(encoding="utf-8").replace(TITLE, title)
+             for path in sorted(source.rglob("*")) if path.is_file() and "__pycache__" not in path.parts}  # fmt: skip
+    if target.exists() and (not target.is_dir() or in_the_way(files) or _has_others(target, files)):
+        raise click.UsageError(f"{name} is there already")
     with writing(name):
-        for path in sorted(each for each in source.rglob("*") if each.is_file() and "__pycache__" not in each.parts):
-            copy = target / path.relative_to(source)
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            write_file(copy, path.read_text(encoding="utf-8").replace(TITLE, title))
+        for path, text in files.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_file(path, text)
     say(f"{name}/")
     for file, said in DESCRIPTIONS.items():
         say(f"  {file:<28}{said}")
     say(f"\ncd {name}\nfbvm test")
+
+
+def _has_others(folder: Path, files: Iterable[Path]) -> bool:
+    """True if a folder holds more than these files, their folders, and parts that a killed call has left."""
+    known = {each for path in files for each in (path, *path.parents)}
+    return any(path not in known and not is_part(path) for path in folder.rglob("*"))

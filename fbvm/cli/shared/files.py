@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 import click
 
-from fbvm.base.files import check_writable, reason
+from fbvm.base.files import check_writable, holds, reason
 from fbvm.cli.shared.terminal import named
 
 
@@ -62,6 +63,16 @@ def writing(target: Path | str) -> Iterator[None]:
         yield
     except OSError as error:
         raise click.UsageError(f"{named(target)} cannot be written: {reason(error)}") from None
+
+
+def in_the_way(files: Mapping[Path, str]) -> list[Path]:
+    """Those of the files that a verb makes that are there already.
+
+    None if a call that was broken off has left them, which the next call completes: each that is there has what the verb would
+    write, and one is missing."""
+    there = [path for path in files if os.path.lexists(path)]
+    is_unfinished = len(there) < len(files) and all(holds(path, files[path].encode("utf-8")) for path in there)
+    return [] if is_unfinished else there
 
 
 def check_outputs(*paths: Path | None) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import random
 import signal
 import struct
@@ -83,3 +85,41 @@ def test_a_server_that_saves_its_memory(seed: int, tmp_path: Path) -> None:
     words = json.loads(image.read_text(encoding="utf-8"))["spaces"]["D"]
     assert words[:CLIENTS_WORDS] == [7] * CLIENTS_WORDS
     assert len(words) == 32768
+
+
+@pytest.mark.parametrize("verb", [["import", "../in.xml", "-o", "made"], ["new", "made"]], ids=["import", "new"])
+def test_a_call_that_was_broken_off_between_two_files_is_completed_by_the_next(
+    verb: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in.st").write_text("FUNCTION_BLOCK A\nEND_FUNCTION_BLOCK\nPROGRAM Main\nVAR a : A; END_VAR\na();\nEND_PROGRAM\n")
+    assert CliRunner().invoke(main, ["export", str(tmp_path / "in.st"), "-o", str(tmp_path / "in.xml")]).exit_code == 0
+
+    def call(folder: Path, files: int) -> tuple[int, dict[Path, bytes]]:
+        left = iter([True] * files)
+
+        def killed(part: Path, target: Path) -> None:
+            if not next(left, False):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.replace(part, target)
+
+        monkeypatch.setattr("fbvm.base.files.replace", killed)
+        folder.mkdir(exist_ok=True)
+        monkeypatch.chdir(folder)
+        status = CliRunner().invoke(main, verb).exit_code
+        return status, {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+    status, whole = call(tmp_path / "whole", 100)
+    assert status == 0 and len(whole) > 1
+    for count in range(len(whole)):
+        folder = tmp_path / str(count)
+        status, begun = call(folder, count)
+        assert (status, len(begun)) == (2, count)
+        (folder / "made").mkdir(exist_ok=True)
+        (folder / "made" / ".fbvm.1.part").touch()  # of a process that was killed
+        assert call(folder, 100) == (0, whole | {Path("made/.fbvm.1.part"): b""})
+        assert call(folder, 100)[0] == 2
+    changed = next(iter(begun))
+    (folder / "other" / "made").mkdir(parents=True)
+    (folder / "other" / changed).parent.mkdir(parents=True, exist_ok=True)
+    (folder / "other" / changed).write_text("of the user")
+    assert call(folder / "other", 100) == (2, {changed: b"of the user"})
