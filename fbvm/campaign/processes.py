@@ -104,7 +104,7 @@ class Process:
 
 
 def started() -> Process:
-    """A new process."""
+    """A new process.  To be called inside of `signals_held`, until who ends the process knows it: Ctrl-C might come between."""
     with signals_held():
         door = connection.Listener()  # where only this user comes in
         code = CODE.format(address=door.address, path=sys.path)
@@ -178,7 +178,8 @@ class Pool(Generic[Task, Result]):
         """Gives each process that does nothing a task, as far as there are some.  Processes that are missing start together."""
         idle = [number for number, worker in enumerate(self._workers) if worker is None or worker.task is None][: len(left)]
         for number in idle:
-            self._workers[number] = self._workers[number] or _Worker[Task](started())
+            with signals_held():
+                self._workers[number] = self._workers[number] or _Worker[Task](started())
         for number in idle:
             self._begin(number, left.popleft(), limit_ns)
 

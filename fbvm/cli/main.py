@@ -6,6 +6,7 @@ used, 130 ended by Ctrl-C, 143 ended by SIGTERM, 141 nobody reads the output any
 
 from __future__ import annotations
 
+import errno
 import importlib
 import sys
 from contextlib import suppress
@@ -25,6 +26,9 @@ from fbvm.cli.shared.terminal import named, say
 
 NO_THREAD = "can't start new thread"
 """What Python says if the system has no more threads for it."""
+NO_MORE = "the system gives fbvm no more {} (`ulimit -a` shows its limits)"
+LACKING = {errno.EMFILE: "open files", errno.ENFILE: "open files", errno.EAGAIN: "processes", errno.ENOMEM: "memory"}
+"""What there is too little of, by the number of the host's error; EAGAIN is that of starting a process."""
 VERB_GROUPS = {
     "running": ("Run PLCs", {
         "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
@@ -125,19 +129,18 @@ class _Verbs(click.Group):
         except BrokenPipeError:
             give_up_output()
             sys.exit(status.OUTPUT_CLOSED)
-        except OSError as error:
-            give_up_output()
+        except (OSError, MemoryError, RuntimeError) as error:
+            if lacking := _lacking(error):
+                said = NO_MORE.format(lacking)
+            elif isinstance(error, OSError):
+                give_up_output()
+                said = _refused(error)
+            else:
+                raise
             if ending.by_other_than_ctrl_c():  # such as the end of its terminal, to which nothing can be written any more
                 sys.exit(ending.exit_status())
-            said = f"{named(error.filename)} cannot be used" if error.filename else "the output cannot be written"
             with suppress(OSError):
-                say(f"{said}: {reason(error)}", err=True)
-            sys.exit(status.USAGE)
-        except (MemoryError, RuntimeError) as error:
-            if isinstance(error, RuntimeError) and str(error) != NO_THREAD:
-                raise
-            lacking = "memory" if isinstance(error, MemoryError) else "threads"
-            say(f"the system gives fbvm no more {lacking} (`ulimit -a` shows its limits)", err=True)
+                say(said, err=True)
             sys.exit(status.USAGE)
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
@@ -164,6 +167,20 @@ class _Verbs(click.Group):
         for heading, verbs in VERB_GROUPS.values():
             with formatter.section(heading):
                 formatter.write_dl(list(verbs.items()))
+
+
+def _lacking(error: Exception) -> str:
+    """What the system does not give to this process; "" if the error is another one."""
+    if isinstance(error, OSError) and not hasattr(error, "characters_written"):  # of a stream that cannot take more now
+        return LACKING.get(error.errno or 0, "")
+    return "memory" if isinstance(error, MemoryError) else "threads" if str(error) == NO_THREAD else ""
+
+
+def _refused(error: OSError) -> str:
+    """What the host has refused to a verb that was not prepared for it."""
+    if error.errno is None:  # an error of our own, which is a sentence
+        return str(error)
+    return f"{named(error.filename) + ' cannot be used' if error.filename else 'the output cannot be written'}: {reason(error)}"
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from fbvm.base.host import signals_held
 from fbvm.campaign.fleet.shard import FAILED, OVER, Figures, Shard, ShardProcess
 
 if TYPE_CHECKING:
@@ -27,8 +28,16 @@ class Places(Protocol):
 class Here:
     """The parts are processes of this machine."""
 
-    def __init__(self, shards: Sequence[Shard]) -> None:
-        self._parts = [ShardProcess(shard) for shard in shards]
+    def __init__(self) -> None:
+        self._parts: list[ShardProcess] = []
+
+    def begin(self, shards: Sequence[Shard]) -> None:
+        """Starts the processes, all at once.  Raises OSError; those that were started are ended by `end`."""
+        for shard in shards:
+            with signals_held():
+                self._parts.append(ShardProcess(shard))
+        for part in self._parts:
+            part.begin()
 
     def figures(self) -> dict[int, tuple[str, Figures]]:
         told = [part.figures() for part in self._parts]
@@ -40,15 +49,17 @@ class Here:
 
     def end(self) -> None:
         """Ends all processes."""
-        for part in self._parts:
-            part.end()
+        with signals_held():
+            for part in self._parts:
+                part.end()
 
 
 @contextmanager
 def here(shards: Sequence[Shard]) -> Iterator[Places]:
     """Runs the parts in processes of this machine, which are ended behind the `with` block."""
-    places = Here(shards)
+    places = Here()
     try:
+        places.begin(shards)
         yield places
     finally:
         places.end()
@@ -61,7 +72,9 @@ _parts: dict[str, dict[int, ShardProcess]] = {}
 
 
 def _begin(mark: str, shard: Shard) -> None:
-    _parts.setdefault(mark, {})[shard.number] = ShardProcess(shard)
+    with signals_held():
+        part = _parts.setdefault(mark, {})[shard.number] = ShardProcess(shard)
+    part.begin()
 
 
 def _figures(mark: str) -> dict[int, Figures]:
@@ -90,6 +103,9 @@ class InCluster:
         workers = sorted(self._client.scheduler_info(n_workers=-1)["workers"])
         self._where = {shard.number: workers[number % len(workers)] for number, shard in enumerate(shards)}
         self._told = {shard.number: Figures(shard.number) for shard in shards}
+
+    def begin(self, shards: Sequence[Shard]) -> None:
+        """Starts the parts, which are ended by `end`, also if not all could be started."""
         for shard in shards:
             self._client.run(_begin, self._mark, shard, workers=[self._where[shard.number]])
 
@@ -126,8 +142,10 @@ def in_cluster(cluster: AbstractContextManager[Client], shards: Callable[[int], 
     workers."""
     with cluster as client:
         connection: Any = client
-        places = InCluster(client, shards(len(connection.scheduler_info(n_workers=-1)["workers"])))
+        parts = shards(len(connection.scheduler_info(n_workers=-1)["workers"]))
+        places = InCluster(client, parts)
         try:
+            places.begin(parts)
             yield places
         finally:
             places.end()

@@ -134,12 +134,17 @@ def _measures(plant: Plant) -> dict[str, Any]:
 
 
 class ShardProcess:
-    """The process of a part, in this process's hands."""
+    """The process of a part, in this process's hands.  It has to be made inside of `signals_held`, until somebody is going to end
+    it; `begin` tells it then what to run."""
 
     def __init__(self, shard: Shard) -> None:
         self._process = started()
+        self._shard = shard
         self._said = Figures(shard.number)
-        self._process.line.send(partial(run_shard, shard))
+
+    def begin(self) -> None:
+        """Awaits the process, and has it begin.  Raises NotStarted."""
+        self._process.line.send(partial(run_shard, self._shard))
 
     def figures(self) -> Figures:
         """What the part has told last; it goes on for some seconds more."""

@@ -11,10 +11,14 @@ import click
 import fbvm
 from fbvm.cli.shared import status
 from fbvm.cli.shared.ending import loading
+from fbvm.cli.shared.files import check_free_files
 
 COLLECTED = (50_000, 20, 1_000)
 """New objects after which Python looks for garbage, and how rarely it looks at old ones, of which a program has many: that
 would hold up a key for tenths of a second.  The server looks at all of them when nobody types."""
+
+OWN_FILES = 6
+"""Files and sockets that the server has open for itself."""
 
 
 @click.command("lsp")
@@ -24,6 +28,7 @@ def command(stdio: bool) -> None:
     and output: mistakes while one types, hover, completion, renaming and so on.
 
     An editor starts it; `docs/howto` has the lines of configuration for some.  It needs the extra `editor`."""
+    check_free_files(OWN_FILES)
     try:
         with loading():
             from fbvm.lsp.features import server

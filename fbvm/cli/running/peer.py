@@ -13,10 +13,14 @@ from fbvm.base.host import ending_signals, handling
 from fbvm.cli.shared import status
 from fbvm.cli.shared.doors import LISTENING, unusable, warn_if_reachable
 from fbvm.cli.shared.ending import loading
+from fbvm.cli.shared.files import check_free_files
 from fbvm.cli.shared.terminal import say
 from fbvm.net.tcp import TcpNetwork
 from fbvm.wire import registers
 from fbvm.wire.link import Peer
+
+OWN_FILES = 6
+"""Files and sockets that the server has open for itself."""
 
 
 @click.command("peer")
@@ -29,6 +33,7 @@ def command(port: int, host: str, trace: bool) -> None:
 
     Holding register i holds 1000 + i, input register i 2000 + i, every second coil and every third discrete input is
     ON.  Status 0 if a signal ends the server, 5 if the port cannot be used."""
+    check_free_files(OWN_FILES)
     try:
         with loading():
             import pymodbus.server  # noqa: F401

@@ -81,3 +81,14 @@ def check_outputs(*paths: Path | None) -> None:
         if path:
             with writing(path):
                 check_writable(path)
+
+
+def check_free_files(count: int) -> None:
+    """Raises OSError if this process cannot open so many files and sockets more: for libraries that would print a traceback."""
+    pipes: list[int] = []
+    try:
+        while len(pipes) < count:
+            pipes += os.pipe()
+    finally:
+        for number in pipes:
+            os.close(number)

@@ -249,6 +249,7 @@ def test_a_part_tells_its_last_figures_and_is_told_to_go_on_while_it_runs(monkey
     line = Line(Figures(0, RUNNING, 1), Figures(0, RUNNING, 2))
     monkeypatch.setattr(shard, "started", Parts([line]))
     one = shard.ShardProcess(part())
+    one.begin()
     assert one.figures() == Figures(0, RUNNING, 2) and line.sent[1:] == [GO_ON]
     line.coming = [Figures(0, OVER, 3), Figures(0, RUNNING, 4)]
     assert one.figures() == Figures(0, OVER, 3) == one.figures() and line.sent[1:] == [GO_ON] and len(line.coming) == 1
@@ -271,6 +272,25 @@ def test_parts_of_this_machine_are_ended_behind_an_error_too(monkeypatch: pytest
         running.stop()
         raise KeyError
     assert parts.ended == 2 and [line.sent[-1] for line in lines] == [STOP, STOP]
+
+
+@each_of("problem", [OSError(24, "Too many open files"), KeyboardInterrupt()])
+def test_parts_that_were_started_are_ended_where_another_cannot_be(
+    problem: BaseException, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = []
+
+    def started() -> Any:
+        if len(ended) == 2:
+            raise problem
+        number = len(ended)
+        ended.append(False)
+        return SimpleNamespace(line=Line(), end=lambda: ended.__setitem__(number, True))
+
+    monkeypatch.setattr(shard, "started", started)
+    with pytest.raises(type(problem)), places.here([part(0), part(1), part(2)]):
+        pass
+    assert ended == [True, True]
 
 
 class Cluster:

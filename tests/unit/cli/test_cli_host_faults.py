@@ -195,7 +195,11 @@ def test_a_script_that_its_encoding_cannot_read_is_shown_with_its_bytes() -> Non
     assert (done.exit_code, done.stdout.splitlines()[-1]) == (2, "> print \\xff")
 
 
-@each_of(("error", "lacking"), [(MemoryError(), "memory"), (RuntimeError("can't start new thread"), "threads")])
+@each_of(("error", "lacking"), [
+    (MemoryError(), "memory"), (RuntimeError("can't start new thread"), "threads"),
+    (OSError(errno.EMFILE, "Too many open files"), "open files"),
+    (OSError(errno.EAGAIN, "Resource temporarily unavailable"), "processes"),
+])
 def test_what_the_system_does_not_give_is_said(error: Exception, lacking: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_: object) -> None:
         raise error
@@ -203,6 +207,26 @@ def test_what_the_system_does_not_give_is_said(error: Exception, lacking: str, m
     monkeypatch.setattr(fmt, "_read", refused)
     done = fbvm("fmt", DEMO)
     assert (done.exit_code, done.stderr) == (2, f"the system gives fbvm no more {lacking} (`ulimit -a` shows its limits)\n")
+
+
+@each_of("verb", ["peer", "lsp"])
+def test_a_server_without_open_files_is_not_begun(verb: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its event loop would print a traceback when it is thrown away half made."""
+    before = os.pipe()
+    given = [before]
+
+    def pipe() -> tuple[int, int]:
+        if not given:
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+        return given.pop()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "pipe", pipe)
+        done = fbvm(verb)
+    assert (done.exit_code, done.stderr) == (2, "the system gives fbvm no more open files (`ulimit -a` shows its limits)\n")
+    for number in before:
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.close(number)
 
 
 def test_closed_streams_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
