@@ -20,7 +20,7 @@ from fbvm.base.memory import Memory
 from fbvm.cli.main import main
 from fbvm.cli.programs import fmt
 from fbvm.cli.running import step
-from fbvm.cli.shared import files, run_recording
+from fbvm.cli.shared import files, run_recording, streams
 from fbvm.cli.shared.files import OutputError, growing_file
 from fbvm.cli.shared.streams import ASCII, prepare_streams
 from fbvm.record.trace import memory_images
@@ -209,9 +209,9 @@ def test_what_the_system_does_not_give_is_said(error: Exception, lacking: str, m
     assert (done.exit_code, done.stderr) == (2, f"the system gives fbvm no more {lacking} (`ulimit -a` shows its limits)\n")
 
 
-@each_of("verb", ["peer", "lsp"])
-def test_a_server_without_open_files_is_not_begun(verb: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its event loop would print a traceback when it is thrown away half made."""
+@each_of("verb", ["peer", "lsp", "test"])
+def test_what_would_lack_open_files_is_not_begun(verb: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An event loop prints a traceback when it is thrown away half made, and so does pytest."""
     before = os.pipe()
     given = [before]
 
@@ -227,6 +227,17 @@ def test_a_server_without_open_files_is_not_begun(verb: str, monkeypatch: pytest
     for number in before:
         with pytest.raises(OSError, match="Bad file descriptor"):
             os.close(number)
+
+
+def test_an_output_is_given_up_also_where_no_more_files_can_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    monkeypatch.setattr(sys, "stdout", sys.stdout)
+    monkeypatch.setattr(os, "open", refused)
+    monkeypatch.setattr(streams, "open", refused, raising=False)
+    streams.give_up_output()
+    print("nowhere")
 
 
 def test_closed_streams_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
