@@ -80,6 +80,24 @@ def test_a_helper_process_that_was_never_begun_or_is_anothers_is_not_ended(monke
     assert (killed, helper._process) == ([], None)
 
 
+def test_what_no_thread_can_wait_for_is_not_compiled_and_the_next_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[str] = []
+
+    class Thread:
+        def __init__(self, **options: Any) -> None:
+            self.name = options["name"]
+
+        def start(self) -> None:
+            begun.append(self.name)
+            raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(worker.threading, "Thread", Thread)
+    helper = worker.Worker()
+    for _ in range(2):
+        helper.compile(Thread(name="any job"))  # type: ignore[arg-type]
+    assert begun == ["fbvm compiler", "fbvm compiler"]
+
+
 # --- LLVM and the host ----------------------------------------------------------------------------------------------------
 
 

@@ -86,12 +86,17 @@ class Worker:
         self._owner = os.getpid()
 
     def compile(self, job: Job) -> None:
-        """Has a module optimised.  If the helper process cannot be started or dies, the job is never told."""
+        """Has a module optimised.  If the helper process, or the thread that waits for it, cannot be started or dies, the job is
+        never told."""
         with self._lock:
             self._jobs.append(ref(job))
             if not self._busy:
-                self._busy = True
-                threading.Thread(target=self._work, name="fbvm compiler", daemon=True).start()
+                try:
+                    threading.Thread(target=self._work, name="fbvm compiler", daemon=True).start()
+                except RuntimeError:  # the system has no more threads for this process
+                    self._jobs.clear()
+                else:
+                    self._busy = True
 
     def _work(self) -> None:
         while True:
