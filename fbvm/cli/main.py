@@ -180,6 +180,8 @@ def _refused(error: OSError) -> str:
     """What the host has refused to a verb that was not prepared for it."""
     if error.errno is None:  # an error of our own, which is a sentence
         return str(error)
+    if error.errno == errno.ENOENT and not error.filename:
+        return "the folder in which fbvm was started has gone"
     return f"{named(error.filename) + ' cannot be used' if error.filename else 'the output cannot be written'}: {reason(error)}"
 
 

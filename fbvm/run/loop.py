@@ -36,6 +36,8 @@ SWITCH_ON_NS = 250_000
 one take."""
 FIRST_PERIODS = 10
 """In real time, for so many periods behind its first scan a PLC makes objects that stay."""
+LONG_NS = 3_000_000
+"""Of scans that take longer, none follow another at once, without coming back to the loop: it hears nothing meanwhile."""
 PAUSE_NS = 1_000_000
 """How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
@@ -221,6 +223,7 @@ def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchd
         if watchdogs:
             watchdogs[number].end()
         ended_ns = time.monotonic_ns()
+        run.takes_long = ended_ns - began_ns > LONG_NS * (len(times) or 1)
         if times:
             plc.scan_times.note_burst(scan, times, ended_ns - began_ns)
         elif scans := plc.scans - scan:

@@ -74,6 +74,8 @@ class Running:
         """When the next scan is to begin."""
         self.alone = False
         """True for the only PLC of a run in virtual time: many scans may follow without coming back to the loop."""
+        self.takes_long = False
+        """True if a scan takes so long that the loop has to hear signals and networks behind each: no bursts then."""
         self._behind_ns = 0
         self._clock: Clock | None = None
         self._writes = sorted(writes, key=lambda write: write.at_ns)
@@ -130,7 +132,7 @@ class Running:
         times: list[int] = []
         if self._writes:
             self._write(max(now_ns - self._behind_ns, plc.now_ns))
-        if self._clock and (many := self._cycles_left if self._writes else self._goal.scans_left) > 1:
+        if self._clock and not self.takes_long and (many := self._cycles_left if self._writes else self._goal.scans_left) > 1:
             times = plc.scan_at_once(min(many, MOST_AT_ONCE), now_ns - self._behind_ns, self._clock)
         if times:
             now_ns = times[-1] + self._behind_ns

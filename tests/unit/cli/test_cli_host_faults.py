@@ -209,6 +209,20 @@ def test_what_the_system_does_not_give_is_said(error: Exception, lacking: str, m
     assert (done.exit_code, done.stderr) == (2, f"the system gives fbvm no more {lacking} (`ulimit -a` shows its limits)\n")
 
 
+@each_of(("error", "said"), [
+    (FileNotFoundError(errno.ENOENT, "No such file or directory"), "the folder in which fbvm was started has gone"),
+    (OSError("python ended with status 1 before it began"), "python ended with status 1 before it began"),
+])
+def test_what_the_host_refuses_without_a_name_is_said(error: OSError, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(fmt, "_read", refused)
+    monkeypatch.setattr("fbvm.cli.main.give_up_output", lambda: None)
+    done = fbvm("fmt", DEMO)
+    assert (done.exit_code, done.stderr) == (2, f"{said}\n")
+
+
 @each_of("verb", ["peer", "lsp", "test"])
 def test_what_would_lack_open_files_is_not_begun(verb: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """An event loop prints a traceback when it is thrown away half made, and so does pytest."""

@@ -193,6 +193,26 @@ def test_event_pace_scans_when_something_arrives(clock: Clock) -> None:
     assert network.waits_ms == [10, 10, 10, 10, 10]
 
 
+def test_scans_that_take_long_do_not_follow_at_once(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is heard between them, no signal either.  Whether they take long is known behind the first."""
+    plc, _ = real_plc(clock)
+    scans_ms, at_once = [1, 5, 1, 1, 1], []
+
+    def scan(most: int, now_ns: int, told: object) -> list[int]:
+        at_once.append(plc.scans)
+        return single(now_ns)
+
+    def single(now_ns: int) -> list[int]:
+        clock.now_ns += scans_ms[plc.scans] * MS
+        plc.scans, plc.now_ns = plc.scans + 1, now_ns
+        return [now_ns]
+
+    monkeypatch.setattr(plc, "scan_at_once", scan)
+    monkeypatch.setattr(plc, "scan", single)
+    assert run(plc, scans=5, pace="event") == "scans"
+    assert at_once == [0, 1, 3]
+
+
 def test_event_pace_wakes_for_a_tasks_interval(clock: Clock) -> None:
     plc, network = Plc(counter_image(task("fast", interval_ns=4 * MS))), RealNetwork(clock)
     plc.attach(Idle(), network)
