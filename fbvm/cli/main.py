@@ -29,6 +29,8 @@ NO_THREAD = "can't start new thread"
 NO_MORE = "the system gives fbvm no more {} (`ulimit -a` shows its limits)"
 LACKING = {errno.EMFILE: "open files", errno.ENFILE: "open files", errno.EAGAIN: "processes", errno.ENOMEM: "memory"}
 """What there is too little of, by the number of the host's error; EAGAIN is that of starting a process."""
+TAKES_NO_MORE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
+"""Errors of the second file, where one is copied to another."""
 VERB_GROUPS = {
     "running": ("Run PLCs", {
         "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
@@ -182,7 +184,8 @@ def _refused(error: OSError) -> str:
         return str(error)
     if error.errno == errno.ENOENT and not error.filename:
         return "the folder in which fbvm was started has gone"
-    return f"{named(error.filename) + ' cannot be used' if error.filename else 'the output cannot be written'}: {reason(error)}"
+    name = error.filename2 if error.errno in TAKES_NO_MORE and error.filename2 else error.filename
+    return f"{named(name) + ' cannot be used' if name else 'the output cannot be written'}: {reason(error)}"
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})

@@ -6,6 +6,7 @@ import random
 
 import pytest
 
+from fbvm.base.files import SOURCE_BYTES
 from fbvm.interchange.cx.compression import LONGEST, CompressionError, _matches, compress, decompress
 
 VECTORS = (("00 06 82 02 FE 01", b"A"), ("01 04 E2 80 7F", b"A"), ("00 06 82 08 D5 83 80 7F", b"ABABABAB"),
@@ -65,6 +66,14 @@ def test_damage_is_told_and_a_flood_is_stopped() -> None:
             decompress(stream)
     with pytest.raises(CompressionError, match="longer than 1000 bytes"):
         decompress(compress(bytes(100_000)), 1000)
+
+
+@pytest.mark.slow
+def test_a_small_file_that_opens_to_more_than_a_project_may_have_is_refused() -> None:
+    copies = compress(bytes(1 + 9 * LONGEST))
+    assert copies[6:12] == copies[9:15]  # a copy of 518 bytes is 3 bytes
+    with pytest.raises(CompressionError, match="longer than 67108864 bytes"):
+        decompress(copies[:6] + copies[6:9] * (SOURCE_BYTES // LONGEST + 1))
 
 
 @pytest.mark.slow

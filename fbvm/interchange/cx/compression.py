@@ -10,8 +10,10 @@ from collections.abc import Iterator
 from functools import cache
 from typing import NamedTuple
 
-MOST_BYTES = 1 << 28
-"""Decompressed bytes beyond which a stream is refused."""
+from fbvm.base.files import SOURCE_BYTES
+
+MOST_BYTES = SOURCE_BYTES
+"""Decompressed bytes beyond which a stream is refused: as many as of a project that is not compressed."""
 LONGEST, END = 518, 519
 """The longest copy, and the length that ends the stream."""
 _LENGTHS = ((3, 0), (2, 0), (4, 0), (5, 0), (6, 0), (7, 0), (8, 0), (9, 0), (10, 1), (12, 2), (16, 3), (24, 4), (40, 5),
@@ -112,8 +114,8 @@ def decompress(data: bytes, most_bytes: int = MOST_BYTES) -> bytes:
         distance = (bits.symbol(distances) << low) + bits.take(low) + 1
         if distance > len(made):
             raise CompressionError(f"byte {bits.at // 8} is damaged: it repeats what stands before the beginning")
-        for _ in range(length):
-            made.append(made[-distance])
+        piece = made[len(made) - distance :][:length]
+        made += (piece * (length // distance + 1))[:length]
 
 
 # --- compressing ------------------------------------------------------------------------------------------------------

@@ -211,9 +211,11 @@ def test_what_the_system_does_not_give_is_said(error: Exception, lacking: str, m
 
 @each_of(("error", "said"), [
     (FileNotFoundError(errno.ENOENT, "No such file or directory"), "the folder in which fbvm was started has gone"),
+    (OSError(errno.ENOSPC, "No space left on device", "m.st", None, "copy/m.st"),
+     "copy/m.st cannot be used: no space left on device"),
     (OSError("python ended with status 1 before it began"), "python ended with status 1 before it began"),
 ])
-def test_what_the_host_refuses_without_a_name_is_said(error: OSError, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_the_host_refuses_is_said_by_its_place(error: OSError, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_: object) -> None:
         raise error
 
