@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
+
+from forked_fbvm import Forked
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PUMP = """
@@ -37,11 +37,9 @@ class Live:
         file.write_text(text)
         self._browser = browser
         given = [] if verb in ("serve", "demo", "learn") or options and options[-1].startswith(str(folder)) else [str(file)]
-        self.process = subprocess.Popen([sys.executable, "-m", "fbvm", verb, *given, *options], stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE, text=True)  # fmt: skip
-        assert self.process.stdout is not None
-        self.url = next((line.strip() for line in self.process.stdout if line.startswith("http:")), "")
-        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#token=[\w-]{32,}", self.url), self.process.stderr
+        self._process = Forked([verb, *given, *options])
+        self.url = next((line.strip() for line in self._process.stdout if line.startswith("http:")), "")
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#token=[\w-]{32,}", self.url), self._process.communicate()[1]
         self.complaints: list[str] = []
 
     def window(self, url: str = "", **settings: Any) -> Any:
@@ -56,8 +54,8 @@ class Live:
     def close(self) -> None:
         for context in self._browser.contexts:
             context.close()
-        self.process.terminate()
-        self.process.communicate(timeout=30)
+        self._process.terminate()
+        self._process.communicate(timeout=30)
 
 
 def watch(page: Any, name: str) -> Any:
