@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from forked_fbvm import Forked
 
 HERE = Path(__file__).resolve().parent
 HOUSE = HERE.parents[1]
@@ -25,13 +26,18 @@ MISSING = 77
 """Status with which a server says that its library is not installed."""
 
 
+def _started(command: list[str]) -> Forked | subprocess.Popen[str]:
+    is_fbvm = command[:3] == [sys.executable, "-m", "fbvm"]
+    return Forked(command[3:], HOUSE) if is_fbvm else subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=HOUSE)
+
+
 @contextmanager
 def server(name: str) -> Iterator[int]:
     """A server of that make; its port.  Skips the test where it is not installed."""
     command = SERVERS[name]
     if shutil.which(command[0]) is None:
         pytest.skip(f"{name} needs {command[0]}, which is not installed")
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=HOUSE) as process:
+    with _started(command) as process:
         assert process.stdout is not None
         try:
             line = process.stdout.readline()

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from forked_fbvm import Forked
 from received import heard
 
 from fbvm.wire.modbus import Adu
@@ -32,7 +33,7 @@ pytestmark = pytest.mark.slow
 class Server:
     """`fbvm run examples/server.st` in a process of its own."""
 
-    def __init__(self, process: subprocess.Popen[str], port: int) -> None:
+    def __init__(self, process: Forked, port: int) -> None:
         self.process = process
         self.port = port
 
@@ -47,13 +48,12 @@ class Server:
 
 @contextmanager
 def serving(*settings: str, shown: tuple[str, ...] = ("W491..W495",), pcap: Path | None = None) -> Iterator[Server]:
-    command = [
-        sys.executable, "-m", "fbvm", "run", "examples/server.st", "--net", "tcp", "--pace", "event", "--for", "300s",
+    arguments = [
+        "run", "examples/server.st", "--net", "tcp", "--pace", "event", "--for", "300s",
         "--json", "--map", f"{UNIT}=127.0.0.1:0", *(part for one in settings for part in ("--set", one)),
         *(part for one in shown for part in ("--show", one)), *(["--pcap", str(pcap)] if pcap else []),
     ]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HOUSE) as process:
-        assert process.stderr is not None
+    with Forked(arguments, HOUSE) as process:
         try:
             line = process.stderr.readline()
             assert line.startswith(UNIT), line + process.stderr.read()

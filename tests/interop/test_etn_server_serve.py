@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from forked_fbvm import Forked
 from received import heard
 from test_etn_server import BOUND_S, HOUSE, connected
 
@@ -23,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 
 class Service:
-    def __init__(self, process: subprocess.Popen[str], port: int) -> None:
+    def __init__(self, process: Forked, port: int) -> None:
         self.process = process
         self.port = port
 
@@ -43,14 +44,12 @@ class Service:
         self.process.send_signal(number)
         _, said = self.process.communicate(timeout=BOUND_S)
         assert time.monotonic() - start_s < 5
-        return self.process.returncode, said
+        return self.process.wait(), said
 
 
 @contextmanager
 def service(*arguments: str) -> Iterator[Service]:
-    command = [sys.executable, "-m", "fbvm", "serve", "--port", "0", *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HOUSE) as process:
-        assert process.stdout is not None
+    with Forked(["serve", "--port", "0", *arguments], HOUSE) as process:
         try:
             line = process.stdout.readline()
             assert line.startswith("listening on "), line + process.communicate()[1]

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from forked_fbvm import Forked
 
 pytestmark = pytest.mark.slow
 HERE = Path(__file__).resolve().parent
@@ -29,9 +30,7 @@ BOUND_S = 60
 @contextmanager
 def served(*options: str) -> Iterator[int]:
     """The port at which `fbvm serve --fins` runs the program."""
-    command = [sys.executable, "-m", "fbvm", "serve", str(HERE / "fins_program.st"), "--fins", *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=HERE.parents[1]) as process:
-        assert process.stdout is not None
+    with Forked(["serve", str(HERE / "fins_program.st"), "--fins", *options], HERE.parents[1]) as process:
         try:
             line = process.stdout.readline()
             found = re.fullmatch(r"FINS: listening on [\d.]+:(\d+), node \w+\n", line)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from forked_fbvm import Forked
 
 from fbvm.net.tcp import TcpNetwork
 from fbvm.run import run_all
@@ -26,7 +27,7 @@ BOUND_S = 30
 
 
 class Served:
-    def __init__(self, process: subprocess.Popen[str], port: int) -> None:
+    def __init__(self, process: Forked, port: int) -> None:
         self.process, self.port = process, port
 
     def ask(self, code: int, parameters: str = "", node: int = 1, unit: int = 0) -> str:
@@ -43,14 +44,12 @@ class Served:
         """Status, and what it said on stderr."""
         self.process.terminate()
         said = self.process.communicate(timeout=BOUND_S)[1]
-        return self.process.returncode, said
+        return self.process.wait(), said
 
 
 @contextmanager
 def served(*options: str) -> Iterator[Served]:
-    command = [sys.executable, "-m", "fbvm", "serve", "--port", "0", "--fins", "--fins-port", "0", *options]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HERE.parents[1]) as process:
-        assert process.stdout is not None
+    with Forked(["serve", "--port", "0", "--fins", "--fins-port", "0", *options], HERE.parents[1]) as process:
         try:
             found = re.fullmatch(r"FINS: listening on [\d.]+:(\d+), node (?:any|\d+)\n", process.stdout.readline())
             assert found, process.communicate()

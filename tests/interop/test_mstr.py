@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from forked_fbvm import Forked
 from servers import SERVERS, client, server
 from wireshark import TSHARK, dissected
 
@@ -59,7 +60,7 @@ def test_the_example_against_servers_of_other_people(make: str, tmp_path: Path) 
 class Station:
     """`fbvm run` with the server program, in a process of its own."""
 
-    def __init__(self, process: subprocess.Popen[str], port: int) -> None:
+    def __init__(self, process: Forked, port: int) -> None:
         self.process, self.port = process, port
 
     def end(self) -> dict[str, Any]:
@@ -75,14 +76,13 @@ class Station:
 @contextmanager
 def serving(folder: Path) -> Iterator[Station]:
     (folder / "server.st").write_text(SERVING)
-    command = [
-        sys.executable, "-m", "fbvm", "run", str(folder / "server.st"), "--net", "tcp", "--pace", "event",
+    arguments = [
+        "run", str(folder / "server.st"), "--net", "tcp", "--pace", "event",
         "--until", "%MW100 = 4711", "--max", "300s",
         "--json", "--map", f"{STATION}=127.0.0.1:0", "--pcap", str(folder / "server.pcapng"),
         "--show", "%MW1..%MW3", "--show", "Main.Server.Requests",
     ]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HOUSE) as process:
-        assert process.stderr is not None
+    with Forked(arguments, HOUSE) as process:
         try:
             line = process.stderr.readline()
             assert line.startswith(STATION), line + process.stderr.read()

@@ -10,7 +10,6 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ from typing import Any
 import pytest
 from depth import times
 from foreign_clients import BOUND_S, CLIENTS, expected
+from forked_fbvm import Forked
 from received import heard
 from wireshark import TSHARK
 
@@ -64,7 +64,7 @@ every_kind = pytest.mark.parametrize("kind", KINDS)
 
 @dataclass
 class Server:
-    process: subprocess.Popen[str]
+    process: Forked
     port: int
     output: str = ""
 
@@ -96,15 +96,14 @@ def serving(name: str, folder: Path, capture: bool = False, engine: str = "auto"
     if kind.program:
         file = folder / "server.st"
         file.write_text(kind.program)
-    command = [
-        sys.executable, "-m", "fbvm", "run", str(file), "--net", "tcp", "--pace", "event", "--for", "600s", "--json",
+    arguments = [
+        "run", str(file), "--net", "tcp", "--pace", "event", "--for", "600s", "--json",
         "--engine", engine,
         "--map", f"{kind.endpoint}=127.0.0.1:0", *(part for one in kind.settings for part in ("--set", one)),
         *(part for one in kind.kept for part in ("--show", one)),
         *(["--pcap", str(folder / "server.pcapng")] if capture else []),
     ]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HOUSE) as process:
-        assert process.stderr is not None
+    with Forked(arguments, HOUSE) as process:
         try:
             line = process.stderr.readline()
             assert line.startswith(kind.endpoint), line + process.stderr.read()
