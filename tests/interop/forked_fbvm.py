@@ -15,9 +15,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-IMPORTED = ["fbvm.__main__", "fbvm.cli.running.live", "fbvm.cli.running.peer", "fbvm.cli.running.run", "fbvm.cli.running.serve",
-            "fbvm.cli.shared.live.origins", "fbvm.cli.shared.live.page", "fbvm.live.host", "fbvm.live.pytest_text",
-            "fbvm.engine.native.engine", "pymodbus.server", "pymodbus.simulator"]  # fmt: skip
+IMPORTED = ["fbvm.__main__", "fbvm.cli.main", "fbvm.cli.running.live", "fbvm.cli.running.peer", "fbvm.cli.running.run",
+            "fbvm.cli.running.serve", "fbvm.cli.shared.live.origins", "fbvm.cli.shared.live.page", "fbvm.live.host",
+            "fbvm.live.pytest_text", "fbvm.engine.native.engine", "llvmlite.binding",
+            "pymodbus.server", "pymodbus.simulator"]  # fmt: skip
 START = multiprocessing.get_context("forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn")
 if START.get_start_method() == "forkserver":
     START.set_forkserver_preload(IMPORTED)

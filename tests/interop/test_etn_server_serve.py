@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -115,9 +113,9 @@ def test_what_may_be_switched_on() -> None:
 
 
 def failing(*arguments: str) -> tuple[int, str]:
-    command = [sys.executable, "-m", "fbvm", "serve", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=HOUSE, check=False, timeout=BOUND_S)
-    return done.returncode, done.stderr
+    with Forked(["serve", *arguments], HOUSE) as process:
+        said = process.communicate(BOUND_S)[1]
+        return process.wait(), said
 
 
 def test_a_port_that_is_taken() -> None:

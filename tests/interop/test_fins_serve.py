@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -89,17 +87,17 @@ def test_a_port_in_use_is_status_5(kind: int) -> None:
     with socket.socket(type=kind) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-        command = [sys.executable, "-m", "fbvm", "serve", "--port", "0", "--fins", "--fins-port", str(port)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=BOUND_S, check=False)
-    assert done.returncode == 5
-    assert done.stderr == f"127.0.0.1:{port} cannot be used: somebody else listens there\n"
+        with Forked(["serve", "--port", "0", "--fins", "--fins-port", str(port)]) as process:
+            said = process.communicate(BOUND_S)[1]
+            assert process.wait() == 5
+    assert said == f"127.0.0.1:{port} cannot be used: somebody else listens there\n"
 
 
 def test_an_address_that_is_none_is_status_2() -> None:
-    done = subprocess.run([sys.executable, "-m", "fbvm", "serve", "--fins", "--fins-bind", "plc"], capture_output=True,
-                          text=True, timeout=BOUND_S, check=False)  # fmt: skip
-    assert done.returncode == 2
-    assert "--fins-bind plc is not an IPv4 address" in done.stderr
+    with Forked(["serve", "--fins", "--fins-bind", "plc"]) as process:
+        said = process.communicate(BOUND_S)[1]
+        assert process.wait() == 2
+    assert "--fins-bind plc is not an IPv4 address" in said
 
 
 PROJECT = """
