@@ -178,6 +178,7 @@ def test_a_journal_of_real_connections_is_done_again(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="handles are counted in /proc")
+@pytest.mark.usefixtures("frozen_heap")
 @pytest.mark.parametrize("name", ["black hole", "closed port", "closes at once", "resets in mid-request"])
 def test_many_lost_connections_leave_nothing_behind(name: str) -> None:
     """Neither handles nor objects, however connections end."""
