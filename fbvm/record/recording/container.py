@@ -22,6 +22,8 @@ MAGIC = b"FBVMREC1"
 START, PLC, KEYFRAME, SCANS, END = 1, 2, 3, 4, 5
 LARGEST_BYTES = 1 << 29
 """Most bytes of a payload, unpacked."""
+LARGEST_JSON_BYTES = 1 << 26
+"""Most bytes of one that is JSON."""
 MOST_SCANS = 1 << 31
 """More than a block ever has."""
 MOST_PLCS = 1 << 16
@@ -87,9 +89,9 @@ def read_block(file: BinaryIO, head: BlockHead) -> bytes:
     if (kind, plc, first, scans) != (head.kind, head.plc, head.first, head.scans) or (
         _checksum(packed, kind, plc, first, scans) != check):  # fmt: skip
         raise RecordingError(f"the block at byte {head.at} is damaged")
-    engine = zlib.decompressobj()
+    engine, most = zlib.decompressobj(), LARGEST_BYTES if kind in (KEYFRAME, SCANS) else LARGEST_JSON_BYTES
     try:
-        payload = engine.decompress(packed, LARGEST_BYTES)
+        payload = engine.decompress(packed, most)
     except zlib.error:
         raise RecordingError(f"the block at byte {head.at} is damaged") from None
     if not engine.eof:

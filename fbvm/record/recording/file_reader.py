@@ -39,7 +39,6 @@ from fbvm.record.trace.scan_source import ScanSource
 
 KEPT_CHUNKS = 4
 """Chunks that are kept unpacked."""
-LARGEST_HEAD_BYTES = 1 << 26
 
 
 class RecordingFile:
@@ -134,10 +133,7 @@ class FileRecordedPlc(RecordedPlc):
         self.made_by, self.version = made_by, version
         """The versions of fbvm that made the recording, and that reads it."""
         with damages("what the recording tells of a PLC is damaged"):
-            payload = read_block(file, blocks.description)
-            if len(payload) > LARGEST_HEAD_BYTES:
-                raise RecordingError("what the recording tells of a PLC is too large")
-            self.head: dict[str, Any] = load(payload)
+            self.head: dict[str, Any] = load(read_block(file, blocks.description))
             """What `trace.description` reads."""
             self.name, self._text = str(self.head["name"]), ProgramText.of(self.head["program"])
             self._substituted = tuple(number(body) for body in self.head["substituted"])

@@ -119,3 +119,16 @@ def test_a_payload_may_be_as_large_as_the_limit(monkeypatch: pytest.MonkeyPatch)
                 read_block(file, head)
         else:
             assert read_block(file, head) == bytes(5000)
+
+
+def test_what_is_json_may_be_as_large_as_a_limit_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(container, "LARGEST_JSON_BYTES", 4999)
+    refused = []
+    for kind in (START, PLC, KEYFRAME, SCANS, END):
+        file = written((kind, bytes(5000), 0, 0, 0))
+        try:
+            read_block(file, next(heads(file)))
+        except RecordingError as error:
+            assert "does not end, or is too large" in str(error)
+            refused.append(kind)
+    assert refused == [START, PLC, END]
