@@ -22,6 +22,10 @@ SAME_FOR_EQUAL = 2
 """The version of `marshal` in which equal data are equal bytes, whether or not parts of them are one object."""
 
 
+DISPATCH = "DISPATCH"
+"""In place of the word of a declaration: a part that executes the body which its instance has for a call."""
+
+
 @dataclass(unsafe_hash=True)
 class Site:
     """A place in the source: name of the file, name of the POU, line and column from 1 on.  It never changes, as a `Field`."""

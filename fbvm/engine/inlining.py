@@ -58,6 +58,11 @@ class Inlining:
         return self.code(call[1]) if call[1] in self._numbers and _is_fixed(call[2]) else None
 
 
+def in_place(code: Block, address: Address | None) -> Block:
+    """The code of a body without temporaries, for the instance at an address."""
+    return _Moved(code, address, 0).code
+
+
 def _smallest(sizes: Mapping[int, int], calls: Mapping[int, int], room: float) -> set[int]:
     """The bodies of which calls gain most, as long as there is room for their statements."""
     chosen: set[int] = set()

@@ -108,6 +108,7 @@ class Context:
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}
         self._descendants: dict[str, list[Pou]] = {}
+        self._candidates: dict[Pou, dict[Pou, list[int]]] = {}
         """By name of a type the blocks whose types have that name or are derived from one that has."""
         self._indexed = 0
         """How many blocks there were when that was made."""
@@ -202,8 +203,11 @@ class Context:
         pou: what the call names: a method, an accessor, an ACTION or a block.  Types that are ABSTRACT have no instances."""
         home = pou.block or pou.owner
         assert home.type is not None, "what has no instances is not meant by different types"
-        found: dict[Pou, list[int]] = {}
-        for block in self._derived_from(home.type):
+        derived = self._derived_from(home.type)
+        if pou in self._candidates:
+            return self._candidates[pou]
+        found = self._candidates[pou] = {}
+        for block in derived:
             if "ABSTRACT" in block.modifiers:
                 continue
             meant = block.method(pou.key) if pou.block is not None else block.action(pou.key) if pou.home is not None else block
@@ -227,6 +231,7 @@ class Context:
         if self._indexed != len(self._blocks):
             self._indexed = len(self._blocks)
             self._descendants.clear()
+            self._candidates.clear()
             for block in self._blocks.values():
                 for name in _names_of(block.type) if block.kind != "INTERFACE" and block.type is not None else ():
                     self._descendants.setdefault(name, []).append(block)

@@ -1,18 +1,25 @@
 """Dispatch: which body a call executes whose instance may be of a derived type.
 
 Every instance begins with the number of its type.  A call that several bodies may be meant by is a CASE over that number; where
-only one can be meant, the call is the same as that of a function.  The parameters of a method lie in the frame of the method
-that the call names; an override gets them copied into its own frame, where they lie alike (S1004), and gives outputs and result
-back.  Frames on the stack need no copy (`frame_stack`)."""
+only one can be meant, the call is the same as that of a function.  Where very many can be meant, all calls share one CASE in a
+body of its own (DISPATCH), so that code does not grow with the product of calls and bodies.
+
+The parameters of a method lie in the frame of the method that the call names; an override gets them copied into its own frame,
+where they lie alike (S1004), and gives outputs and result back.  Frames on the stack need no copy (`frame_stack`)."""
 
 from __future__ import annotations
 
 from fbvm.base.types import UDINT, RefType, StructType
 from fbvm.check.symbols.facts import Pou, PouCall, StandardCall
 from fbvm.code.builder.places import Place
+from fbvm.code.image import DISPATCH, Body
 from fbvm.code.lowering.context import BodyContext
+from fbvm.code.lowering.step_costs import with_costs
 from fbvm.code.operations import Address, Block, Node
 
+Candidates = dict[Pou, list[int]]
+MOST_ROWS = 16
+"""Bodies up to which each call has a CASE of its own."""
 _NO_SUCH_TYPE = "R0110"
 """The trap of a call whose instance has the number of no type that is possible there."""
 
@@ -32,7 +39,21 @@ def call(body: BodyContext, called: PouCall, instance: Place | None, site: int) 
         (only,) = found
         block = _row(body, pou, only, address)
         return block[0] if len(block) == 1 else ("if", ((("const", "b", 1), block),), ())
-    rows = tuple((tuple((number, number) for number in numbers), _row(body, pou, meant, address))
+    if len(found) > MOST_ROWS:
+        return ("call", body.program.shared_part((_shared, pou), lambda: _shared(body, pou, found)), address)
+    return _chosen(body, pou, found, instance, site)
+
+
+def _shared(body: BodyContext, pou: Pou, found: Candidates) -> Body:
+    """The body of a part that executes the body which its instance has for calls of a method, an ACTION or a block."""
+    site = body.part({}, pou).entry_site
+    chosen = _chosen(body, pou, found, Place(("self", 0, ()), UDINT), site)
+    return Body(pou.name, DISPATCH, with_costs((("charge", 1, site), chosen)), UDINT.size, True)
+
+
+def _chosen(body: BodyContext, pou: Pou, found: Candidates, instance: Place, site: int) -> Node:
+    """The CASE over the type of an instance."""
+    rows = tuple((tuple((number, number) for number in numbers), _row(body, pou, meant, instance.address))
                  for meant, numbers in found.items())
     return ("case", "u32", instance.moved(0, UDINT).load(), rows, (("stop", _NO_SUCH_TYPE, site),))
 

@@ -7,8 +7,10 @@ from __future__ import annotations
 from typing import Any
 
 from fbvm.base.memory import WHOLE_BYTES
+from fbvm.code.image import DISPATCH
 from fbvm.code.operations import Address, Block, Node, detail_size
 from fbvm.engine.effects import STORES
+from fbvm.engine.inlining import in_place
 from fbvm.engine.python.statements import PlainWriter
 from fbvm.engine.python.writer import bare
 
@@ -28,6 +30,9 @@ class ObservedWriter(PlainWriter):
         nodes: list[Node | None] = [*block, None]
         for number, node in enumerate(block):
             here, following = nodes[number] or node, nodes[number + 1]
+            if here[0] == "call" and self.image.bodies[here[1]].kind == DISPATCH:  # nobody sees that these have a body
+                self.block(in_place(self.image.bodies[here[1]].code, here[2]))
+                continue
             if here[0] not in STORES:
                 self.emitters[here[0]](self, *here[1:])
                 continue

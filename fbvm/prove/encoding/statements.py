@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from fbvm.code.image import Body
+from fbvm.code.image import DISPATCH, Body
 from fbvm.code.operations import SIZES, TEXT_UNITS, WHOLE_BYTES, Address, Block, Node, detail_size
+from fbvm.engine.inlining import in_place
 from fbvm.prove.encoding.addresses import Target, targets
 from fbvm.prove.encoding.cells import BIT
 from fbvm.prove.encoding.execution import UNWOUND, Attempt, Execution, Held, Refused, Row, State, Trapped
@@ -302,6 +303,13 @@ def _let(x: Execution, state: State, number: int, machine: str, a: Node) -> None
 
 def _call(x: Execution, state: State, pou: int, address: Address | None) -> None:
     body = x.image.bodies[pou]
+    if body.kind == DISPATCH:
+        following, _ = run_block(x, in_place(body.code, address), state)
+        if following is None:
+            raise Refused("a call never ends", x.site)
+        if following is not state:
+            state.join([following], [x.terms.true])
+        return
     if address is None:
         call(x, state, body, 0)
         return

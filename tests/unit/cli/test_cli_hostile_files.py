@@ -176,6 +176,15 @@ def of_interfaces(count: int) -> str:
     return f"{parts}PROGRAM Main VAR {held}r : INT; END_VAR {''.join(f'r := i{at}.M(); ' for at in range(count))}END_PROGRAM\n"
 
 
+def of_one_interface(count: int) -> str:
+    """Blocks that implement one interface, and calls that may mean each of them."""
+    parts = "".join(f"FUNCTION_BLOCK C{at} IMPLEMENTS I METHOD PUBLIC M : INT M := 1; END_METHOD END_FUNCTION_BLOCK\n"
+                    for at in range(count))
+    held, calls = "".join(f"c{at} : C{at}; " for at in range(count)), "".join(f"i := c{at}; r := i.M(); " for at in range(count))
+    return (f"INTERFACE I METHOD M : INT END_METHOD END_INTERFACE\n{parts}"
+            f"PROGRAM Main VAR {held}i : I; r : INT; END_VAR {calls}END_PROGRAM\n")
+
+
 def of_jumps(count: int) -> str:
     """An instruction list with a label and a jump to the next one again and again."""
     lines = "".join(f"l{at}: LD n\nGT 100\nJMPCN l{at + 1}\n" for at in range(count))
@@ -215,7 +224,7 @@ def of_drawn_coils(count: int) -> str:
 
 
 @pytest.mark.slow
-@each_of(("made", "few"), [(of_interfaces, 150), (of_jumps, 500), (of_far_jumps, 100), (of_bases, 50), (of_namespaces, 500),
+@each_of(("made", "few"), [(of_interfaces, 150), (of_one_interface, 70), (of_jumps, 500), (of_far_jumps, 100), (of_bases, 50), (of_namespaces, 500),
                            (of_drawn_contacts, 200), (of_drawn_coils, 200)])  # fmt: skip
 def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int) -> None:
     def took_s(count: int) -> float:
