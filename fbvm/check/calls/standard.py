@@ -36,6 +36,7 @@ from fbvm.check.expressions.values import MAKERS, is_any
 from fbvm.check.symbols import vendor_names
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
 from fbvm.syntax import tree
+from fbvm.syntax.st.builder import CHAIN_LIMIT
 
 _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
@@ -107,10 +108,10 @@ def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value
     if (why := project.why_unseen(callee(call), scope.source)) is not None:
         scope.error(why[0], call.callee, *why[1:])
         return None
-    known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
+    groups = functions.names(), (p.name for p in project.pous.values()), project.libraries.block_names()
     scope.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
                 vendor_names.FUNCTIONS.get(name) or vendor_names.library_of(callee(call)) or
-                project.nearest(callee(call), known))
+                project.nearest(callee(call), (each for group in groups for each in group)))
     return None
 
 
@@ -129,10 +130,18 @@ def _raise(scope: Scope, call: tree.Call) -> str | None:
 def _operator(scope: Scope, call: tree.Call, name: str, kind: Elementary | StringType | None,
               want: Type | None) -> Type | None:
     """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
-    names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
-    values = _assigned(scope, call) if name == "NOT" else None
-    values = values or Arguments(scope, call, names, name in functions.EXTENSIBLE_OPERATORS).in_order()
-    return _meaning(scope, call, name, values, kind, want) if values is not None else None
+    values = (_assigned(scope, call) if name == "NOT" else None) or Arguments(
+        scope, call, ["IN"] if name == "NOT" else ["IN1", "IN2"], name in functions.EXTENSIBLE_OPERATORS).in_order()
+    if values is None:
+        return None
+    if scope.operators + len(values) > CHAIN_LIMIT:
+        scope.error("S0106", call, f"the expression is more than {CHAIN_LIMIT} operators deep", "split it into statements")
+        return None
+    scope.operators += len(values)
+    try:
+        return _meaning(scope, call, name, values, kind, want)
+    finally:
+        scope.operators -= len(values)
 
 
 def _assigned(scope: Scope, call: tree.Call) -> list[tree.Expr] | None:

@@ -82,6 +82,8 @@ class Scope:
         """Names that stand in front of a point."""
         self.counters: list[tuple[object, ...]] = []
         """Places of the counters of the FOR loops around the present statement."""
+        self.operators = 0
+        """Operators that calls around the present expression mean, each of which is one level of the tree."""
 
     def error(self, code: str, node: tree.Node, message: str, hint: str = "",
               related: tuple[Source, int, str] | None = None) -> None:

@@ -29,6 +29,14 @@ def test_what_compilations_leave_is_collected_in_passing() -> None:
     assert counts[-1] < counts[0] + 20_000
 
 
+def test_calls_that_mean_more_operators_than_an_expression_may_have_are_refused() -> None:
+    inside, refused = "ADD(" + ", ".join(["a"] * 900) + ")", "the expression is more than 1000 operators deep"
+    for meant in (f"ADD({inside}, {', '.join(['a'] * 200)})", f"ADD({', '.join(['a'] * 9000)})"):
+        [error] = compile_text(TEXT.replace("a + 1", meant)).errors
+        assert (error.code, error.message) == ("S0106", refused)
+    assert compile_text(TEXT.replace("a + 1", inside)).image is not None
+
+
 @pytest.mark.slow
 def test_functions_that_call_the_next_twice_are_looked_at_once() -> None:
     text = "".join(f"FUNCTION F{n} : INT\nVAR_INPUT a : INT; END_VAR\nF{n} := F{n + 1}(a) + F{n + 1}(a);\nEND_FUNCTION\n"
