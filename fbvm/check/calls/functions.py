@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 
 from fbvm.base.types import ELEMENTARY, SHORT_NAMES, Elementary, StringType, string
 
@@ -166,6 +167,7 @@ def is_standard(name: str) -> bool:
     return name in SIGNATURES or name in OPERATORS or name in TIME_OPERATORS or bool(conversion(name) or typed_name(name))
 
 
+@cache
 def names() -> list[str]:
     """All names of standard functions, for hints."""
     return [*SIGNATURES, *OPERATORS, *(f"{a}_TO_{b}" for a in ELEMENTARY for b in ELEMENTARY if a != b)]

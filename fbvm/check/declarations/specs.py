@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 
 from fbvm.base.types import (
     ANYTHING,
@@ -169,9 +170,9 @@ def _hint(scope: Scope, name: str) -> str:
         also = ", and BIT in structures" if fold(name) == "BIT" else ""
         return f"its name here is {vendor_names.TYPES[fold(name)]}{also}"
     project = scope.project
-    known = (*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
-             *(pou.name for pou in project.pous.values()),
-             *(name for name in project.libraries.block_names() if fold(name).removeprefix("F_") not in _ARGUMENTS))
+    known = chain(ELEMENTARY, ["STRING"], (entry.tree.name.text for entry in project.types.values()),
+                  (pou.name for pou in project.pous.values()),
+                  (name for name in project.libraries.block_names() if fold(name).removeprefix("F_") not in _ARGUMENTS))
     return vendor_names.library_of(name) or project.nearest(name, known)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import chain
 
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.dialects import takers
@@ -60,9 +61,9 @@ def _hint(scope: Scope, expr: tree.NameRef) -> str:
     name, project = expr.text, scope.project
     if address := _address_hint(scope, expr):
         return address
-    known = [v.name for v in scope.pou.order] if scope.pou else []
+    known = (v.name for v in scope.pou.order) if scope.pou else ()
     hint = (vendor_names.VALUES.get(fold(name)) or vendor_names.duration(name) or vendor_names.library_of(name)
-            or project.nearest_global(name, [*known, *_members(scope)]))  # fmt: skip
+            or project.nearest_global(name, chain(known, _members(scope))))  # fmt: skip
     if not hint and expr in scope.qualifiers:
         return "if it is a library, an enumeration or a file of global variables, give its source with the files"
     return hint

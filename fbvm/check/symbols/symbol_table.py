@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
@@ -113,6 +114,9 @@ class SymbolTable:
         self._found_types: dict[str, dict[Seen, TypeEntry | None]] = {}
         """Results of look-ups: by folded name, and by the library and the namespaces in which the name is used."""
         self._compared = 0
+        self._indexed_globals = 0
+        self._qualified: dict[str, Variable] = {}
+        """The first global variable of each folded name that programs know by the name of its list only."""
         self.operator_types: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
         """By operator and elementary types of its operands, if none is constant: the types of the operation and the result."""
         self.instantiated: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
@@ -362,10 +366,12 @@ class SymbolTable:
 
     def nearest_global(self, name: str, more: Iterable[str] = ()) -> str:
         """A hint for a name that means no global variable, and none of the names in `more`."""
-        for variable in self.globals.values():
-            if variable.qualified and fold(variable.name) == fold(name):
-                return f"its list is qualified_only: write {variable.space}.{variable.name}"
-        return self.nearest(name, [*more, *(v.name for v in self.globals.values())])
+        if len(self.globals) != self._indexed_globals:
+            self._indexed_globals = len(self.globals)
+            self._qualified = {fold(v.name): v for v in reversed(self.globals.values()) if v.qualified}
+        if (variable := self._qualified.get(fold(name))) is not None:
+            return f"its list is qualified_only: write {variable.space}.{variable.name}"
+        return self.nearest(name, chain(more, (v.name for v in self.globals.values())))
 
     def names_in(self, space: str) -> list[str]:
         """The global variables of a list."""
@@ -393,6 +399,8 @@ class SymbolTable:
         """A hint that names the candidates most like a misspelt name, "" if none is.
 
         After `COMPARISONS` comparisons there are no more hints: thousands of unknown names have another cause than spelling."""
+        if self._compared > COMPARISONS:  # which is asked first: to gather the candidates for each name takes time, too
+            return ""
         shown = {fold(c): c for c in candidates}
         self._compared += len(shown)
         if self._compared > COMPARISONS:

@@ -45,6 +45,8 @@ class Comments:
         self.end_before: dict[int, int] = {}
         """Start of a token -> end of the one before it."""
         self.start_after: dict[int, int] = {}
+        self._column = (0, 0)
+        """The place whose column was asked for last, and that column."""
         end = 0
         for token in tokens:
             self.end_before[token.start] = end
@@ -85,8 +87,14 @@ class Comments:
         return Comment("\n".join(line.rstrip() for line in lines), self.column(start), own, blank)
 
     def column(self, at: int) -> int:
-        """Column of a place, from 0; a tab goes to the next multiple of TAB."""
-        return len(self.text[self.text.rfind("\n", 0, at) + 1:at].expandtabs(TAB))
+        """Column of a place, from 0; a tab goes to the next multiple of TAB.  Places on one line are asked for in their order."""
+        known, column = self._column if self._column[0] <= at else (0, 0)
+        start = self.text.rfind("\n", known, at) + 1
+        if start:
+            known, column = start, 0
+        over = " " * (column % TAB)
+        self._column = at, column - len(over) + len((over + self.text[known:at]).expandtabs(TAB))
+        return self._column[1]
 
     # --- moving ---
 

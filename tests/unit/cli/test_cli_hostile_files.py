@@ -22,7 +22,9 @@ from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_sources
 from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.plcopen.write.exporting import export_xml
 from fbvm.record.trace import format as trace_format
+from fbvm.syntax.formatter.formatter import formatted
 
 COUNTER = "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n"
 Fbvm = Callable[..., Result]
@@ -223,14 +225,51 @@ def of_drawn_coils(count: int) -> str:
     return DRAWN.format(f"       a           b\n   |--| |--+------( )--|{below * count}")
 
 
+def of_unknown_names(count: int) -> str:
+    """A program that declares names and uses others."""
+    declared = "".join(f"y{at} : INT; " for at in range(count))
+    return f"PROGRAM Main VAR {declared}END_VAR {''.join(f'x{at} := 1; ' for at in range(count))}END_PROGRAM\n"
+
+
+def of_comments_on_one_line(count: int) -> str:
+    """A program on one line, with comments between its statements."""
+    return f"PROGRAM Main VAR n : INT; END_VAR {'n := 1; (* a *) ' * count}END_PROGRAM\n"
+
+
+def of_properties(count: int) -> str:
+    """A block with properties."""
+    parts = "".join(f"PROPERTY PUBLIC P{at} : INT GET P{at} := 1; END_GET END_PROPERTY\n" for at in range(count))
+    return f"FUNCTION_BLOCK F\n{parts}END_FUNCTION_BLOCK\n"
+
+
+def compiled(source: Source) -> bool:
+    return compile_sources([source], runnable=True).image is not None
+
+
+def refused(source: Source) -> bool:
+    return compile_sources([source]).image is None
+
+
+def laid_out(source: Source) -> bool:
+    return not formatted(source)[1]
+
+
+def exported(source: Source) -> bool:
+    return export_xml([source], "x", "2020-01-01T00:00:00").text is not None
+
+
 @pytest.mark.slow
-@each_of(("made", "few"), [(of_interfaces, 150), (of_one_interface, 70), (of_jumps, 500), (of_far_jumps, 100), (of_bases, 50), (of_namespaces, 500),
-                           (of_drawn_contacts, 200), (of_drawn_coils, 200)])  # fmt: skip
-def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int) -> None:
+@each_of(("made", "few", "work"), [
+    (of_interfaces, 150, compiled), (of_one_interface, 70, compiled), (of_jumps, 500, compiled), (of_far_jumps, 100, compiled),
+    (of_bases, 50, compiled), (of_namespaces, 500, compiled), (of_drawn_contacts, 200, compiled), (of_drawn_coils, 200, compiled),
+    (of_unknown_names, 1500, refused), (of_comments_on_one_line, 3000, laid_out), (of_properties, 400, exported),
+])  # fmt: skip
+def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int,
+                                                        work: Callable[[Source], bool]) -> None:  # fmt: skip
     def took_s(count: int) -> float:
-        text = made(count)
-        assert compile_sources([Source("x.st", text)], runnable=True).image is not None
-        return least_s(lambda: compile_sources([Source("x.st", text)], runnable=True))
+        source = Source("x.st", made(count))
+        assert work(source)
+        return least_s(lambda: work(source))
 
     assert took_s(4 * few) < 8 * took_s(few)
 

@@ -120,16 +120,17 @@ def members(types: Types, declared: tree.Pou, body: BodyWriter) -> list[Element]
 
 def _members(types: Types, declared: tree.Pou, body: BodyWriter | None) -> Iterator[Element]:
     """The elements Method and Property; with no `body`, those of an INTERFACE."""
-    done: set[str] = set()
+    accessors: dict[str, list[tree.Pou]] = {}
+    for each in declared.methods:
+        if each.kind in ACCESSORS:
+            accessors.setdefault(each.name.text.upper(), []).append(each)
     for each in declared.methods:
         if each.refused or each.usings or each.accesses:
             raise NotExportable(each.name, f"parts of {each.kind} {each.name.text} are not exported", HINT)
         if each.kind == "METHOD":
             yield _method(types, each, body)
-        elif each.name.text.upper() not in done:
-            done.add(each.name.text.upper())
-            yield _property(types, [one for one in declared.methods if one.kind in ACCESSORS
-                                    and one.name.text.upper() == each.name.text.upper()], body)
+        elif (together := accessors.pop(each.name.text.upper(), None)) is not None:
+            yield _property(types, together, body)
 
 
 def _method(types: Types, method: tree.Pou, body: BodyWriter | None) -> Element:
