@@ -87,6 +87,7 @@ _DRAWN = re.compile(r"(?:[ \t]*[│├┃┣][^\n]*\n)+")
 """Lines that begin with the left rail of a rung."""
 END_OF_FILE = "\x1a\0"
 """Characters with which older systems fill a file behind its end."""
+_FILLED = re.compile(rf"[{END_OF_FILE} \t\r\n]*+\Z")
 NO_VALUE = ("<<", ">>", "++", "--")
 """Operators of other languages for which there is none of ours."""
 _WORDS = r"(?s:\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?)"
@@ -181,6 +182,8 @@ class Lexer:
         self.pragmas: list[Pragma] = []
         self.forms: list[Form] = []
         """What only some dialects take."""
+        self._line = (0, 0)
+        """The place whose line was asked for last, and where that begins."""
 
     def tokens(self, start: int = 0) -> Iterator[Token]:
         """Every token from an offset on, then one of type "$END"."""
@@ -307,11 +310,11 @@ class Lexer:
             self.forms.append(Form("bits_by_name", at, named.end(), (
                 "S0102", "the number of a bit stands behind %X", "the bit of a constant k is written name.k")))
             return None, named.end()
-        if character in END_OF_FILE and not text[at:].strip(END_OF_FILE + " \t\r\n"):
+        if character in END_OF_FILE and _FILLED.match(text, at):
             return None, len(text)
         if character in "'\"":
             return self._open_string(at)
-        if drawn := _DRAWN.match(text, text.rfind("\n", 0, at) + 1):
+        if drawn := _DRAWN.match(text, self._begin(at)):
             self.report("S0101", at, min(drawn.end(), text.find("\n", at)), "these lines are a rung that is drawn",
                         "rungs stand between LADDER and END_LADDER", False)
             return None, drawn.end()
@@ -321,9 +324,15 @@ class Lexer:
             return self._meant(at, *written)
         run = lex.unknown.match(text, at + 1)
         end = run.end() if run else at + 1
-        advice = next((match.expand(words) for shape, words in SIGNS if (match := shape.match(text, at))), "")
+        advice = next((words for shape, words in SIGNS if shape.match(text, at)), "")
         self.report("S0102", at, end, f"unexpected {_characters(text[at:end])}", advice)
         return None, end
+
+    def _begin(self, at: int) -> int:
+        """Where the line of a place begins; a long line is looked through once."""
+        known, begin = self._line if self._line[0] <= at else (0, 0)
+        self._line = at, self.text.rfind("\n", known, at) + 1 or begin
+        return self._line[1]
 
     def _meant(self, at: int, shape: re.Pattern[str], kind: str, ours: str, message: str,
                advice: str) -> tuple[Token | None, int]:
