@@ -108,10 +108,9 @@ def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value
     if (why := project.why_unseen(callee(call), scope.source)) is not None:
         scope.error(why[0], call.callee, *why[1:])
         return None
-    groups = functions.names(), (p.name for p in project.pous.values()), project.libraries.block_names()
     scope.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
                 vendor_names.FUNCTIONS.get(name) or vendor_names.library_of(callee(call)) or
-                project.nearest(callee(call), (each for group in groups for each in group)))
+                project.nearest_pou(callee(call), functions.names()))
     return None
 
 

@@ -373,6 +373,10 @@ class SymbolTable:
             return f"its list is qualified_only: write {variable.space}.{variable.name}"
         return self.nearest(name, chain(more, (v.name for v in self.globals.values())))
 
+    def nearest_pou(self, name: str, more: Iterable[str]) -> str:
+        """A hint for a name that means no POU, and none of the names in `more`."""
+        return self.nearest(name, chain(more, (pou.name for pou in self.pous.values()), self.libraries.block_names()))
+
     def names_in(self, space: str) -> list[str]:
         """The global variables of a list."""
         return [v.name for v in self.globals.values() if list_name(v.source) == fold(space)]
