@@ -10,6 +10,7 @@ from fbvm.check.expressions import objects, qualified
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Pou, PouCall, Variable
+from fbvm.check.symbols.report import with_article
 from fbvm.syntax import tree
 from fbvm.syntax.tree.il import CallsInRow
 
@@ -69,7 +70,7 @@ def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -
     if isinstance(callee, tree.NameRef) and objects.program(scope, callee):
         return _instance(scope, call, as_value)
     if pou is not None:
-        scope.error("S0401", callee, f"{pou.name} is a {pou.kind}: what is called is an instance of it",
+        scope.error("S0401", callee, f"{pou.name} is {with_article(pou.kind)}: what is called is an instance of it",
                     f"declare one, such as  my_{pou.name.lower()} : {pou.name};" if pou.kind != "PROGRAM" else
                     "a CONFIGURATION has several of it, and none is meant")
         _arguments_alone(scope, call)

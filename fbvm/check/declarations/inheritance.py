@@ -12,6 +12,7 @@ from fbvm.check.declarations import generic_blocks
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Variable
+from fbvm.check.symbols.report import with_article
 from fbvm.syntax import tree
 
 _BASES = {"FUNCTION_BLOCK": ("FUNCTION_BLOCK", "CLASS"), "CLASS": ("CLASS",), "INTERFACE": ("INTERFACE",)}
@@ -44,8 +45,9 @@ def resolve_head(context: Context, pou: Pou) -> None:
         if found is not None:
             pou.interfaces.append(found)
     for spec in (*(() if allowed else head.bases), *(head.interfaces if pou.kind not in ("FUNCTION_BLOCK", "CLASS") else ())):
-        report.add("S1001", pou.source, spec, f"a {pou.kind} extends and implements nothing",
-                   "make it a FUNCTION_BLOCK" if pou.kind == "PROGRAM" else "")
+        said = ("an INTERFACE implements nothing", "an interface EXTENDS others") if pou.kind == "INTERFACE" else \
+            (f"a {pou.kind} extends and implements nothing", "make it a FUNCTION_BLOCK" if pou.kind == "PROGRAM" else "")
+        report.add("S1001", pou.source, spec, *said)
 
 
 def _without_query(specs: Iterable[tree.NamedType]) -> Iterator[tree.NamedType]:
@@ -60,12 +62,13 @@ def _named(context: Context, pou: Pou, spec: tree.NamedType, kinds: tuple[str, .
     if found is None and (why := context.project.why_unseen(spec.text, pou.source)) is not None:
         context.report.add(why[0], pou.source, spec, *why[1:])
         return None
-    if found is None or found.kind not in kinds:
-        known = [each.name for each in context.project.pous.values() if each.kind in kinds]
-        what = f"{found.name} is a {found.kind}" if found is not None else f"there is no {' or '.join(kinds)} {spec.text}"
-        hint = "IMPLEMENTS names interfaces" if found is not None and found.kind == "INTERFACE" else \
-            "EXTENDS names blocks" if found is not None and "INTERFACE" in kinds else context.project.nearest(name, known)
-        context.report.add("S1001", pou.source, spec, what, hint)
+    if found is None:
+        known = [each.name for each in context.project.pous.values() if each.kind in kinds and each is not pou]
+        context.report.add("S1001", pou.source, spec, f"there is no {' or '.join(kinds)} {spec.text}",
+                           context.project.nearest(name, known))
+        return None
+    if found.kind not in kinds:
+        context.report.add("S1001", pou.source, spec, f"{found.name} is {with_article(found.kind)}", _instead(pou, found))
         return None
     if found is pou or found.busy:
         context.report.add("S1001", pou.source, spec, f"{pou.name} extends itself" if found is pou else
@@ -73,6 +76,17 @@ def _named(context: Context, pou: Pou, spec: tree.NamedType, kinds: tuple[str, .
         return None
     chosen = generic_blocks.chosen(Scope(context, pou.source, pou), found, spec)
     return chosen if chosen is not None and context.interface(chosen, pou.source, spec) and chosen.type is not None else None
+
+
+def _instead(pou: Pou, found: Pou) -> str:
+    """What to do where a head names something of the wrong kind; "" if that is nothing that may stand in a head."""
+    if pou.kind == "INTERFACE":
+        return "an interface extends interfaces only"
+    if found.kind == "INTERFACE":
+        return "IMPLEMENTS names interfaces"
+    if pou.kind == "CLASS":
+        return "a class extends classes only"
+    return "EXTENDS names blocks" if found.kind in _BASES else ""
 
 
 def shown(method: Pou) -> str:

@@ -12,6 +12,7 @@ from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols import vendor_names
+from fbvm.check.symbols.report import with_article
 from fbvm.syntax import tree
 
 _USES = {
@@ -46,7 +47,7 @@ def report_unknown(scope: Scope, expr: tree.NameRef) -> None:
     elif pou is None:
         scope.error("S0201", expr, f"{name} is not declared", _hint(scope, expr))
     else:
-        scope.error("S0201", expr, f"{name} is a {pou.kind} and has no value", _USES[pou.kind].format(pou.name))
+        scope.error("S0201", expr, f"{name} is {with_article(pou.kind)} and has no value", _USES[pou.kind].format(pou.name))
 
 
 def report_internal(scope: Scope, name: tree.Name, member: Field, block: StructType) -> None:

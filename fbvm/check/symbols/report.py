@@ -6,6 +6,11 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax import tree
 
 
+def with_article(kind: str) -> str:
+    """The kind of a POU as messages say it: `a PROGRAM`, `an INTERFACE`."""
+    return f"{'an' if kind == 'INTERFACE' else 'a'} {kind}"
+
+
 class Report:
     """Collects diagnostics; one code is reported once for one place."""
 
