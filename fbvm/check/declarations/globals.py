@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fbvm.base.types import fold
+from fbvm.check.declarations.inheritance import refuse_abstract
 from fbvm.check.declarations.locations import is_open
 from fbvm.check.declarations.variables import check_qualifiers, initialized, make_variable, type_of
 from fbvm.check.expressions.scope import Scope
@@ -75,6 +76,7 @@ def _declare(context: Context, declaration: GlobalDeclaration) -> None:
         made.init_slot = init_slot(attributes_before(source.text, declaration.section.start), GLOBAL_SLOT)
         made.qualified = declaration.section in project.qualified_only
         made.space = Path(source.name).stem if list_name(source) in project.lists else ""
+        refuse_abstract(context, made.type, source, name)
         made.place = "area" if declared.location is not None and not is_open(declared.location, made.type) else "abs"
         if not project.size_limits.reserve(made.type.size, f"{name.text} takes", source, name):
             project.failed_globals.add(key)

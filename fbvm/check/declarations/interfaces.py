@@ -315,8 +315,7 @@ class _Interface:
 
     def _edge(self, variable: Variable, declared: tree.VarDecl) -> None:
         if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or self.pou.is_routine:
-            self._error("S0206", variable.node,
-                        f"{declared.edge} belongs to a BOOL input of a block or program")
+            self._error("S0206", variable.node, f"{declared.edge} belongs to a BOOL input of a block or program")
             return
         variable.edge = declared.edge
 
@@ -377,6 +376,7 @@ class _Interface:
         if is_block(resolved[0]) and not self.scope.dialect.instances_are_values:
             self._error("S0901", spec, f"an instance as a result is not taken here: {takers('instances_are_values')}")
             return
+        refuse_abstract(self.context, resolved[0], pou.source, spec)
         pou.result = Variable(pou.tree.name.text, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])
         pou.variables.setdefault(fold(pou.tree.name.text), pou.result)
         pou.order.append(pou.result)

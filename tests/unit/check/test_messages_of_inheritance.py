@@ -157,3 +157,40 @@ M = "M : BOOL VAR_INPUT a : INT; END_VAR"
 ])
 def test_a_block_has_the_methods_of_its_interfaces(text: str, expected: Said) -> None:
     assert said(I + text) == expected
+
+
+ABSTRACT = """\
+FUNCTION_BLOCK ABSTRACT B
+METHOD ABSTRACT M : ARRAY [0..2] OF INT END_METHOD
+PROPERTY ABSTRACT P : INT GET END_GET SET END_SET END_PROPERTY
+END_FUNCTION_BLOCK
+TYPE S : STRUCT n : INT; b : ARRAY [0..1] OF B; END_STRUCT END_TYPE
+"""
+OF_P = "Get of the property P of B, Set of the property P of B"
+NO_INSTANCES = ("S1007", 6, "B is ABSTRACT and has no instances",
+                "declare one of a block that extends it and has the method M, Get of the property P, Set of the property P")
+
+
+@each_of("text, expected", [
+    (block("D EXTENDS B"), [("S1003", 6, f"D lacks method M of B, {OF_P}",
+                             "write METHOD M : ARRAY [0..2] OF INT, or make it FUNCTION_BLOCK ABSTRACT D")]),
+    (block("D EXTENDS B", "M : ARRAY [0..2] OF INT"),
+     [("S1003", 6, f"D lacks {OF_P}", "write PROPERTY P with GET, or make it FUNCTION_BLOCK ABSTRACT D")]),
+    (block("D EXTENDS B", head="FUNCTION_BLOCK ABSTRACT"), []),
+    ("PROGRAM Main VAR b : B; END_VAR END_PROGRAM", [NO_INSTANCES]),
+    ("PROGRAM Main VAR b : ARRAY [0..1] OF ARRAY [0..1] OF B; END_VAR END_PROGRAM", [NO_INSTANCES]),
+    ("PROGRAM Main VAR s : S; END_VAR END_PROGRAM", [NO_INSTANCES]),
+    ("PROGRAM Main VAR s : ARRAY [0..1] OF S; END_VAR END_PROGRAM", [NO_INSTANCES]),
+    ("FUNCTION_BLOCK E VAR_INPUT b : B; END_VAR END_FUNCTION_BLOCK", [NO_INSTANCES]),
+    ("FUNCTION F : INT VAR b : B; END_VAR F := 1; END_FUNCTION", [NO_INSTANCES]),
+    ("FUNCTION F : B END_FUNCTION", [NO_INSTANCES]),
+    ("FUNCTION_BLOCK E METHOD M : S END_METHOD END_FUNCTION_BLOCK", [NO_INSTANCES]),
+    ("FUNCTION F : INT VAR_INPUT b : B; END_VAR F := 1; END_FUNCTION", []),
+    ("VAR_GLOBAL b : B; END_VAR", [NO_INSTANCES]), ("VAR_GLOBAL s : S; END_VAR", [NO_INSTANCES]),
+    ("FUNCTION F : INT VAR_IN_OUT b : B; END_VAR F := 1; END_FUNCTION", []),
+    ("FUNCTION F : INT VAR_INPUT b : POINTER TO B; r : REFERENCE TO B; END_VAR F := 1; END_FUNCTION", []),
+    ("FUNCTION_BLOCK ABSTRACT E END_FUNCTION_BLOCK PROGRAM Main VAR e : E; END_VAR END_PROGRAM",
+     [("S1007", 6, "E is ABSTRACT and has no instances", "declare one of a block that extends it")]),
+])
+def test_a_block_that_is_abstract_has_no_instances(text: str, expected: Said) -> None:
+    assert said(ABSTRACT + text) == expected
