@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type, characters
+from fbvm.base.types import BOOL, DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type, base, characters
 from fbvm.check.expressions.assignability import as_number, mismatch_hint
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
@@ -29,9 +29,7 @@ def element(scope: Scope, expr: tree.Index, want: Type | None) -> Type | None:
             return None
         whole = characters(whole)
     if not isinstance(whole, ArrayType):
-        bit = len(expr.subscripts) == 1 and is_any(whole, "ANY_INT", "ANY_BIT")
-        of, number = scope.text(expr.of), scope.text(expr.subscripts[0])
-        scope.error("S0304", expr.of, f"this is {whole}, not an array", f"a bit is written {of}.{number}" if bit else "")
+        scope.error("S0304", expr.of, f"this is {whole}, not an array", _bit_hint(scope, expr, whole))
         return None
     element: Type = whole
     rest = list(zip(expr.subscripts, kinds, strict=True))
@@ -45,6 +43,16 @@ def element(scope: Scope, expr: tree.Index, want: Type | None) -> Type | None:
         rest = rest[len(element.bounds):]
         element = element.element
     return element
+
+
+def _bit_hint(scope: Scope, expr: tree.Index, whole: Type) -> str:
+    """How the bit is written that a subscript may mean; "" for what has no bits."""
+    if len(expr.subscripts) != 1 or not is_any(whole, "ANY_INT", "ANY_BIT") or base(whole) == BOOL:
+        return ""
+    of, number, bits = scope.text(expr.of), scope.facts.constants.get(expr.subscripts[0]), 8 * whole.size
+    if isinstance(number, int) and 0 <= number < bits:
+        return f"a bit is written {of}.{number}"
+    return f"bits are written {of}.0 to {of}.{bits - 1}"
 
 
 def _open(scope: Scope, expr: tree.Index, whole: OpenArrayType, kinds: list[Type | None]) -> Type | None:
