@@ -192,8 +192,8 @@ class Parts:
         for at, item in enumerate(order):
             for behind in order[at + 1:]:
                 if place[behind] < place[item] and (self._writes(item) or self._writes(behind)):
-                    both = touched[item], touched[behind]
-                    if None in both or (both[0] or frozenset()) & (both[1] or frozenset()):
+                    first, second = touched[item], touched[behind]
+                    if first is None or second is None or first & second:
                         raise Inexact
 
     def _writes(self, item: Object) -> bool:

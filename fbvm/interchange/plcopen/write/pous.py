@@ -174,9 +174,8 @@ def _pieces(start: int, end: int, without: Sequence[objects.Span]) -> Iterator[o
 
 
 def _is_list(body: tree.Block) -> bool:
-    """Whether a body is an instruction list; its jumps back have become loops around parts of it."""
-    return any(isinstance(each, InstructionList) or isinstance(each, tree.Repeat) and _is_list(each.body)
-               or isinstance(each, tree.If) and any(_is_list(inner) for _, inner in each.branches) for each in body)  # fmt: skip
+    """Whether a body is an instruction list; a jump back has become a loop around it."""
+    return any(isinstance(each, InstructionList) or isinstance(each, tree.Repeat) and _is_list(each.body) for each in body)
 
 
 def _without_ladder(text: str) -> str:
