@@ -41,6 +41,7 @@ def cells_of(partition: Partition) -> str:
     ([(0, 1, BIT), (0, 2, NUMBER)], "0:bits 1:1n", "0:2n"),  # the larger number counts, once it is known
     ([(0, 2, NUMBER), (1, 1, BIT)], "0:2n", "0:2n"),
     ([(0, 1, NUMBER), (0, 4, NUMBER), (2, 2, NUMBER)], "0:1n 1:1n 2:1n 3:1n", "0:4n"),
+    ([(0, 4, NUMBER), (2, 4, NUMBER), (4, 1, NUMBER)], "0:4n 4:1n 5:1n", "0:4n 4:1n"),  # a cell that others were cut into
     ([(2, 4, NUMBER), (0, 4, NUMBER)], "0:1n 1:1n 2:4n", "0:4n"),
     ([(5, 1, BOOL)], "5:1n", "5:1n"),  # a byte that is known to hold other numbers
     ([(8, 2, NUMBER), (8, 1, BIT)], "8:2n", "8:bits"),  # a byte in which bits are inputs

@@ -13,9 +13,12 @@ from test_encoded_rows import compare, result
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.types import BOOL, WORD, Field, array
 from fbvm.code.operations import Block, Node
-from fbvm.prove.encoding.execution import Refused
+from fbvm.prove.encoding.addresses import cases
+from fbvm.prove.encoding.cells import Contents, Partition
+from fbvm.prove.encoding.execution import Refused, State
 from fbvm.prove.encoding.scan import Scanned
 from fbvm.prove.encoding.summary import _extent
+from fbvm.prove.encoding.terms import Terms
 
 B0: Node = ("load", "b", at(0))
 SET_9: Node = store("u8", 9, const("u8", 7))
@@ -93,6 +96,19 @@ def test_a_copy_that_chooses_from_few_places_is_followed() -> None:
     code = (("copy", at(100, (2, index)), at(10, (3, other)), 2),)
     for row in (b"\0\0", b"\2\1", b"\1\0", b"\3\0"):
         compare(code, {0: row, 10: b"abcdefgh"}, budget=1000, unknown=True)
+
+
+@each_of(("width", "known", "most", "values"), [
+    (8, (2, 4), 3, [2, 3, 4]), (8, (2, 4), 2, None), (8, (-1, 1), 3, [255, 0, 1]), (8, (5, 5), 1, [5]), (1, None, 2, [1, 0]),
+    (8, None, 256, [number % 256 for number in range(-128, 128)]), (8, None, 255, None),
+])  # fmt: skip
+def test_the_values_of_a_term_are_told_up_to_so_many(width: int, known: tuple[int, int] | None, most: int,
+                                                     values: list[int] | None) -> None:  # fmt: skip
+    terms = Terms()
+    term = terms.variable("x", width)
+    contents = Contents(terms, Partition(), lambda cell: terms.true)
+    found = cases(terms, State(contents, terms.true, known={term: known} if known else {}), term, most)
+    assert (found and [value for _, value in found]) == values
 
 
 def test_what_no_path_reads_is_nothing_that_is_known() -> None:
