@@ -107,7 +107,7 @@ def test_a_folder_and_a_missing_file_are_messages(tmp_path: Path) -> None:
 ])
 def test_a_wrong_encoding_is_named(data: bytes, says: str) -> None:
     found = only(data)
-    assert found.code == "X0101"
+    assert (found.code, found.start, found.end) == ("X0101", 0, 0)  # nothing of it can be shown
     assert says in found.message
 
 
