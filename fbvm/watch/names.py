@@ -154,14 +154,13 @@ class Names:
 
     def _addressed(self, offset: int, target: Type | None) -> Place | None:
         """The word, double word or long word of an area of bytes, %MW20, in which no variable is located."""
-        size = target.size if target else 0
         area = next((area for area in self._areas.values() if area.offset <= offset < _end(area)), None)
-        if area is None or area.unit_bits != 8 or size not in _LETTERS or self._at_area(offset, None):
+        if target is None or target.size not in _LETTERS or area is None or area.unit_bits != 8 or self._at_area(offset, None):
             return None
-        number, rest = divmod(offset - area.offset, size)
-        if rest or area.address_bits not in (0, 8 * size):
+        number, rest = divmod(offset - area.offset, target.size)
+        if rest or area.address_bits not in (0, 8 * target.size):
             return None
-        return find_place({}, self._areas, f"%{area.name.lstrip('%')[0]}{_LETTERS[size]}{number}")
+        return find_place({}, self._areas, f"%{area.name.lstrip('%')[0]}{_LETTERS[target.size]}{number}")
 
     def _chain(self, offset: int, bit: int | None) -> Iterator[Place]:
         """The variables to which a byte belongs: each is followed by its element or member that holds the byte."""
