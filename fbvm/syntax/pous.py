@@ -228,7 +228,6 @@ class SourceBuilder(SfcElements):
         self.lists = [each for each in lists if each.start >= start]
         self.targets = {each: name for each, name in targets.items() if each.start >= start}
         self.labels = {each: name for each, name in labels.items() if each.start >= start}
-        self.rungs = _rungs(self.ladders)
         self.charted, self.jump_sections = {}, []
         yield
         self.ladders = [each for each in ladders if each.start < start]
