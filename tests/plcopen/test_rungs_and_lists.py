@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drawings import RAIL, block, coil, contact, document, pou
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -15,10 +16,10 @@ def exported(body: str) -> str:
     return made.text
 
 
-def body_of(text: str) -> list[str]:
-    """The lines of the body that comes of a document, in single words."""
-    main = import_xml(text.encode()).files["Main.st"]
-    lines = main.partition("END_VAR\n")[2].splitlines()
+def body_of(text: str, order: str = "network") -> list[str]:
+    """The lines of the body that comes of a document, with single spaces."""
+    main = import_xml(text.encode(), order=order).files["Main.st"]
+    lines = main.rpartition("END_VAR\n")[2].splitlines()
     return [" ".join(line.split()) for line in lines if not line.strip().startswith("//")]
 
 
@@ -45,3 +46,29 @@ def test_an_and_block_alone_joins_a_comparison_to_the_power_before_it(other: str
 def test_a_body_is_exported_in_the_language_that_it_is_written_in(body: str, language: str) -> None:
     text = exported(body)
     assert [each for each in ("ST", "IL", "LD") if f"<{each}>" in text] == [language]
+
+
+RUNG = ["LADDER", "RUNG 1", "LD a", "OUT TR0"]
+
+
+@each_of("branch, output, order, body", [
+    (contact(5, "2", "c") + coil(6, "5", "y"), coil(7, "3", "z"), "network",
+     [*RUNG, "AND b", "OUT x", "OUT z", "LD TR0", "AND c", "OUT y", "END_LADDER"]),
+    (contact(5, "2", "s.f") + coil(6, "5", "y"), coil(7, "3", "z"), "network",
+     [*RUNG, "AND b", "OUT x", "OUT z", "LD TR0", "AND s.f", "OUT y", "END_LADDER"]),
+    (contact(5, "2", "z") + coil(6, "5", "y"), coil(7, "3", "z"), "network",
+     ["Power_3 := a AND b;", "x := Power_3;", "y := a AND z;", "z := Power_3;"]),
+    (contact(5, "2", "%MX0.3") + coil(6, "5", "y"), coil(7, "3", "z"), "network",
+     [*RUNG, "AND b", "OUT x", "OUT z", "LD TR0", "AND %MX0.3", "OUT y", "END_LADDER"]),
+    (contact(5, "2", "%MX0.3") + coil(6, "5", "y"), coil(7, "3", "%MX0.4"), "network",
+     ["Power_3 := a AND b;", "x := Power_3;", "y := a AND %MX0.3;", "%MX0.4 := Power_3;"]),
+    (contact(5, "2", "c") + coil(6, "5", "y"), block(7, "Blk", "EN=3", "ENO", "t"), "network",
+     ["Power_3 := a AND b;", "x := Power_3;", "y := a AND c;", "t(EN := Power_3);"]),  # a block may touch any memory
+    (contact(5, "2", "c") + block(6, "Blk", "EN=5", "ENO", "t"), coil(7, "3", "z"), "network",
+     ["Power_3 := a AND b;", "x := Power_3;", "t(EN := a AND c);", "z := Power_3;"]),
+    (contact(5, "2", "c") + block(6, "Blk", "EN=5", "ENO", "t"), coil(7, "3", "z"), "document",
+     [*RUNG, "AND b", "OUT x", "OUT z", "LD TR0", "AND c", "FBCALL Blk t", "END_LADDER"]),  # blocks come last there
+])  # fmt: skip
+def test_a_rung_reads_and_writes_in_the_order_of_its_network(branch: str, output: str, order: str, body: list[str]) -> None:
+    drawn = RAIL + contact(2, "1", "a") + contact(3, "2", "b") + coil(4, "3", "x") + branch + output
+    assert body_of(document(pou(drawn, "a b c x y z")).decode(), order) == [*body, "END_PROGRAM"]
