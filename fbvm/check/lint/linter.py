@@ -72,7 +72,8 @@ def _tasks(context: Context, own: list[Pou]) -> None:
     """Warn of programs that a CONFIGURATION forgets."""
     run = {run.instance.type for task in context.tasks for run in task.runs if run.block is None}
     called = {callee for pou in own for callee in pou.calls}
+    named = set(context.project.pous.values())  # without what the system calls before the first cycle
     for pou in own:
-        if pou.kind == "PROGRAM" and pou.as_written and pou.type not in run and pou not in called:
+        if pou.kind == "PROGRAM" and pou in named and pou.type not in run and pou not in called:
             context.report.add("S0890", pou.source, pou.tree.name, f"no task runs the PROGRAM {pou.name}",
                                f"write in the CONFIGURATION: PROGRAM {pou.name}1 WITH task : {pou.name};")
