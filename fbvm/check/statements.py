@@ -159,8 +159,9 @@ class _Statements:
         if kind is not None:
             compares = isinstance(node.call, tree.Binary) and node.call.op == "="
             if self.scope.dialect.idle_statements:
-                self.scope.settle(node.call)
-                self.error("S0193", node.call, "this statement does nothing", "`=` compares, `:=` assigns" if compares else "")
+                if self.scope.settle(node.call) is not None:
+                    self.error("S0193", node.call, "this statement does nothing",
+                               "`=` compares, `:=` assigns" if compares else "")
                 return
             self.error("S0401", node.call, "this is no statement: it does nothing", ("`=` compares, `:=` assigns" if compares else
                        "write () behind an instance to call it, := to assign") + f", or take {takers('idle_statements')}")

@@ -49,6 +49,15 @@ def test_a_head_that_is_wrong_has_one_message(text: str, said: list[tuple[str, i
     assert [(each.code, each.line, each.message, each.hint) for each in errors] == said
 
 
+def test_a_second_configuration_is_shown_beside_the_first() -> None:
+    run = "RESOURCE R ON PLC TASK T(INTERVAL := T#10ms, PRIORITY := 1); PROGRAM P WITH T : Main; END_RESOURCE END_CONFIGURATION"
+    [error] = compile_text(f"PROGRAM Main END_PROGRAM\nCONFIGURATION First {run}\nCONFIGURATION Second {run}").errors
+    assert (error.code, error.line, error.message, error.hint) == \
+        ("S0801", 3, "there is a second CONFIGURATION", "a project has one")  # fmt: skip
+    assert error.related is not None
+    assert (error.related[0].place(error.related[1]), error.related[2]) == ((2, 15), "the first")
+
+
 @each_of("text, width, lines", [
     ("", 6, [""]), ("a bb ccc", 6, ["a bb", "ccc"]), ("aaa bb", 6, ["aaa bb"]), ("aaaa bb", 6, ["aaaa", "bb"]),
     ("aaa  bb\nc", 100, ["aaa bb c"]),
