@@ -90,8 +90,9 @@ def test_a_global_reference_is_known_by_its_own_eight_bytes() -> None:
 
 def test_bytes_without_a_name_are_passed_over_one_by_one() -> None:
     block = t.StructType("Block", 16, 8, {"R": Field("r", t.INT, 0, reference=True), "N": Field("n", t.BOOL, 8)}, block=True)
-    names = Names({"X": Field("x", t.BOOL, SLOTS_OFFSET + 17), "B": Field("b", block, SLOTS_OFFSET + 24)}, AREAS)
-    assert [found.name for found in names.within(SLOTS_OFFSET + 16, 17)] == ["x", "b.r", "b.n"]
+    own = {"X": Field("x", t.BOOL, SLOTS_OFFSET + 17), "Y": Field("y", t.BOOL, SLOTS_OFFSET + 18)}
+    names = Names({**own, "B": Field("b", block, SLOTS_OFFSET + 24)}, AREAS)
+    assert [found.name for found in names.within(SLOTS_OFFSET + 16, 17)] == ["x", "y", "b.r", "b.n"]
 
 
 def test_a_pointer_is_outside_of_the_variable_that_fills_its_object_or_of_what_begins_there() -> None:
