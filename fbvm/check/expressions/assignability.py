@@ -57,10 +57,8 @@ def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
         return False
     if dialect.numbers_of_enumerations and (isinstance(kind, EnumType) or isinstance(target, EnumType)):
         kind = kind.base if isinstance(kind, EnumType) else kind
-        if kind == target or converts(kind, target):
-            return True
         target = target.base if isinstance(target, EnumType) else target
-        if kind == target or converts(kind, target):
+        if converts(kind, target):
             return True
     if dialect.instances_are_values and isinstance(target, StructType) and target.block:
         return kind == target
