@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drawings import RAIL, block, coil, contact, document, pou
+from drawings import RAIL, block, coil, contact, document, pou, result, value, variable
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -34,6 +34,47 @@ def test_an_and_block_alone_joins_a_comparison_to_the_power_before_it(other: str
     text = exported("LADDER\nLD a\nAND=(300) n m\nOUT x\nEND_LADDER")
     assert text.count('typeName="AND"') == 1
     assert body_of(text.replace('typeName="AND"', f'typeName="{other}"')) == body
+
+
+THIRD = '<variable formalParameter="IN3"><connectionPointIn><connection refLocalId="2"/></connectionPointIn></variable>'
+RIGHT = "<rightPowerRail"
+
+
+@each_of("edits, body", [
+    ({}, ["LADDER", "RUNG 1", "LD a", "AND= n m", "OUT x", "END_LADDER"]),
+    ({"</inputVariables>": f"{THIRD}</inputVariables>"}, ["x := a AND n = m AND a;"]),
+    ({RIGHT: coil(70, "5.OUT", "y", at="520,200") + RIGHT}, ["Power_5 := n = m;", "x := a AND Power_5;", "y := Power_5;"]),
+    ({'refLocalId="5"': 'refLocalId="71"', RIGHT: contact(71, "1", "b") + RIGHT}, ["x := a AND b;"]),
+])  # fmt: skip
+def test_an_and_block_joins_one_comparison_that_nothing_else_takes(edits: dict[str, str], body: list[str]) -> None:
+    text = exported("LADDER\nLD a\nAND=(300) n m\nOUT x\nEND_LADDER")
+    before, kind, behind = text.partition('typeName="AND"')
+    for old, new in edits.items():
+        behind = behind.replace(old, new, 1)
+    assert body_of(before + kind + behind) == [*body, "END_PROGRAM"]
+
+
+@each_of("drawn, body", [
+    (block(5, "Blk", "EN=2", "ENO", "t"), ["FBCALL Blk t"]),
+    (block(5, "Blk", "EN=2", "ENO", "t") + coil(6, "5.ENO", "x"), ["FBCALL Blk t", "OUT x"]),
+    (value(3, "n") + block(5, "Blk", "EN=2 k=3", "ENO,q", "t") + result(6, "5.q", "m"), ["FBCALL Blk t k:=n q=>m"]),
+    (value(3, "b") + block(5, "Blk", "EN=2 !k=3", "ENO,q", "t"), "t(EN := a, k := NOT b);"),
+    (value(3, "b") + block(5, "Blk", "EN=2", "ENO,q", "t", in_outs="k=3"), "t(EN := a, k := b);"),
+    (contact(3, "1", "b") + block(5, "Blk", "EN=2 k=3", "ENO,q", "t"), "t(EN := a, k := b);"),
+    (block(5, "Blk", "!EN=2", "ENO", "t"), "t(EN := NOT a);"),
+    (block(5, "Blk", "k=2", "q", "t"), "t(k := a);"),
+    (value(3, "n") + block(5, "Blk", "EN=2 k=3", "ENO,q", "t") + coil(6, "5.q", "x"),
+     "Enabled_5 := FALSE; t(EN := a, k := n, ENO => Enabled_5); IF Enabled_5 THEN x := t.q; END_IF;"),
+    (value(3, "b") + block(5, "Blk", "EN=2 k=3", "ENO,q", "t") + result(6, "5.q", "y", 'negated="true"'),
+     "Enabled_5 := FALSE; t(EN := a, k := b, ENO => Enabled_5); IF Enabled_5 THEN y := NOT t.q; END_IF;"),
+    (value(3, "n") + block(5, "Fun", "EN=2 k=3", "ENO,q") + result(6, "5.q", "m"),
+     "Enable_5 := a; IF Enable_5 THEN Result_5 := Fun(k := n); END_IF; IF Enable_5 THEN m := Result_5; END_IF;"),
+])  # fmt: skip
+def test_a_block_that_power_goes_through_is_called_by_a_rung(drawn: str, body: list[str] | str) -> None:
+    names = "".join(map(variable, ("a", "b", "x", "y"))) + variable("n", "INT") + variable("m", "INT") + variable("t", "Blk")
+    text = " ".join(body_of(document(pou(RAIL + contact(2, "1", "a") + drawn, names)).decode()))
+    wanted = body if isinstance(body, str) else " ".join(["LADDER", "RUNG 1", "LD a", *body, "END_LADDER"])
+    assert text == f"{wanted} END_PROGRAM"
 
 
 @each_of("body, language", [
