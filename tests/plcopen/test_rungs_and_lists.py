@@ -36,6 +36,15 @@ def test_an_and_block_alone_joins_a_comparison_to_the_power_before_it(other: str
     assert body_of(text.replace('typeName="AND"', f'typeName="{other}"')) == body
 
 
+@each_of("steps", [
+    ["LD a", "MOV n m"], ["LD a", "NOT", "OUT x"], ["LD a", "AND b", "NOT", "MOV n m"], ["LD a", "@SET x"], ["LD= n m", "OUT x"],
+    ["LD a", "OUT x", "ANDNOT b", "MOV n m"], ["LD a", "+ n &1 m"], ["LD a", "OR= n m", "DIFU x"], ["@LD a", "SET x"],
+])
+def test_steps_come_back_as_they_were_exported(steps: list[str]) -> None:
+    found = body_of(exported("\n".join(["LADDER", *steps, "END_LADDER"])))
+    assert found == ["LADDER", "RUNG 1", *steps, "END_LADDER", "END_PROGRAM"]
+
+
 THIRD = '<variable formalParameter="IN3"><connectionPointIn><connection refLocalId="2"/></connectionPointIn></variable>'
 RIGHT = "<rightPowerRail"
 
@@ -61,6 +70,8 @@ def test_an_and_block_joins_one_comparison_that_nothing_else_takes(edits: dict[s
     (value(3, "b") + block(5, "Blk", "EN=2 !k=3", "ENO,q", "t"), "t(EN := a, k := NOT b);"),
     (value(3, "b") + block(5, "Blk", "EN=2", "ENO,q", "t", in_outs="k=3"), "t(EN := a, k := b);"),
     (contact(3, "1", "b") + block(5, "Blk", "EN=2 k=3", "ENO,q", "t"), "t(EN := a, k := b);"),
+    (value(3, "b", 'negated="true"') + block(5, "Blk", "EN=2 k=3", "ENO,q", "t"), "t(EN := a, k := NOT b);"),
+    (value(3, "b") + value(4, "x") + block(5, "Blk", "EN=2 k=3+4", "ENO,q", "t"), "t(EN := a, k := b OR x);"),
     (block(5, "Blk", "!EN=2", "ENO", "t"), "t(EN := NOT a);"),
     (block(5, "Blk", "k=2", "q", "t"), "t(k := a);"),
     (value(3, "n") + block(5, "Blk", "EN=2 k=3", "ENO,q", "t") + coil(6, "5.q", "x"),
