@@ -381,11 +381,10 @@ class Debugger:
         for stretch in stretches(held.start, min(here.scan, held.stop)):
             passes = plc.passes(Position(stretch.start, BEFORE))
             runner = PastRunner(plc.recorded, stretch.start, plc, rows, plc.seen_before(stretch.start), passes, check)
-            found = yield from last_in(runner, stretch.stop)
+            found = yield from last_in(runner, stretch.stop, Position(stretch.stop) < here)
             if found and found[2] and check:
-                if Position(found[0] + 1) < here:
-                    return Reached(plc.name, Position(found[0] + 1), NO_SITE, (), (check.found,), check.kind)
-            elif found:
+                return Reached(plc.name, Position(found[0] + 1), NO_SITE, (), (check.found,), check.kind)
+            if found:
                 return plc.stops.look(found[0], state=found[1], last=True).reached
         return None
 

@@ -142,8 +142,8 @@ class PastRunner(Runner):
         return self.check is None and self._again.many(end)
 
 
-def last_in(runner: Runner, end: int) -> Generator[None, None, tuple[int, State, bool] | None]:
-    """Executes the scans before number `end`.
+def last_in(runner: Runner, end: int, checks_last: bool) -> Generator[None, None, tuple[int, State, bool] | None]:
+    """Executes the scans before number `end`.  A check stops behind the last of them only if `checks_last`.
 
     The result is the last one in which a breakpoint is reached, or behind which a check stops: its number, what breakpoints had
     seen before it, and True if it was a check."""
@@ -158,7 +158,7 @@ def last_in(runner: Runner, end: int) -> Generator[None, None, tuple[int, State,
             found = scan, runner.state, False
             if runner.plc.scans > scan:
                 break
-        if runner.stops_behind():
+        if (checks_last or scan + 1 < end) and runner.stops_behind():
             found = scan, runner.state, True
         runner.rows.take_told()
         yield None

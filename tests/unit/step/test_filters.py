@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from test_debugger import done
+from rows import each_of
+from test_debugger import debugger, done, line
 
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
@@ -13,6 +14,7 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.step.debugger import Debugger
 from fbvm.step.filters import BetweenScans
+from fbvm.step.position import Position
 from fbvm.step.session import Session
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
@@ -102,3 +104,39 @@ def test_a_scan_that_begins_too_late_stops_the_run() -> None:
     assert late_scans(frozenset((5,)), 0, 10, 24, 39, 55, 65) == ["scan 3 began 5ms late", "scan 4 began 6ms late"]
     assert late_scans(frozenset(), 0, 10, 29, 49, 59) == ["scan 3 began 10ms late"]
     assert late_scans(frozenset((1,)), 0, 10, 20, 30) == []
+
+
+class SomeScans:
+    """Stops a run behind scans, and says which one it was."""
+
+    found, kind = "", "some"
+
+    def __init__(self, *scans: int) -> None:
+        self._scans = scans
+
+    def attached(self, plc: Plc) -> None:
+        """Another PLC executes the scans."""
+
+    def checked(self, plc: Plc) -> bool:
+        if plc.scans in self._scans:
+            self.found = f"{plc.scans} scans"
+        return plc.scans in self._scans
+
+
+@pytest.mark.slow
+@each_of(("scans", "condition", "stops"), [
+    ((2, 3, 5), "", [(5, 0), (3, 0), (2, 0)]),
+    ((5,), "Main.N = 5", [(5, 0), (4, 1)]), ((2, 5), "Main.N = 5", [(5, 0), (4, 1), (2, 0)]),
+])  # fmt: skip
+def test_back_from_a_stop_between_two_scans_it_goes_to_the_stop_before_it(
+    scans: tuple[int, ...], condition: str, stops: list[tuple[int, int]]
+) -> None:
+    found = debugger()
+    done(found.scan(7))
+    found.checks = {"plc": SomeScans(*scans)}
+    found.here.put([line("text.st:14", condition)] * bool(condition))
+    for scan, step in stops:
+        reached = done(found.reverse())
+        assert reached and reached.position == found.session.here == Position(scan, step)
+        assert (reached.kind, reached.reasons) == ("some", (f"{scan} scans",)) or step
+    assert done(found.reverse()) is None and found.session.here == Position()
