@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from fbvm.base.diagnostics import Source, errors
+from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import BOOL, fold
 from fbvm.code.image import Site
 from fbvm.engine.observation import NO_SITE
@@ -186,7 +187,7 @@ class Assertions:
         if isinstance(event, Statement):
             self._reads[event.frame] = []
         elif isinstance(event, Read):
-            place = self.names.at(event.offset, event.bit if event.bit < 8 else None)
+            place = self.names.at(event.offset, None if event.bit == WHOLE_BYTES else event.bit)
             if place is not None and is_single(place):
                 self._reads.setdefault(event.frame, []).append(place)
         elif isinstance(event, Write):

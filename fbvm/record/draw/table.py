@@ -186,8 +186,10 @@ class ScanTable:
         return next((change for change in reversed(self.changes) if change.signal == signal), None)
 
     def draw(self, bands: Iterable[Band] | None = None) -> str:
-        """The table as text, of all recorded scans or of some `bands`."""
+        """The table as text, of all recorded scans or of some `bands`; "" of none."""
         chosen = list(self.bands if bands is None else bands)
+        if not chosen:
+            return ""
         headings = [signal.label for signal in self.signals]
         heads = [f"scan {band.scan}   {show_time(band.now_ns).removeprefix('T#')}" for band in chosen]
         left = max([len(head) + 2 for head in heads] + [len(row.label) + 4 for band in chosen for row in band.rows])

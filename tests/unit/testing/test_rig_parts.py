@@ -353,6 +353,24 @@ def test_programs_in_st_pass_fail_or_trap(tmp_path: Path, monkeypatch: pytest.Mo
         "  test_it.st:7  >2\nscan 2   20ms\n  inputs         2   0\n  test_it.st:7  >3\n\npage")
 
 
+@pytest.mark.slow
+def test_a_failed_assert_shows_bits_by_their_names_and_no_scan_where_none_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fbvm.testing.st_items.failure_page", lambda item, suffix, write: "page")
+    file = tmp_path / "tests" / "test_it.st"
+    file.parent.mkdir()
+    monkeypatch.chdir(tmp_path)
+    file.write_text("PROGRAM Bits VAR b AT CIO 0.03 : BOOL; k AT CIO 1.15 : BOOL; c : BOOL; END_VAR\n"
+                    "    ASSERT(b OR k OR c OR b);\nEND_PROGRAM", encoding="utf-8")  # fmt: skip
+    item = st_item(file, "Bits")
+    with pytest.raises(AssertFailed) as failed:
+        item.runtest()
+    assert item.repr_failure(cast(Any, failed)) == (
+        f"{Path('tests/test_it.st')}:2: in Bits, scan 0 (0s)\n>   ASSERT(b OR k OR c OR b);\n"
+        "E   b = FALSE\nE   k = FALSE\nE   c = FALSE\n\npage")
+
+
 def test_a_program_in_st_that_is_never_done_fails_after_a_minute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fbvm.testing.st_items.LIMIT_NS", 30 * MS)
     file = tmp_path / "tests" / "test_it.st"
