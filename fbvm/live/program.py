@@ -140,8 +140,7 @@ class ScanView:
         """Called at the end of a phase."""
         self._power.phase(plc, phase)
         self._charts.phase(plc, phase)
-        if phase is Phase.INPUTS:
-            self.scan = plc.scans
+        self.scan = plc.scans
 
     def event(self, plc: ScanState, event: Event) -> None:
         """Called for each event of the scan."""

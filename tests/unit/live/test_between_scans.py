@@ -131,9 +131,11 @@ def test_which_address_is_the_server_s_own(host: str, is_own: bool) -> None:
 
 
 def test_a_test_of_all_plcs_names_the_network_only_where_something_was_done_to_it() -> None:
-    for acts, wanted in (([("write", {"plc": "pump", "name": "Main.Level", "value": "5"})], False),
-                         ([("fault", {"kind": "silent"})], True),
-                         ([("cable", {"plc": "pump", "unit": "ETN21 0", "plugged": False})], True)):  # fmt: skip
+    fault = "from fbvm.net.faults import Fault"
+    for acts, wanted, imports in (
+            ([("write", {"plc": "pump", "name": "Main.Level", "value": "5"})], False, []),
+            ([("fault", {"kind": "silent"})], True, [fault]),
+            ([("cable", {"plc": "pump", "unit": "ETN21 0", "plugged": False})], True, ["from fbvm import Peer", fault])):
         page = Page()
         page.done("hello", version=1)
         page.scan(2)
@@ -142,6 +144,7 @@ def test_a_test_of_all_plcs_names_the_network_only_where_something_was_done_to_i
         page.scan()
         text = plant_text(page.bench.acts, page.live, [], Path("fbvm.toml"), {"pump": page.live})
         assert ("    network = made.network\n" in text) is wanted, text
+        assert [line for line in text.splitlines() if "import " in line] == imports
         assert text.splitlines()[-3:] == ["    while plc.scans < 3:", "        made.scan()",
                                           "    assert all(rig.plc.trap is None for rig in made.rigs.values())"]  # fmt: skip
 

@@ -49,6 +49,8 @@ def test_a_page_is_opened_and_asks(host: LiveHost) -> None:
     with opened(host) as sock:
         assert b'"re":1' in sock.recv(65536)
         assert len(host.server.sessions) == 1
+        [browser] = host.server._browsers
+        assert browser.sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY), "small updates do not wait for one another"
 
 
 def test_a_browser_that_goes_without_a_word_is_forgotten(host: LiveHost) -> None:

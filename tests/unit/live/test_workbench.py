@@ -201,6 +201,16 @@ def test_a_scan_is_observed_once_for_a_look(page: Page) -> None:
     assert page.live.view.scan == 5, "a quarter of a second has to pass between two"
 
 
+def test_a_scan_that_executes_no_program_is_observed_as_the_scan_that_it_is(page: Page) -> None:
+    page.scan(3)
+    page.done("mode", plc="pump", mode="PROGRAM")
+    page.done("look", plc="pump", names=[], instance="Main", scan=True)
+    page.scan(2)
+    assert page.update()["inside"] == {"scan": 3, "executed": [], "pictures": []}
+    page.done("view", plc="pump", scan=4)
+    assert page.update()["inside"] == {"scan": 4, "executed": [], "pictures": []}
+
+
 @pytest.mark.slow
 def test_a_chart_is_drawn_as_it_was_in_the_scan() -> None:
     page = opened(CHART)

@@ -641,7 +641,7 @@ def test_wrong_use(network: TcpNetwork, device: Device) -> None:
         network.attach(UNIT)
     network.close()
     network.close()
-    assert network.wait(0)
+    assert network.wait(0) and network.serve(now_ns()) == []
     link.submit([Send(1, b""), Close(1), Connect(1, SERVER)], now_ns())
     assert link.events(now_ns()) == [Failed(1, "send", "ENOTCONN"), Closed(1), Failed(1, "open", "ENETDOWN")]
 
@@ -669,4 +669,14 @@ def test_a_door_at_every_address_is_known_by_that_of_this_host() -> None:
         ("127.0.0.1", 5000), ("127.0.0.2", 5001), ("127.0.0.1", 5001))] == [True, True, False]  # fmt: skip
     network.own("tcp", Peer("0.0.0.0", 5000), None)
     assert network.inward("tcp", Peer("127.0.0.1", 5000)) != SERVER
+    network.close()
+
+
+def test_a_unit_that_listens_at_every_address_is_called_at_that_of_this_host() -> None:
+    hosts = {UNIT: "0.0.0.0", "10.0.0.8": "127.0.0.2"}
+    network = TcpNetwork({Peer(host, 0): (real, 5000 + number) for number, (host, real) in enumerate(hosts.items())})
+    for host in hosts:
+        network.attach(host)
+    assert [network.outward(Peer(host, 2000)) for host in (*hosts, "10.0.0.9")] == [
+        Peer("127.0.0.1", 5000), Peer("127.0.0.2", 5001), Peer("10.0.0.9", 2000)]  # fmt: skip
     network.close()

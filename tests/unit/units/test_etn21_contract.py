@@ -17,7 +17,7 @@ from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.inside import PROGRAM
 from fbvm.units.etn21.mail import Mail, agreed
 from fbvm.units.etn21.map import CIO_WORDS, D_WORDS, Switch, TcpState
-from fbvm.wire.link import Failed, Opened, Peer, Received, Sent
+from fbvm.wire.link import Failed, Grant, Opened, Peer, Received, Sent
 
 MAIL = "fbvm.units.etn21.mail"
 
@@ -90,6 +90,19 @@ def test_rows_follow_the_program_wherever_their_fields_lie() -> None:
     faults[:] = [Fault(0x0302, Switch.SEND, 4), Fault(1)]
     assert faults == [Fault(0x0302, Switch.SEND, 4), Fault(1)]
     assert own.view("ETN21_Filler")[0] == KEEP
+
+
+def test_every_row_of_requests_is_done_in_their_order() -> None:
+    own = processor(PROGRAM)
+    mail, plc = Mail(own, None), Plc(compile_text("PROGRAM Main END_PROGRAM").image)
+    kinds, pack = own.contract.enumeration("ETN21_Asked"), own.contract.record("ETN21_Requests").packer("kind", "channel", "size")
+    rows = own.contract.array("ETN21_Requests")[1]
+    for number in range(rows):
+        pack(own.view("ETN21_Requests"), number * own.contract.record("ETN21_Requests").size, kinds["grant"], number % 8, number)
+    for asked in (rows, 3):
+        own.view("ETN21_Requested")[0] = own.view("ETN21_Urgent")[0] = asked
+        assert mail.collect(plc.memory) == [Grant(number % 8, number) for number in range(asked)]
+        assert (own.view("ETN21_Requested")[0], own.view("ETN21_Urgent")[0]) == (0, 0)
 
 
 def test_names_for_charts_are_those_of_the_program() -> None:
