@@ -155,7 +155,9 @@ def _formatted(server: Server, uri: str, only: types.Range | None) -> list[types
     start, end = 0, len(file.text)
     if only is not None:
         first, last = positions.offset(only.start), positions.offset(only.end)
-        touched = [each for each in file.parts if each.base <= last and first <= each.base + len(each.source.text)]
+        chosen = range(first, max(last, first + 1))  # a cursor stands in front of a character
+        touched = [each for each in file.parts if each.base < chosen.stop and first < each.base + len(each.source.text)]
+        touched = touched or file.parts[-1:]
         start, end = touched[0].base, touched[-1].base + len(touched[-1].source.text)
     before = file.text[start:end]
     after, wrong = formatted(Source(file.name, before), OUTSIDE)

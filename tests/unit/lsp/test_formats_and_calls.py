@@ -37,6 +37,30 @@ def test_blank_lines_around_a_whole_text_go(tmp_path: Path) -> None:
     talk(tmp_path, about)
 
 
+def test_what_is_chosen_is_formatted_and_its_neighbours_are_not(tmp_path: Path) -> None:
+    """Also if whole lines are chosen, up to the first character of the next declaration; at an edge the one behind it."""
+    bad, good = "PROGRAM {}\nVAR n:INT; END_VAR\nEND_PROGRAM\n", "PROGRAM {}\nVAR\n    n : INT;\nEND_VAR\nEND_PROGRAM\n"
+    rows = [((0, 0, 3, 0), "A"), ((3, 0, 6, 0), "B"), ((6, 0, 10, 0), "C"), ((0, 0, 3, 1), "AB"), ((2, 10, 7, 1), "ABC"),
+            ((0, 0, 0, 0), "A"), ((3, 0, 3, 0), "B"), ((5, 11, 5, 11), "B"), ((2, 11, 3, 0), "A"), ((7, 3, 8, 2), "C"),
+            ((9, 11, 10, 0), "C"), ((10, 0, 10, 0), "C"), ((11, 0, 12, 0), "C"), ((0, 0, 10, 0), "ABC")]  # fmt: skip
+
+    async def about(desk: Desk) -> None:
+        for places, names in rows:
+            texts = [bad.format("A"), bad.format("B"), "\n" + bad.format("C")]
+            desk.open("main.st", "".join(texts))
+            [edit] = await desk.of("rangeFormatting", "main.st", options=OPTIONS, range=span(*places))
+            desk.replace("main.st", *((at["line"], at["character"]) for at in edit["range"].values()), edit["newText"])
+            wanted = [text.replace(bad.format(name), (good if name in names else bad).format(name))
+                      for name, text in zip("ABC", texts, strict=True)]  # fmt: skip
+            [file] = [file for project in desk.server.projects.all for file in project.program.files.values()]
+            assert file.text == ("\n" * ("AB" in names)).join(wanted[:2]) + wanted[2], places
+            desk.close_file("main.st")
+        desk.open("main.st", "")
+        assert await desk.of("rangeFormatting", "main.st", options=OPTIONS, range=span(0, 0, 0, 0)) == []
+
+    talk(tmp_path, about)
+
+
 def test_calls_are_looked_for_in_the_program_that_has_the_block(tmp_path: Path) -> None:
     for name, call in (("one", "p"), ("other", "q")):
         (tmp_path / name).mkdir()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from in_process import PUMP, Desk, span, talk
@@ -121,3 +123,29 @@ def test_a_refusal_is_no_fault_that_is_logged(monkeypatch: pytest.MonkeyPatch) -
     for error, is_logged in ((JsonRpcInvalidParams("no"), False), (ValueError("a fault"), True), (None, True)):
         record = logging.LogRecord("x", logging.ERROR, "x", 1, "said", None, (type(error), error, None) if error else None)  # type: ignore[arg-type]
         assert bool(logger.filter(record)) is is_logged, error
+
+
+@pytest.mark.parametrize(("is_current", "is_small", "is_going", "done"), [
+    (True, True, True, []), (False, True, True, ["changes"]), (False, False, True, ["changes", "wait"]),
+    (False, False, False, ["changes", "all"]),
+])  # fmt: skip
+def test_an_answer_waits_for_no_more_than_what_has_changed(
+    is_current: bool, is_small: bool, is_going: bool, done: list[str]
+) -> None:
+    """Of a small change for its POU, of another one for the check that goes on, else for a check of everything."""
+    seen: list[str] = []
+    file = object()
+    program: Any = SimpleNamespace(is_current=is_current, files={"/a.st": file})
+    program.check_changes = lambda: seen.append("changes") or is_small
+    program.check_all = lambda: seen.append("all") or setattr(program, "is_current", True)
+
+    async def asked() -> None:
+        async def check() -> None:
+            seen.append("wait")
+            program.is_current = True
+        project = SimpleNamespace(program=program, task=asyncio.ensure_future(check()) if is_going else None)
+        server: Any = SimpleNamespace(projects=SimpleNamespace(of=lambda path: [project]))
+        assert await Server.ready(server, "file:///a.st") == (project, file) and seen == done
+        assert await Server.ready(server, "file:///b.st") is None
+
+    asyncio.run(asked())
