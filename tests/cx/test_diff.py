@@ -102,6 +102,9 @@ def test_projects_differ_by_their_status_and_quietly(tmp_path: Path) -> None:
     done = run(main, ["diff", str(one), str(other)])
     assert done.exit_code == 1
     assert "NewProgram1, section Pumping: 1 rung changed" in done.output
+    colored = run(main, ["diff", str(one), str(other)], color=True).output
+    assert [line for line in colored.splitlines() if "\x1b[1m" in line] == [
+        "\x1b[1mNewProgram1, section Pumping: 1 rung changed\x1b[0m"]
     assert (
         run(main, ["diff", "-q", str(one), str(other)]).exit_code,
         run(main, ["diff", "-q", str(one), str(other)]).output,

@@ -156,6 +156,13 @@ def test_wrong_use_has_status_2(arguments: list[str]) -> None:
     assert "Error: " in result.stderr
 
 
+def test_files_without_a_program_have_status_3(tmp_path: Path) -> None:
+    text = "FUNCTION_BLOCK Lamp VAR n : INT; END_VAR n := n + 1; END_FUNCTION_BLOCK"
+    (tmp_path / "blocks.st").write_text(text, encoding="utf-8")
+    result = proved(str(tmp_path / "blocks.st"), "--no-trap")
+    assert (result.exit_code, result.stdout) == (3, "") and "error S0209: there is no PROGRAM to run" in result.stderr
+
+
 @each_of("text, unit", [("0:1", (0, 1)), ("15:8", (15, 8)), *((text, None) for text in (
     "16:1", "0:0", "0:9", "0", "01", ":1", "0:", "a:1", "0:b", "-1:1", "0:1:1", ""))])
 def test_a_unit_is_a_number_to_15_and_a_socket_of_1_to_8(text: str, unit: tuple[int, int] | None) -> None:

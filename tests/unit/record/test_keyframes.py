@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from fbvm import Plc, compile_text
+from fbvm import Etn21, Plc, compile_text
 from fbvm.code.image import Image
 from fbvm.record.recording import replay
-from fbvm.record.recording.chunks import Chunk, ScanInputs
+from fbvm.record.recording.chunks import Chunk, PackedSnapshot, ScanInputs, UnitKeyframe
 from fbvm.record.recording.recording import Recording
 from fbvm.record.recording.scan_codec import WRITES, decode_inputs, encode_inputs
+from fbvm.units.contract import UnitState
 
 
 def image_of(size: int) -> Image:
@@ -68,6 +71,26 @@ def test_a_keyframe_is_packed_beside_an_earlier_one(image: Image) -> None:
     second.pack(first)
     assert second.size_bytes(first) < alone / 10
     assert second.state.memory.pages == pages
+
+
+def test_of_units_only_those_have_a_memory_to_be_packed_whose_processors_are_on(image: Image) -> None:
+    plc = Plc(image)
+    units: list[Any] = [Etn21(0, "192.168.250.21"), Etn21(1, "192.168.250.22"), Etn21(2, "192.168.250.23")]
+
+    def with_units() -> Chunk:
+        frame = keyframe(plc)
+        states = [None, UnitState(None, (1,)), UnitState(frame.state.memory, (2,))]
+        frame.units = [UnitKeyframe(unit, state) for unit, state in zip(units, states, strict=True)]
+        return frame
+
+    first, second = with_units(), with_units()
+    whole = second.memories
+    assert whole == [second.state.memory] * 2
+    second.pack(first)
+    assert [frame.unit for frame in second.units] == units and [frame.state and frame.state.other for frame in second.units] == [
+        None, (1,), (2,)]  # fmt: skip
+    assert [memory.pages for memory in second.memories] == [memory.pages for memory in whole]
+    assert all(isinstance(memory, PackedSnapshot) for memory in second.memories)
 
 
 def test_a_keyframe_of_another_size_of_memory_stays_as_it_is(image: Image) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import pytest
 from rows import each_of
 
+from fbvm import Depth, Trace, TraceWriter
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Phase, Plc
@@ -275,3 +277,20 @@ def test_two_statements_that_write_the_same_bit_in_a_scan(body: str, writers: li
                         f"PROGRAM Main\nVAR a, lamp, other : BOOL; END_VAR\n{body}\nEND_PROGRAM\n", "twice.st").image
     assert made is not None
     assert double_writes(Plc(made), "Main.lamp") == writers
+
+
+@pytest.mark.slow
+@each_of("depth", [*Depth])
+def test_behind_a_way_back_memory_is_that_of_the_later_scans(image: Image, depth: Depth) -> None:
+    """Also where it is 0 as at the end of the scans that no longer count, but not as in the last one that does."""
+    plc, file = Plc(image), io.BytesIO()
+    writer = TraceWriter(plc, file, depth)
+    plc.write("D700", 7)
+    plc.run(scans=2)
+    kept = plc.snapshot()
+    for _ in range(2):
+        plc.restore(kept)
+        plc.write("D700", 0)
+        plc.run(scans=2)
+    writer.close()
+    assert [moment.read("D700") for moment in Trace(io.BytesIO(file.getvalue())).moments()] == [7, 7, 0, 0]

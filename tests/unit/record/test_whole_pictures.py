@@ -31,6 +31,11 @@ def run() -> Waveforms:
     return waveforms(traced(29), NAMES)
 
 
+def numbers_of(root: ElementTree.Element) -> list[str | None]:
+    """The scans whose numbers stand above a chart."""
+    return [row.text for row in root.iter() if row.get("class") == "dim"][2::2]
+
+
 @pytest.mark.slow
 def test_a_time_chart_as_svg(run: Waveforms) -> None:
     text = SvgChart(run, PASSED, "a <run>").text()
@@ -50,7 +55,8 @@ def test_waveforms_in_other_formats(run: Waveforms) -> None:
 
 @pytest.mark.slow
 def test_of_many_scans_each_is_narrow_and_of_few_none_is_too_wide(run: Waveforms) -> None:
-    for scans, width in ((1, 158), (25, 1118), (26, 1118), (1000, 1118), (2000, 1118), (2001, 1118), (3000, 1618)):
+    for scans, width, every in ((1, 158, 2), (25, 1118, 2), (26, 1118, 2), (100, 1118, 10), (300, 1118, 50), (1000, 1118, 100),
+                                (2000, 1118, 200), (2001, 1118, 200), (3000, 1618, 200)):  # fmt: skip
         run_of = Waveforms([], 0, [number * 10_000_000 for number in range(scans)])
         root = ElementTree.fromstring(SvgChart(run_of).text())
         wide = float(root.get("width") or 0)
@@ -59,9 +65,9 @@ def test_of_many_scans_each_is_narrow_and_of_few_none_is_too_wide(run: Waveforms
         ruled = [row for row in root.iter() if row.get("class") == "grid"]
         apart = {round(float(b.get("x1") or 0) - float(a.get("x1") or 0), 1) for a, b in pairwise(ruled)}
         assert len(apart) <= 1 and all(70 <= distance < 70 * 2.6 for distance in apart), (scans, apart)
+        assert numbers_of(root) == [str(scan) for scan in range(0, scans, every)]
     late = SvgChart(Waveforms([], 17, [170_000_000 + number for number in range(30)])).text()
-    numbers = [row.text for row in ElementTree.fromstring(late).iter() if row.get("class") == "dim"][2::2]
-    assert numbers == ["20", "25", "30", "35", "40", "45"]
+    assert numbers_of(ElementTree.fromstring(late)) == ["20", "25", "30", "35", "40", "45"]
 
 
 def test_the_height_of_a_number_is_its_part_of_the_range() -> None:
