@@ -52,6 +52,13 @@ def test_a_changed_rung_is_drawn_beside_the_one_before() -> None:
     ]
 
 
+def test_a_function_of_text_is_removed_or_added() -> None:
+    less = OLD[:OLD.index("FUNCTION")]
+    lines = ["FUNCTION Twice : INT", "VAR_INPUT x : INT; END_VAR", "Twice := 2 * x;", "END_FUNCTION"]
+    assert shown(OLD, less) == ["Twice: removed", "@@ -1,4 +0,0 @@", *(f"-{line}" for line in lines)]
+    assert shown(less, OLD) == ["Twice: added", "@@ -0,0 +1,4 @@", *(f"+{line}" for line in lines)]
+
+
 BRANCHES = "LD a\nOUT TR0\nAND b\nOUT 1.00\nLD TR0\nANDNOT b\nOUT 1.01\n"
 
 

@@ -234,6 +234,8 @@ def test_a_scan_with_very_many_statements_is_shown_in_part(monkeypatch: pytest.M
     rows = {scan: len(found) for scan, found in read.rows.items()}
     assert rows[2] <= 21
     assert {scan for scan, count in rows.items() if count > 1} == {0, 1, 2, 3, 4}
+    assert read.rows[2][-1] == [-3, -1, 1, "101", 3, "5056"]
+    assert read.rows[3][:3] == [[-1, -1], [0, 0, 0, "4"], [1, 0, 2, "2"]], "what scan 3 has changed is not told before it"
     values = read.values("Main.sum")
     assert values[2] == 5056
     assert values[4] == 5062

@@ -43,7 +43,8 @@ def test_a_plc_that_was_put_back_has_what_it_did_then(back: int, left: list[tupl
 
 
 def test_scans_before_a_gap_are_forgotten() -> None:
-    assert scans(found((KEYFRAME, 0, 0), (SCANS, 0, 7), (KEYFRAME, 20, 0), (SCANS, 20, 2))) == [(20, 22)]
+    blocks = found((KEYFRAME, 0, 0), (SCANS, 0, 7), (KEYFRAME, 20, 0), (SCANS, 20, 2))
+    assert scans(blocks) == [(20, 22)] and blocks.chunks.firsts == [20]
 
 
 def test_a_file_has_an_end_until_it_goes_on() -> None:

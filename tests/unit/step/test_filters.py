@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from rows import each_of
-from test_debugger import debugger, done, line
+from test_debugger import debugger, done, line, where
 
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
@@ -140,3 +140,12 @@ def test_back_from_a_stop_between_two_scans_it_goes_to_the_stop_before_it(
         assert reached and reached.position == found.session.here == Position(scan, step)
         assert (reached.kind, reached.reasons) == ("some", (f"{scan} scans",)) or step
     assert done(found.reverse()) is None and found.session.here == Position()
+
+
+def test_back_over_from_a_trap_inside_a_block_goes_to_its_call() -> None:
+    found = debugger("FUNCTION_BLOCK F\nVAR z : INT; END_VAR\n    z := 0;\n    z := 1 / z;\nEND_FUNCTION_BLOCK\n"
+                     "PROGRAM Main\nVAR b : F; n : INT; END_VAR\n    n := 1;\n    b();\nEND_PROGRAM\n")  # fmt: skip
+    reached = done(found.resume())
+    assert reached and reached.kind == "trap" and found.session.statement is None
+    found.back_over()
+    assert where(found) == (0, 9)

@@ -73,6 +73,14 @@ def at_line(wanted: int, session: Stepping, statement: Statement | None) -> bool
     return statement is not None and session.facts.sites[statement.site].line == wanted
 
 
+def test_the_source_around_a_statement_begins_with_its_first_line_at_most() -> None:
+    session = live()
+    report = StopReport(session, {"text.st": TEXT})
+    shown = [f" {'>' if number == 13 else ' '}{number:>4}  {text}" for number, text in enumerate(TEXT.splitlines(), 1)]
+    assert [list(report.around(lines)) for lines in (0, 1, 11, 12, 13)] == [
+        shown[12:13], shown[11:14], shown[1:], shown, shown]  # fmt: skip
+
+
 @each_of("make", SESSIONS)
 def test_what_a_move_answers_and_where_it_stands(make: Callable[[], Stepping]) -> None:
     session = make()
