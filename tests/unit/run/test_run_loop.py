@@ -314,6 +314,16 @@ def test_many_plcs_are_switched_on_one_after_another(clock: Clock) -> None:
     assert all(run.plc.lateness.missed == 0 for run in runs)
 
 
+def test_a_plc_in_real_time_has_the_date_of_the_host_unless_it_has_another(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The date at its beginning: a PLC that scans 8 ms later begins at a later date."""
+    date_ns = 800_000_000_000_000_000
+    monkeypatch.setattr(loop, "local_date_ns", lambda: date_ns)
+    plcs = [real_plc(clock)[0] for _ in range(3)]
+    plcs[1].servicing.clock_ns = 5
+    run_all([Running(plc, scans=1, phase_ns=4 * MS * number) for number, plc in enumerate(plcs)])
+    assert [plc.servicing.clock_ns for plc in plcs] == [date_ns, 5, date_ns + 8 * MS]
+
+
 class Collector:
     """Stands in for the module `gc`, of which the loop is told that so many objects are frozen."""
 
