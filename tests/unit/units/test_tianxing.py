@@ -7,6 +7,7 @@ import tomllib
 import pytest
 from common_unit_tests import CommonUnitTests, FakeMemory
 
+from fbvm.base.areas import NEVER
 from fbvm.base.data import data_folder
 from fbvm.units.contract import Unit
 from fbvm.units.port.tianxing import Tianxing
@@ -76,6 +77,7 @@ def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:
             raise KeyError(area)
 
     port = Tianxing()
-    assert port.reset(Bare()) == []
+    for memory, wake_ns in ((Bare(), NEVER), (FakeMemory(), 0), (Bare(), NEVER)):
+        assert (port.reset(memory), port.wake_ns) == ([], wake_ns)
     assert port.refresh(Bare(), [], 0) == []
     assert port.settings == {}
