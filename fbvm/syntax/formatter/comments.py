@@ -65,15 +65,17 @@ class Comments:
             return
         gaps = [self.text.count("\n", before, here) for before, here in zip(
             [start, *(stop for _, stop in found)], [*(begin for begin, _ in found), end], strict=True)]
+        parted = [at for at, count in enumerate(gaps) if count]
+        first_end, last_end = (parted[0], parted[-1]) if parted else (len(gaps), 0)
         ahead: list[Comment] = []
         behind: list[Comment] = []
         for at, (begin, stop) in enumerate(found):
-            ended = last or any(gaps[at + 1:])
+            ended = last or last_end > at
             if ahead and ahead[-1].own and ahead[-1].text[0] == "{" and not gaps[at] and self.text.startswith("//", begin):
                 remark = self._comment(begin, stop, own=True, blank=False).text
                 ahead[-1] = replace(ahead[-1], text=f"{ahead[-1].text}{BESIDE}{remark}")
                 continue
-            if not any(gaps[:at + 1]) and start and ended:
+            if first_end > at and start and ended:
                 behind.append(self._comment(begin, stop, own=False, blank=False))
             else:
                 ahead.append(self._comment(begin, stop, own=ended, blank=gaps[at] > 1))

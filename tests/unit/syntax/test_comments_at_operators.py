@@ -1,11 +1,15 @@
-"""Comments around an operator that reach to a line end stand in front of it in the canonical text, which stays as it is then."""
+"""Comments between two tokens: around an operator, those that reach to a line end stand in front of it in the canonical text,
+which stays as it is then."""
 
 from __future__ import annotations
 
 import pytest
+from growth import least_s
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.formatter.comments import Comments
 from fbvm.syntax.formatter.formatter import formatted
+from fbvm.syntax.st.lexer import Token
 
 HEAD, END = "PROGRAM Main\nVAR\n    x, y : INT;\nEND_VAR\n", "END_PROGRAM\n"
 
@@ -25,3 +29,14 @@ def test_where_comments_stand(written: str, lines: list[str]) -> None:
     body = text.removeprefix(HEAD).removesuffix(END).splitlines()
     assert (wrong, [line.removeprefix("    ") for line in body]) == ([], lines)
     assert formatted(Source("a.st", text))[0] == text
+
+
+@pytest.mark.slow
+def test_the_time_of_pragmas_between_two_tokens_grows_with_their_number() -> None:
+    def took_s(count: int) -> float:
+        text = "{a} " * count
+        end = Token("$END", "", len(text), len(text))
+        assert len(Comments(text, [end]).ahead[end.start]) == count
+        return least_s(lambda: Comments(text, [end]))
+
+    assert took_s(10_000) < 8 * took_s(2_500)
