@@ -112,3 +112,31 @@ def test_names_are_looked_up_anew_when_a_using_changes() -> None:
     assert not program.check_changes()
     program.check_all()
     assert [each.code for each in program.diagnostics("pump.st")] == ["S0401"]
+
+
+OWN = """\
+NAMESPACE Plant
+TYPE Mode : (Idle, Busy); END_TYPE
+FUNCTION Twice : INT
+VAR_INPUT x : INT; END_VAR
+    Twice := 2 * x;
+END_FUNCTION
+END_NAMESPACE
+FUNCTION_BLOCK Pump USING Plant;
+VAR_OUTPUT q : Mode; n : INT; END_VAR
+    q := Mode#Busy; n := Twice(x := 1);
+END_FUNCTION_BLOCK
+CLASS Motor
+METHOD PUBLIC Run : INT USING Plant;
+    Run := Twice(x := 2);
+END_METHOD
+END_CLASS
+"""
+
+
+@each_of("before, word, line, count", [
+    ("q : Mode", "Mode", 2, 3), ("Mode#Busy", "Mode", 2, 3), ("Mode#Busy", "Busy", 2, 2), ("n := Twice", "Twice", 3, 4),
+    ("Run := Twice", "Twice", 3, 4), ("Twice(x := 2)", "x", 4, 4),
+])
+def test_a_using_of_a_pou_or_of_a_method_counts_in_it(before: str, word: str, line: int, count: int) -> None:
+    check_declaration(OWN, before, word, line, count)
