@@ -7,6 +7,7 @@ import pytest
 from fbvm.base.memory import Memory
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
+from fbvm.engine.allowance import Allowance
 from fbvm.engine.choice import tiers
 from fbvm.engine.choice.tiers import TieredEngine, engine_for
 from fbvm.engine.native import engine as native
@@ -67,6 +68,26 @@ def test_python_in_place_of_a_block_brings_a_run_back(monkeypatch: pytest.Monkey
     tiers.python_of(plc.engine).substitute(number, calls.append)
     plc.scan()
     assert len(calls) == 1 and not plc.engine.native
+
+
+@pytest.mark.slow
+@needs_native
+def test_machine_code_asks_whom_the_run_has_asked_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tiers, "STATEMENTS_TO_PAY", 1)
+    code = image()
+    code_of(code).prepare(2)
+    plc, asked = Plc(code), list[bool]()
+    engine = plc.engine
+    assert isinstance(engine, TieredEngine)
+
+    def ask(left: int) -> int:
+        asked.append(engine.native)
+        return 0
+
+    engine.allowance = Allowance(plc.budget - 10, ask)
+    for _ in range(3):
+        plc.scan()
+    assert asked == [False, True], "once, after which the whole budget may be used up"
 
 
 def test_choices() -> None:
