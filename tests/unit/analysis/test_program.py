@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,10 +12,13 @@ from depth import times
 from lang_corpus import programs
 from rows import each_of
 
+from fbvm.analysis import parts
 from fbvm.analysis.parts import File, spans
 from fbvm.analysis.program import Program
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.compiler import compile_sources
+from fbvm.syntax.parser import parse
+from fbvm.syntax.tree import SourceText
 
 TWO = """\
 FUNCTION_BLOCK Pump
@@ -158,6 +162,28 @@ def test_a_whole_check_that_is_given_up_is_still_needed() -> None:
     assert not program.is_current and not program.check_changes()
 
 
+def test_a_check_parses_one_part_in_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed: list[str] = []
+
+    def parsing(source: Source) -> tuple[SourceText, list[Diagnostic]]:
+        parsed.append(source.text.split()[1])
+        return parse(source)
+
+    monkeypatch.setattr("fbvm.analysis.parts.parse", parsing)
+    program = Program()
+    program.replace("pump.st", TWO)
+    program.replace("twice.st", "FUNCTION Twice : INT\nEND_FUNCTION\n")
+    steps, names = program.check(), ["Pump", "Main", "Twice"]
+    for known in range(3):
+        next(steps)
+        assert parsed == names[:known]
+    next(steps)
+    assert parsed == names
+    steps.close()
+    program.check_all()
+    assert parsed == names
+
+
 def test_a_part_whose_messages_name_lines_is_checked_anew_where_it_moves_to() -> None:
     text = TWO.replace("On := P1.Runs;", "On := P1.Run; IF On THEN") + "PROGRAM Last\nEND_PROGRAM\n"
     program = edited(text, ("Level < 200", "Level <\n200"))
@@ -202,6 +228,23 @@ def test_only_the_changed_part_is_new() -> None:
     pairs = file.replace(TWO.replace("200", "300"))
     assert [(old and old.base, new and new.base) for old, new in pairs] == [(0, 0)]
     assert [part.base for part in file.parts] == [0, TWO.index("\nPROGRAM")]
+
+
+@each_of("old, new, cuts", [("x0 := 0", "x0 := 1", 2), ("x0 := 0", "x0 := 10", 2), ("x25 := 0", "x25 := 1", 3), ("x49 := 0", "", 2)])
+def test_of_a_long_text_only_what_is_around_a_change_is_read_again(old: str, new: str, cuts: int) -> None:
+    text = "".join(f"PROGRAM P{each}\n    x{each} := 0;\nEND_PROGRAM\n" for each in range(50))
+    file = File("a.st", text)
+    found, original = list[tuple[int, int]](), parts._cuts
+
+    def counted(text: str, start: int) -> Iterator[tuple[int, int]]:
+        for cut in original(text, start):
+            found.append(cut)
+            yield cut
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parts, "_cuts", counted)
+        file.replace(text.replace(old, new))
+    assert len(found) == cuts
 
 
 # --- edited = never edited --------------------------------------------------------------------------------------------
