@@ -9,6 +9,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fbvm.cli.main import main
+from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
 
 PROGRAM = """
 PROGRAM Main
@@ -203,6 +205,18 @@ def test_a_project_is_checked_with_all_its_plcs(folder: Path) -> None:
     assert check(".", "--no-warn", "S0290").output == ""
     assert check(".", "--warnings-as-errors").exit_code == 3
     assert json.loads(check(".", "--json").stdout)["diagnostics"][0]["code"] == "S0290"
+
+
+@pytest.mark.slow
+def test_a_check_makes_one_plc_of_each_kind(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def plc(image: Image, cycle_ns: int, **more: str) -> Plc:
+        made.append(cycle_ns)
+        return Plc(image, cycle_ns, **more)
+
+    monkeypatch.setattr("fbvm.run.plant.Plc", plc)
+    assert (check().output, made) == ("", [10_000_000, 5_000_000])
 
 
 def test_what_the_file_of_a_project_says_is_checked(folder: Path) -> None:
