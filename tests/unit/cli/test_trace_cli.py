@@ -136,6 +136,9 @@ def test_why(fbvm: Fbvm) -> None:
     assert lines[1] == "├ if Main.Pump = TRUE since scan 8 (80ms), by pump.st:17 in Main:  Pump := Delay.Q;"
     assert "by iec/TON.st:28 in Main.Delay:  Q := TRUE;" in lines[2]
     assert fbvm("why", "D200", "run.fbtrace", "--deep", "0").output == lines[0] + "\n"
+    last, before = (fbvm("why", "Main.Both[2].b", "--deep", "0", *more).output for more in ([], ["--scan", "58"]))
+    assert last.startswith("Main.Both[2].b = 30.0 since scan 59 (590ms), by pump.st:")
+    assert before.startswith("Main.Both[2].b = 29.5 since scan 58 (580ms), by pump.st:")
 
 
 @pytest.mark.slow
