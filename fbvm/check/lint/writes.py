@@ -180,12 +180,12 @@ class _Order:
             definite.update((key, call) for key, call in inside.items() if isinstance(call, tree.Call))
 
     def attempt(self, node: tree.Try, definite: Definite) -> None:
-        """What is assigned between __TRY and __CATCH may be read by the handler; it counts as executed."""
+        """What is assigned between __TRY and __CATCH may be read by the handler; it counts as executed.
+
+        The place of the code is found only after one of these statements, which leaves nothing unread."""
         for statement in node.body:
             definite.update(self.block((statement,)))
             self.stores.clear()
-        if node.code is not None:
-            self.steps(node.code)
         self.block(node.handler)
         definite.update(self.block(node.final or ()))
 
