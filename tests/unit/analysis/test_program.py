@@ -230,7 +230,9 @@ def test_only_the_changed_part_is_new() -> None:
     assert [part.base for part in file.parts] == [0, TWO.index("\nPROGRAM")]
 
 
-@each_of("old, new, cuts", [("x0 := 0", "x0 := 1", 2), ("x0 := 0", "x0 := 10", 2), ("x25 := 0", "x25 := 1", 3), ("x49 := 0", "", 2)])
+@each_of("old, new, cuts", [
+    ("x0 := 0", "x0 := 1", 2), ("x0 := 0", "x0 := 10", 2), ("x25 := 0", "x25 := 1", 3), ("x49 := 0", "", 2),
+])
 def test_of_a_long_text_only_what_is_around_a_change_is_read_again(old: str, new: str, cuts: int) -> None:
     text = "".join(f"PROGRAM P{each}\n    x{each} := 0;\nEND_PROGRAM\n" for each in range(50))
     file = File("a.st", text)
