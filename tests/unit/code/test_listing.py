@@ -176,3 +176,16 @@ def test_lowering_makes_the_observations_of_the_table_and_no_others() -> None:
     made = compile_text("PROGRAM P VAR a, b : BOOL; END_VAR\na := NOT a;\nLADDER\nLD a\nOUT b\nEND_LADDER\nEND_PROGRAM\n").image
     assert made is not None
     assert {node[1] for body in made.bodies for node in statements(body.code) if node[0] == "observe"} == set(OBSERVATIONS)
+
+
+def test_a_number_that_becomes_a_time_is_checked_only_where_it_may_be_none() -> None:
+    made = compile_text("PROGRAM Main VAR l : LTIME; t : TIME; i : LINT; d : DINT; u : ULINT; w : LWORD; END_VAR\n"
+                        "l := LINT_TO_LTIME(i);\nl := ULINT_TO_LTIME(u);\nl := LWORD_TO_LTIME(w);\n"
+                        "t := DINT_TO_TIME(d);\nt := LINT_TO_TIME(i);\nEND_PROGRAM\n").image
+    assert made is not None
+    made_of = [line.partition(" <- ")[2] for line in code_of(made).splitlines() if " <- " in line]
+    assert made_of == [
+        "load i64 self+24", "convert i64 u64 (check u64 (load u64 self+40) 0 9223372036854775807 R0105 @3:6)",
+        "convert i64 u64 (load u64 self+48)", "mul i64 (convert i64 i32 (load i32 self+32)) 1000000",
+        "mul i64 (check i64 (load i64 self+24) -9223372036854 9223372036854 R0105 @6:6) 1000000",
+    ]
