@@ -260,6 +260,21 @@ def test_a_long_scan_in_front_of_a_window_is_left_at_the_limit(monkeypatch: pyte
     assert followed == [range(2, 5), range(3, 5)]
 
 
+def test_of_a_scan_that_is_shown_in_part_the_end_is_told_and_the_next_begins_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inside, "MOST_IN_SCAN", 20)
+    monkeypatch.setattr(inside, "FIRST_IN_SCAN", 2)
+    plc = Plc(image("PROGRAM Main\nVAR i, n, sum : INT; END_VAR\nn := n + 1;\n"
+                    "FOR i := 1 TO SEL(n = 3, 2, 30) DO sum := sum + 1; END_FOR;\nEND_PROGRAM\n"), engine="python")  # fmt: skip
+    recorded = Recording().add("main", plc)
+    plc.run(scans=5)
+    source = RecordedScans(recorded, {})
+    shown = [Signal(place, name) for name in ("n", "sum") if isinstance(place := plc.find(f"Main.{name}"), Place)]
+    window = inside.Insides(source, shown).window(range(1, 5), 1000)
+    phases = {scan: [(where, moved) for where, _, *moved in rows if where < 0] for scan, rows in window.rows.items()}
+    assert phases == {1: [(-1, [])], 2: [(-1, []), (-3, [1, "34"])], 3: [(-1, [])], 4: [(-1, [])]}
+    assert [moved for _, _, *moved in window.rows[3] if moved] == [[0, "4"], [1, "35"], [1, "36"]]
+
+
 def test_packets_are_told_in_parts_with_their_first_and_last_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "FRAMES_A_PART", 2)
     ends = module._Ends(None)  # type: ignore[arg-type]

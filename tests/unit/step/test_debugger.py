@@ -243,6 +243,15 @@ def test_a_recording_is_gone_through_by_statements() -> None:
     assert lines == [13, 14, 4, 5] and session.read("Main.N") == 2
 
 
+def test_from_the_end_of_a_scan_one_goes_back_over_what_the_last_statement_has_called() -> None:
+    found = debugger("FUNCTION_BLOCK Step\nVAR n : INT; END_VAR\nn := n + 1;\nEND_FUNCTION_BLOCK\n"
+                     "PROGRAM Main\nVAR s : Step; END_VAR\n;\ns();\nEND_PROGRAM\n")  # fmt: skip
+    while found.session.statement:
+        done(found.into())
+    found.back_over()
+    assert where(found) == (0, 8)
+
+
 @pytest.mark.slow
 def test_what_was_attached_to_goes_back_to_the_oldest_scan_that_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """The PLC is not executed anew from power-on, because its connections do not travel in time."""
