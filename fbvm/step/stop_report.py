@@ -66,7 +66,8 @@ class StopReport:
         if site is None:
             return
         power = self._power(site.file)
-        for number in range(site.line - lines, site.line + lines + 1):
+        last = max(site.line, min(site.line + lines, len(self._lines.get(site.file, []))))
+        for number in range(max(1, site.line - lines), last + 1):
             text = self.line(site.file, number)
             if text or number == site.line:
                 said = f"{text:<{WIDE}}  {'ON' if power[number] else 'off'}" if number in power else text

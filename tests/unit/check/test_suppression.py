@@ -53,6 +53,12 @@ def test_a_pragma_speaks_of_its_own_text_only() -> None:
     assert [(d.source.name, d.code) for d in made.diagnostics] == [("b.st", "S0290"), ("b.st", "S0390")]
 
 
+def test_a_pragma_speaks_of_what_stands_directly_behind_it() -> None:
+    text = "PROGRAM Main\nVAR {warning disable S0290}idle : INT; {warning restore S0290}lazy : INT; END_VAR\nEND_PROGRAM\n"
+    assert [d.render().splitlines()[0] for d in compile_text(text).diagnostics] == [
+        "text.st:2:63: warning S0290: lazy is never used"]
+
+
 def test_libraries_are_not_looked_at(tmp_path: Path) -> None:
     (tmp_path / "Slack.st").write_text("FUNCTION_BLOCK Slack\nVAR idle : INT; END_VAR\nEND_FUNCTION_BLOCK\n", encoding="utf-8")
     main = tmp_path / "main" / "main.st"

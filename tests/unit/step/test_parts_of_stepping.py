@@ -282,6 +282,15 @@ def test_what_a_breakpoint_is_follows_from_how_its_place_is_written(where: str, 
     assert list(Commands(made, StopReport(made, {"text.st": MOTORS})).run(f"break {where}")) == [f"  1  {shown}"]
 
 
+@each_of("lines", [26, 10**12])
+def test_the_whole_text_is_listed_however_many_lines_are_asked_for(lines: int) -> None:
+    made = session()
+    rows = list(Commands(made, StopReport(made, {"text.st": MOTORS})).run(f"list {lines}"))
+    text = MOTORS.splitlines()
+    assert [row[8:] for row in rows] == [line for line in text if line]
+    assert [row[2:6].strip() for row in rows] == [str(number) for number, line in enumerate(text, 1) if line]
+
+
 @pytest.mark.slow
 @each_of(("where", "said"), [
     ("Nobody", "there is no Nobody; known here: Main"), ("Main.n >", "'Main.n >' ends too early"),

@@ -15,11 +15,19 @@ def said(body: str) -> list[str]:
 
 
 @each_of(("rung", "hint"), [
-    ("LDN A\nOUT M", "did you mean LDNOT?"), ("LD A\nST M", "did you mean OUT?"), ("XIC A\nOTE M", "did you mean LD?"),
+    ("LDN A\nOUT M", "did you mean LDNOT?"), ("LD A\nST M", "did you mean OUT?"), ("LD A\nCMPP D0 D1", "did you mean CMP or TCMP?"),
+    ("XIC A\nOTE M", "did you mean LD?"),
     ("LD A\nADD D0 D1 D2", "did you mean +?"), ("LD A\nTON D0", "did you mean FBCALL TON?"),
     ("LD A OUT M", "OUT begins a line of its own"), ("LD A\nMOV #1 D0 D1", "S is a word or constant, D is a word")])
 def test_ladder(rung: str, hint: str) -> None:
     assert f"help: {hint}" in said(f"LADDER\n{rung}\nEND_LADDER")[0]
+
+
+@each_of(("indent", "column"), [("", 1), ("  ", 3)])
+def test_a_rung_that_is_drawn_outside_of_a_ladder_is_one_mistake(indent: str, column: int) -> None:
+    assert said(f"{indent}│ A   M │\n{indent}├─┤ ├──( )─┤") == [
+        f"text.st:3:{column}: error S0101: these lines are a rung that is drawn\n    {indent}│ A   M │\n    {indent}^^^^^^^^^\n"
+        "  help: rungs stand between LADDER and END_LADDER"]
 
 
 @each_of(("action", "condition", "message"), [

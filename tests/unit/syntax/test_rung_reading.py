@@ -86,6 +86,11 @@ GOOD = {
         ┣━━━┫>┣━━━━━━━( )━━━┥
         ┃  = 7              │
     """, "LD> D0 #5, OUT b"),
+    "a text below a contact with signs of wires in it": ("""
+        |   a       d     |
+        |--| |-----( )----|
+        |  old--new       |
+    """, "LD a, OUT d"),
     "two rungs": ("""
         │   a      b   │
         ├──┤ ├────( )──┤

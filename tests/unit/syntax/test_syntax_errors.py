@@ -69,6 +69,7 @@ ONE_ERROR = [
     ("(a : INT) y := 1;", "`(` behind the name `f` of a POU", 1),
     ("a : INT; y := 1;", "a declaration stands in front of all statements", 2),
     ("1: x := 1;", "label of CASE outside of a CASE statement", 2),
+    ("§1: x := 1;", "unexpected character '§'", 2),
 ]
 
 

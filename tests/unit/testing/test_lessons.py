@@ -18,6 +18,7 @@ from rows import each_of
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
 from fbvm.record.trace.reader import Trace
+from fbvm.testing.course import predictions
 from fbvm.testing.course.class_report import report, summary
 from fbvm.testing.course.lessons import (
     ANSWERS,
@@ -271,6 +272,15 @@ def test_answers_that_are_not_kept_are_taken_as_they_are(written: str, given: li
     (tmp_path / ANSWERS).write_text(written, encoding="utf-8")
     assert [one.given for one in first_wrong(tmp_path, lessons()[1].folder, is_right=False)] == given
     assert first_wrong(tmp_path, lessons()[1].folder, is_right=True) == []
+
+
+@each_of(("largest", "given"), [(17, ["true"]), (16, [])])
+def test_answers_in_a_file_that_is_too_large_are_not_taken(
+    largest: int, given: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(predictions, "LARGEST_BYTES", largest)
+    (tmp_path / ANSWERS).write_bytes(b"at_the_end = true")
+    assert [one.given for one in first_wrong(tmp_path, lessons()[1].folder, is_right=False)] == given
 
 
 def test_the_report_lets_no_script_run_and_loads_nothing() -> None:

@@ -18,7 +18,7 @@ from fbvm.testing.course.class_report import _cell
 from fbvm.testing.course.lessons import Lesson, Result
 from fbvm.testing.coverage_plugin import CoveragePlugin
 from fbvm.testing.plant_rig import PlantRig, project_near
-from fbvm.testing.rig import Rig
+from fbvm.testing.rig import Rig, Trapped
 from fbvm.testing.warning_plugin import WarningPlugin
 
 TEXT = "FUNCTION_BLOCK Lamp\nVAR_INPUT on : BOOL; END_VAR\nVAR_OUTPUT q : BOOL; END_VAR\n    q := on;\nEND_FUNCTION_BLOCK\n"
@@ -111,6 +111,10 @@ def test_how_a_rig_is_named(what: str, pin: str, out: str, tmp_path: Path) -> No
     assert getattr(rig, out) is True
 
 
+TRAPPED = ("scan", "run", "until", "plant scan", "plant run", "plant until")
+"""Where a program stops at a trap."""
+
+
 @pytest.mark.slow
 def test_what_pytest_shows_of_a_failure_ends_in_the_test_itself(tmp_path: Path) -> None:
     """Every function of the plugin between the test and what is wrong hides its frame."""
@@ -121,6 +125,9 @@ def test_what_pytest_shows_of_a_failure_ends_in_the_test_itself(tmp_path: Path) 
     def rig() -> Rig:
         return Rig.of("lamp.st::Lamp", folders=[tmp_path])
 
+    def plant() -> PlantRig:
+        return PlantRig(tmp_path / "fbvm.toml")
+
     wrong: dict[str, Any] = {
         "scan": lambda: rig().scan(), "run": lambda: rig().run("1s"), "until": lambda: rig().until("q", max="1s"),
         "write": lambda: rig().write(nobody=1), "set": lambda: setattr(rig(), "n", "x"), "item": lambda: rig()["nobody"],
@@ -128,15 +135,15 @@ def test_what_pytest_shows_of_a_failure_ends_in_the_test_itself(tmp_path: Path) 
         "of": lambda: Rig.of("lamp.st::Nobody", folders=[tmp_path]), "file": lambda: Rig.of("none.st", folders=[tmp_path]),
         "golden": lambda: golden.check(tmp_path / "none.txt", cast(Any, Recorder(Plc(counter_image()), ["D0"])), False),
         "project": lambda: project_near([tmp_path], "none.toml"), "plant": lambda: PlantRig(tmp_path / "none.toml"),
-        "plant scan": lambda: PlantRig(tmp_path).scan(), "plant run": lambda: PlantRig(tmp_path).run("1s"),
-        "plant until": lambda: PlantRig(tmp_path).until("a.Main.n = 5", max="1s"),
+        "plant scan": lambda: plant().scan(), "plant run": lambda: plant().run("1s"),
+        "plant until": lambda: plant().until("a.Main.n = 5", max="1s"),
     }  # fmt: skip
     shown = {}
     for name, call in wrong.items():
         with pytest.raises(Exception) as raised:
             call()
         frames = [(entry.path.name, entry.locals) for entry in raised.traceback if "/fbvm/testing/" in entry.path.as_posix()]
-        assert frames, name
+        assert frames and (raised.type is Trapped) is (name in TRAPPED), name
         if visible := [file for file, local in frames if not local.get("__tracebackhide__")]:
             shown[name] = visible
     assert shown == {}

@@ -71,11 +71,24 @@ def test_what_fails_has_one_number() -> None:
     assert (slot(memory)[LINE.state], slot(memory)[LINE.error]) == (STATE.failed, 1)
 
 
-def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:
-    class Bare:
-        def words(self, area: str) -> memoryview:
-            raise KeyError(area)
+class Bare:
+    """The memory of a program without a mailbox."""
 
+    def words(self, area: str) -> memoryview:
+        raise KeyError(area)
+
+
+def test_at_power_on_it_wants_one_refresh_and_then_none_by_itself() -> None:
+    port, memory, wanted = Tianxing(), FakeMemory(), []
+    for _ in range(2):
+        port.reset(memory)
+        wanted.append(port.wake_ns)
+        port.refresh(memory, [], 5)
+        wanted.append(port.wake_ns)
+    assert wanted == [0, NEVER, 0, NEVER]
+
+
+def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:
     port = Tianxing()
     for memory, wake_ns in ((Bare(), NEVER), (FakeMemory(), 0), (Bare(), NEVER)):
         assert (port.reset(memory), port.wake_ns) == ([], wake_ns)

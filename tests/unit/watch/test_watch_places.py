@@ -95,6 +95,11 @@ def test_bytes_without_a_name_are_passed_over_one_by_one() -> None:
     assert [found.name for found in names.within(SLOTS_OFFSET + 16, 17)] == ["x", "y", "b.r", "b.n"]
 
 
+def test_each_of_several_single_bytes_has_its_name() -> None:
+    names = Names({"A": Field("a", t.array(((0, 2),), t.BYTE), SLOTS_OFFSET + 16)}, AREAS)
+    assert [found.name for found in names.within(SLOTS_OFFSET + 16, 3)] == ["a[0]", "a[1]", "a[2]"]
+
+
 def test_a_pointer_is_outside_of_the_variable_that_fills_its_object_or_of_what_begins_there() -> None:
     start = SLOTS_OFFSET + 16
     names = Names({"A": Field("a", t.array(((0, 2),), t.INT), start)}, AREAS, [(start, start + 6), (start, start + 4), (4, 8)])
