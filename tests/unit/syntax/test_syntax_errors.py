@@ -6,6 +6,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.code.compiler import compile_text
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Assign, For, If, Pou, SourceText
 
@@ -87,6 +88,15 @@ def test_the_message_points_behind_the_statement_that_lacks_its_semicolon() -> N
         "x.st:2:7: error S0101: `;` expected after the statement\n"
         "    x := 1\n"
         "          ^")
+
+
+def test_a_comment_that_another_one_keeps_open_is_marked_at_its_sign() -> None:
+    [error] = compile_text("PROGRAM p\n(* a (* b *)\nEND_PROGRAM\n").diagnostics
+    assert error.render() == (
+        "text.st:2:1: error S0103: comment without end\n"
+        "    (* a (* b *)\n"
+        "    ^^\n"
+        "  help: close it with *), once for each sign of a beginning, or take --dialect matiec or omron")
 
 
 def test_an_open_block_is_named_with_its_line() -> None:

@@ -133,14 +133,16 @@ def test_link_bit_and_error_status_are_shown_assumed() -> None:
     assert (rig.cio[1517], rig.cio[1518]) == (0, 1 << 14)
 
 
-def test_status_words_that_a_program_overwrites_are_shown_again_by_the_next_refresh() -> None:
+def test_a_unit_with_nothing_to_do_runs_again_when_a_status_word_was_overwritten() -> None:
     rig = Rig()
     rig.open()
-    shown = rig.cio[1517], rig.cio[1518]
-    for address in (1517, 1518):
-        rig.cio[address] ^= 1
-        rig.scan()
-        assert (rig.cio[1517], rig.cio[1518]) == shown
+    rig.scan()
+    for word in (1517, 1518):
+        assert not rig.unit.exchange(rig.memory, [], rig.now_ns) and not rig.unit.changed_words
+        shown = rig.cio[word]
+        rig.cio[word] = 7
+        assert rig.unit.exchange(rig.memory, [], rig.now_ns) and rig.unit.changed_words
+        assert rig.cio[word] == shown
 
 
 def test_a_mode_change_clears_the_status_but_not_the_socket() -> None:
