@@ -44,7 +44,9 @@ Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | 
 _PIECE = re.compile(r"(\d[\d_]*(?:\.\d+)?)(ms|us|ns|d|h|m|s)_?", re.I)
 _PREFIX = re.compile(r"(?:TIME|LTIME|LT|T)#", re.I)
 _REAL = re.compile(r"[+-]?\d[\d_]*(\.\d[\d_]*)?([eE][+-]?\d+)?")
-_INTEGER = re.compile(r"([+-]?)(?:(2|8|16)#([0-9A-F_]+)|0x([0-9A-F_]+)|(\d[\d_]*))", re.I)
+_INTEGER = re.compile(r"([+-]?)(?:2#([01][01_]*)|8#([0-7][0-7_]*)|(?:16#|0x)([0-9A-F][0-9A-F_]*)|(\d[\d_]*))", re.I)
+_RADIXES = (2, 8, 16, 10)
+"""Of its groups behind the sign."""
 
 
 def parse_time_ns(text: str) -> int:
@@ -219,7 +221,7 @@ def literal(text: str) -> tuple[Value, Type | None]:
     if fold(text) in _BITS:
         return _BITS[fold(text)], BOOL
     if match := _INTEGER.fullmatch(text):
-        digits, radix = (match[3], int(match[2])) if match[2] else (match[4], 16) if match[4] else (match[5], 10)
+        digits, radix = next(row for row in zip(match.groups()[1:], _RADIXES, strict=True) if row[0])
         number = whole_number(digits.replace("_", "")) if radix == 10 else int(digits.replace("_", ""), radix)
         return (-number if match[1] == "-" else number), None
     if _REAL.fullmatch(text):

@@ -145,6 +145,17 @@ def test_a_unit_with_nothing_to_do_runs_again_when_a_status_word_was_overwritten
         assert rig.cio[word] == shown
 
 
+def test_what_a_unit_waits_for_comes_at_the_time_that_it_says_and_not_before() -> None:
+    rig = Rig()
+    rig.open()
+    rig.parameters(count=2, timeout=10)
+    rig.scan(Switch.RECEIVE)
+    rig.scan()
+    wake_ns = rig.unit.wake_ns
+    assert not rig.unit.exchange(rig.memory, [], wake_ns - 1) and rig.unit.exchange(rig.memory, [], wake_ns)
+    assert rig.code() == "0080"
+
+
 def test_a_mode_change_clears_the_status_but_not_the_socket() -> None:
     rig = Rig()
     rig.open()

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from noc_words import AREA, COMMAND, HEAD_WORDS, LINE, LINES, MODULES, OWN_IP, STATE
 from rows import each_of
 
+from fbvm.base.areas import NEVER
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopLink, LoopNetwork
 from fbvm.net.peers import Fin, Reset, Say, ScriptedPeer
@@ -384,6 +385,17 @@ def test_a_restart_breaks_connections_and_restores_the_configuration() -> None:
     assert words[LINE.state] == STATE.open
     assert peer.log == ["ECONNRESET"]
     assert Noc().configuration["restart_ns"] == RESTART_NS
+
+
+def test_a_restart_ends_at_its_time_when_nothing_else_happens() -> None:
+    rig = Rig()
+    rig.head()[noc_words.RESTART] = 1
+    rig.step()
+    assert rig.noc.wake_ns == rig.now_ns + 5 * CYCLE_NS
+    rig.step(4)
+    assert rig.head()[noc_words.STATUS] == noc_words.RESTARTING
+    rig.step()
+    assert rig.head()[noc_words.STATUS] == noc_words.READY and rig.noc.wake_ns == NEVER
 
 
 @pytest.mark.slow

@@ -74,6 +74,7 @@ def test_times_are_shown_as_a_program_writes_them(time_ns: int, text: str) -> No
 
 @each_of(("text", "value"), [
     ("TRUE", True), ("false", False), ("12", 12), ("-1_000", -1000), ("16#FF", 255), ("0xff", 255), ("2#101", 5),
+    ("8#17", 15), ("-16#f_f", -255), ("+7_", 7),
     ("INT#5", 5), ("''", ""), ("WORD#16#10", 16), ("1.5", 1.5), ("-2e3", -2000.0), ("'a b'", "a b"), ("T#1s", 1_000_000_000),
     ("1s", 1_000_000_000),
 ])  # fmt: skip
@@ -153,6 +154,10 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
     (COLOUR, "Shape.Red", "x: Colour has no member Shape.Red; it has Red, Green"),
     (t.INT, "INT", "x: 'INT' is no literal; INT takes a whole number"),
     (t.INT, "noon", "x: 'noon' is no literal; INT takes a whole number"),
+    (t.INT, "2#9", "x: '2#9' is no literal; INT takes a whole number"),
+    (t.INT, "8#8", "x: '8#8' is no literal; INT takes a whole number"),
+    (t.WORD, "16#_", "x: '16#_' is no literal; WORD takes a whole number"),
+    (t.WORD, "0x_", "x: '0x_' is no literal; WORD takes a whole number"),
     (t.INT, "'", "x: \"'\" is no literal; INT takes a whole number"),
     (t.DATE, "DT#2024-01-01-00:00:00",
      "x is DATE and takes a date such as D#2024-01-31, not DT#2024-01-01-00:00:00"),
