@@ -15,8 +15,8 @@ def said(body: str) -> list[str]:
 
 
 @each_of(("rung", "hint"), [
-    ("LDN A\nOUT M", "did you mean LDNOT?"), ("LD A\nST M", "did you mean OUT?"), ("LD A\nCMPP D0 D1", "did you mean CMP or TCMP?"),
-    ("XIC A\nOTE M", "did you mean LD?"),
+    ("LDN A\nOUT M", "did you mean LDNOT?"), ("LD A\nST M", "did you mean OUT?"), ("XIC A\nOTE M", "did you mean LD?"),
+    ("LD A\nCMPP D0 D1", "did you mean CMP or TCMP?"),
     ("LD A\nADD D0 D1 D2", "did you mean +?"), ("LD A\nTON D0", "did you mean FBCALL TON?"),
     ("LD A OUT M", "OUT begins a line of its own"), ("LD A\nMOV #1 D0 D1", "S is a word or constant, D is a word")])
 def test_ladder(rung: str, hint: str) -> None:
