@@ -161,14 +161,14 @@ class ObservedEngine:
         for kind, site, detail in observations:
             if kind == "read":
                 form, offset, bit = detail
-                value = buffer[offset : offset + _SIZES[form]] if bit == WHOLE_BYTES else value_at(buffer, offset, 1, bit)
+                value = buffer[offset : offset + _SIZES[form]] if bit == WHOLE_BYTES else bit_at(buffer, offset, bit)
                 report(made(Read, (site, frame, offset, bit, value)))
             elif kind == "write":
                 form, offset, bit = detail
                 end = offset + _SIZES[form]
                 old, value = shadow[offset:end], buffer[offset:end]
                 if bit != WHOLE_BYTES:
-                    old, value = value_at(shadow, offset, 1, bit), value_at(buffer, offset, 1, bit)
+                    old, value = bit_at(shadow, offset, bit), bit_at(buffer, offset, bit)
                 if old != value:
                     shadow[offset:end] = buffer[offset:end]
                 report(made(Write, (site, frame, offset, bit, old, value)))
@@ -203,9 +203,7 @@ class _Sizes(dict[Any, int]):
 _SIZES = _Sizes()
 
 
-def value_at(buffer: bytes | mmap, offset: int, size: int, bit: int = WHOLE_BYTES) -> bytes:
-    """The bytes of a value; of a bit, one byte 0 or 1."""
-    if bit != WHOLE_BYTES:
-        return bytes((buffer[offset] >> bit & 1,))
-    return buffer[offset : offset + size]
+def bit_at(buffer: bytes | mmap, offset: int, bit: int) -> bytes:
+    """The value of a bit: one byte, 0 or 1."""
+    return bytes((buffer[offset] >> bit & 1,))
 

@@ -11,7 +11,7 @@ from rows import each_of
 
 from fbvm.code.image import Site
 from fbvm.record.draw.why import Cause, Change, Phase, _since
-from fbvm.record.trace.events import NetworkEvent, value_at
+from fbvm.record.trace.events import NetworkEvent, bit_at
 from fbvm.record.trace.reader import _passing
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import TapEvent, TapKind
@@ -48,7 +48,6 @@ def test_what_passed_the_network_is_read() -> None:
         _passing(json.dumps(row[:-1]).encode())
 
 
-def test_a_value_is_its_bytes_and_a_bit_is_a_byte() -> None:
+def test_the_value_of_a_bit_is_a_byte() -> None:
     memory = b"\x00\x81\x02\x03"
-    assert [value_at(memory, 1, 2), value_at(memory, 1, 0), value_at(memory, 1, 1)] == [b"\x81\x02", b"", b"\x81"]
-    assert [value_at(memory, 1, 1, bit) for bit in (0, 1, 7)] == [b"\1", b"\0", b"\1"]
+    assert [bit_at(memory, 1, bit) for bit in (0, 1, 7)] == [b"\1", b"\0", b"\1"]
