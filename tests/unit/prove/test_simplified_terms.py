@@ -200,6 +200,8 @@ def number(value: int, width: int = 8) -> Term:
 
 FEW = T.ite(P, number(3), T.ite(Q, number(200), number(0)))
 """One of three constants."""
+TO_16 = T.add(T.bitwise("bvand", A, number(15)), number(1))
+"""A number from 1 to 16."""
 
 
 @pytest.mark.parametrize(("made", "wanted"), [
@@ -269,6 +271,15 @@ def test_what_is_plain_becomes_plain(made: Term | str, wanted: Term | str) -> No
     assert made is wanted or made == wanted == "not"
 
 
+@each_of(("op", "most"), (("add", 16), ("eq", 64), ("ult", 64)))
+def test_operations_are_carried_through_a_choice_of_up_to_so_many_constants(op: str, most: int) -> None:
+    choice, made = number(0), []
+    for way in range(1, most + 1):
+        choice = T.ite(T.variable(f"c{way}", 0), number(2 * way), choice)
+        made.append(BINARY[op][0](T, choice, number(1)).op)
+    assert op not in made[:-1] and made[-1] == op
+
+
 @pytest.mark.parametrize(("term", "low", "high"), [
     (T.extend(A, 16, False), 0, 255), (T.add(T.extend(A, 16, False), number(5, 16)), 5, 260), (T.add(A, number(5)), 0, 255),
     (T.mul(T.extend(A, 16, False), number(3, 16)), 0, 765), (T.mul(A, B), 0, 255), (FEW, 0, 200),
@@ -278,6 +289,9 @@ def test_what_is_plain_becomes_plain(made: Term | str, wanted: Term | str) -> No
     (T.extract(T.extend(T.add(A, B), 16, False), 0, 9), 0, 255),
     (T.extract(T.divide("udiv", A, number(10)), 0, 5), 0, 25), (T.extract(T.divide("udiv", A, number(10)), 1, 5), 0, 31),
     (T.concat(T.add(T.extend(A, 9, False), number(1, 9)), B), 256, 65791),
+    # what may be a bit too long wraps
+    (T.add(A, number(1)), 0, 255), (T.mul(T.add(T.extend(A, 9, False), number(5, 9)), number(3, 9)), 0, 511),
+    (T.mul(TO_16, TO_16), 0, 255), (T.extract(T.ite(P, TO_16, T.add(TO_16, TO_16)), 0, 5), 0, 31),
 ])  # fmt: skip
 def test_the_bounds_of_a_result_come_from_those_of_its_operands(term: Term, low: int, high: int) -> None:
     assert (term.low, term.high) == (low, high)
