@@ -98,6 +98,12 @@ def test_symbols_comments_and_texts_differ_too() -> None:
         "@@ -2,3 +2,3 @@", " VAR_INPUT x : INT; END_VAR", "-Twice := 2 * x;", "+Twice := 3 * x;", " END_FUNCTION"]  # fmt: skip
 
 
+def test_pous_of_text_are_added_and_removed() -> None:
+    rest, function = OLD[:OLD.index("FUNCTION")], OLD[OLD.index("FUNCTION"):].splitlines()
+    assert shown(rest, OLD) == ["Twice: added", "@@ -0,0 +1,4 @@", *(f"+{line}" for line in function)]
+    assert shown(OLD, rest) == ["Twice: removed", "@@ -1,4 +0,0 @@", *(f"-{line}" for line in function)]
+
+
 @pytest.mark.slow
 def test_projects_differ_by_their_status_and_quietly(tmp_path: Path) -> None:
     one, other = tmp_path / "a.cxp", tmp_path / "b.cxt"

@@ -65,16 +65,16 @@ def test_an_interface_has_prototypes() -> None:
                          "GET END_GET END_PROPERTY END_INTERFACE"]  # fmt: skip
 
 
-def test_the_access_word_of_an_accessor_stands_in_front_of_it() -> None:
+def test_the_access_word_of_an_accessor_stands_in_front_of_it_and_no_name_of_its_code_does() -> None:
     block = HEAD + """<POU Name="P" Id="{1}"><Declaration><![CDATA[FUNCTION_BLOCK P
 ]]></Declaration><Property Name="Count" Id="{3}"><Declaration><![CDATA[PROPERTY Count : INT]]></Declaration>
 <Set Name="Set" Id="{4}"><Declaration><![CDATA[// PRIVATE or not
 {attribute 'x'} protected
 VAR
 END_VAR
-]]></Declaration><Implementation><ST><![CDATA[;]]></ST></Implementation></Set></Property></POU></TcPlcObject>"""
+]]></Declaration><Implementation><ST><![CDATA[Internal := 1;]]></ST></Implementation></Set></Property></POU></TcPlcObject>"""
     assert code(block)[:3] == ["FUNCTION_BLOCK P", "PROPERTY Count : INT", "protected SET // PRIVATE or not"]
-    assert code(block)[3:] == ["{attribute 'x'}", "VAR", "END_VAR", "; END_SET END_PROPERTY END_FUNCTION_BLOCK"]
+    assert code(block)[3:] == ["{attribute 'x'}", "VAR", "END_VAR", "Internal := 1; END_SET END_PROPERTY END_FUNCTION_BLOCK"]
 
 
 def test_code_in_one_line_without_a_line_end_behind_a_comment() -> None:

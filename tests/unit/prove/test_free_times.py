@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from rows import each_of
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
@@ -93,6 +94,26 @@ def test_an_answer_in_time_counts_the_time_and_not_the_scans() -> None:
     assert late.run is not None
     assert late.word == "broken"
     assert late.run.times_ns[-1] - late.run.asked_ns > 100 * MS
+
+
+@each_of(("asked", "answered", "within_ms", "late"), (
+    ("1000", "0010", 20, "----"), ("1000", "0001", 20, "--xx"),  # the next scan would be too late, too
+    ("1000", "1000", 0, "----"), ("1000", "0100", 0, "xx--"), ("1000", "0000", 10, "-xxx"),
+    ("1011", "0100", 10, "---x"), ("1011", "0001", 20, "--xx"),  # it waits since the first time
+    ("1111", "0100", 10, "----"), ("0000", "0000", 0, "----"),
+))  # fmt: skip
+def test_an_answer_is_late_behind_its_time_and_where_none_can_come_within_it(asked: str, answered: str, within_ms: int,
+                                                                             late: str) -> None:  # fmt: skip
+    image = compile_text("PROGRAM Main VAR In, Out : BOOL; END_VAR END_PROGRAM", lint=False).image
+    assert image is not None
+    plc, found = Plc(image, 10 * MS, engine="python"), ""
+    judge = Judge.of(image, Question(WITHIN, "Main.Out", trigger="Main.In", within_ns=within_ms * MS))
+    for now, (ask, answer) in enumerate(zip(asked, answered, strict=True)):
+        plc.write("Main.In", ask == "1")
+        plc.write("Main.Out", answer == "1")
+        plc.scan(now * 10 * MS)
+        found += "x" if judge.met(plc) else "-"
+    assert found == late
 
 
 @pytest.mark.slow
