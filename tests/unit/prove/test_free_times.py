@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -96,6 +97,13 @@ def test_an_answer_in_time_counts_the_time_and_not_the_scans() -> None:
     assert late.run.times_ns[-1] - late.run.asked_ns > 100 * MS
 
 
+@cache
+def two_bits() -> Image:
+    image = compile_text("PROGRAM Main VAR In, Out : BOOL; END_VAR END_PROGRAM", lint=False).image
+    assert image is not None
+    return image
+
+
 @each_of(("asked", "answered", "within_ms", "late"), (
     ("1000", "0010", 20, "----"), ("1000", "0001", 20, "--xx"),  # the next scan would be too late, too
     ("1000", "1000", 0, "----"), ("1000", "0100", 0, "xx--"), ("1000", "0000", 10, "-xxx"),
@@ -104,10 +112,8 @@ def test_an_answer_in_time_counts_the_time_and_not_the_scans() -> None:
 ))  # fmt: skip
 def test_an_answer_is_late_behind_its_time_and_where_none_can_come_within_it(asked: str, answered: str, within_ms: int,
                                                                              late: str) -> None:  # fmt: skip
-    image = compile_text("PROGRAM Main VAR In, Out : BOOL; END_VAR END_PROGRAM", lint=False).image
-    assert image is not None
-    plc, found = Plc(image, 10 * MS, engine="python"), ""
-    judge = Judge.of(image, Question(WITHIN, "Main.Out", trigger="Main.In", within_ns=within_ms * MS))
+    plc, found = Plc(two_bits(), 10 * MS, engine="python"), ""
+    judge = Judge.of(plc.image, Question(WITHIN, "Main.Out", trigger="Main.In", within_ns=within_ms * MS))
     for now, (ask, answer) in enumerate(zip(asked, answered, strict=True)):
         plc.write("Main.In", ask == "1")
         plc.write("Main.Out", answer == "1")
