@@ -249,6 +249,16 @@ def test_with_breakpoints_they_are_used(monkeypatch: pytest.MonkeyPatch) -> None
     assert plc.halted and plc.halted.scan == scans[0] == 4999 and len(scans) == 1
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("budget", "done"), [(105, 20), (104, 0)])
+def test_with_breakpoints_each_of_them_has_the_whole_budget(budget: int, done: int) -> None:
+    made = compile_text("PROGRAM Main VAR n, i : INT; END_VAR FOR i := 1 TO 50 DO ; END_FOR n := n + 1; END_PROGRAM", lint=False)
+    assert made.image is not None
+    plc = Plc(made.image, budget=budget, engine="native")
+    plc.breakpoints.condition("Main.n < 0")
+    assert (plc.run(scans=20), plc.read("Main.n")) == ("scans" if done else "trap", done)
+
+
 # --- with units -------------------------------------------------------------------------------------------------------
 
 OPENING = """

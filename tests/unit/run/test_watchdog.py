@@ -242,3 +242,15 @@ def test_engines_end_at_the_charge_at_which_too_few_steps_are_left(engine: str) 
     with pytest.raises(ValueError, match="fewer than none"):
         Allowance(-1)
     assert plc.read("Main.n") == 248  # 1000 - 2 - 249 * 2 = 500: two for the body, two for a pass
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_breakpoint_that_stops_nothing_leaves_a_scan_the_steps_that_it_is_allowed(engine: str) -> None:
+    plc = Plc(image_of(ENDLESS), engine=engine, budget=1000)
+    plc.breakpoints.condition("Main.n < 0")
+    for least, passes in ((501, 248), (301, 348)):  # each is for the engine that the breakpoint takes the place of
+        plc.engine.allowance = Allowance(least)
+        plc.cold_start()
+        trap = plc.scan()
+        assert trap and (trap.code, plc.read("Main.n")) == ("R0112", passes)
