@@ -164,6 +164,16 @@ def test_branches_agree_or_it_is_forgotten() -> None:
     assert [execute(code, before={0: b"\x09", 20: bits}).slot("i16", 4) for bits in (b"\1\0", b"\0\1", b"\0\0")] == [5, 6, 9]
 
 
+@pytest.mark.parametrize("leave", [("next",), ("exit",), ("return",), ("stop", "R0109", 1), ("raise", const("u32", 1), 1)])
+def test_a_branch_that_is_left_does_not_forget_what_the_other_way_holds(leave: Node) -> None:
+    """The branch stores to a byte of X.  Where the ways do meet, X is read again."""
+    def passes(*behind: Node) -> Block:
+        forgets = ("if", ((load("b", 20), (store("u8", 1, const("u8", 1)), *behind)),), ())
+        return (("loop", (("if", ((load("b", 21), (("exit",),)),), ()),), (store("i16", 4, X), forgets, store("i16", 6, X)), ()),)
+
+    assert (looks(passes(leave), 0), looks(passes(), 0)) == (1, 2)
+
+
 def test_a_variable_is_held_from_pass_to_pass() -> None:
     """A FOR from 0 to 9: its variable is read once from the memory, behind the loop not at all."""
     loop = ("loop", (("if", ((("gt", "b", "i16", X, const("i16", 9)), (("exit",),)),), ()),),
