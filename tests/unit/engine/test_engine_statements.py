@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -81,6 +82,37 @@ def test_call_gives_the_instance_and_takes_functions_without_one() -> None:
 def test_call_of_an_instance_that_is_not_there_traps() -> None:
     rig = execute((("call", 1, behind(load("ref", 0))),), ())
     assert rig.trap is not None and rig.trap.code == "R0110"
+
+
+ENDS: list[tuple[int, Callable[[Any], Node]]] = [
+    (1, lambda place: ("store_bit", place, 7, const("b", 1))), (1, lambda place: ("store_flag", place, const("b", 1))),
+    (1, lambda place: ("store_raw", "b", place, const("b", 1))), (2, lambda place: ("store", "i16", place, const("i16", 7))),
+    (8, lambda place: ("store_raw", "f64", place, const("f64", 1.5))),
+    (4, lambda place: ("store_text", place, 3, const("s8", b"abcd"))),
+    (8, lambda place: ("store_text", place, 3, const("s16", "abcd"))),
+    (3, lambda place: ("store_text", at(8), 3, ("load_text", "s8", place, 3))),
+    (6, lambda place: ("store_text", at(8), 3, ("load_text", "s16", place, 3))),
+    (2, lambda place: ("store", "i16", at(8), ("load", "i16", place))),
+    (4, lambda place: ("store", "f32", at(8), ("load_raw", "f32", place))),
+    (1, lambda place: ("store", "b", at(8), ("load_bit", "b", place, 7))),
+    (5, lambda place: ("copy", place, at(8), 5)), (5, lambda place: ("copy", at(8), place, 5)),
+    (4, lambda place: ("reverse", place, 4, ((0, 1, 4, 4),))), (3, lambda place: ("fill", place, b"abc")),
+    (64, lambda place: ("call", 1, place)),
+]
+"""How many bytes a statement takes at a place."""
+
+
+@pytest.mark.slow
+@each_of(("size", "statement"), ENDS)
+def test_what_lies_behind_a_reference_ends_in_the_memory(size: int, statement: Callable[[Any], Node]) -> None:
+    end = image((), ()).layout.size
+    for offset, trap in ((end - size, None), (end - size + 1, "R0110"), (4, None), (-1, "R0110")):
+        place = ("ref", const("ref", 1 << 40 | 4 << 8 | 255), 3), offset - 4, ()
+        program = image((statement(place),), ())
+        found = [execute(program=program).trap]
+        if native.available():
+            found.append(native.NativeEngine(program, power_on(program), 0).run(0))
+        assert [each and each.code for each in found] == [trap] * len(found), offset
 
 
 def test_a_trap_inside_a_call_ends_all() -> None:
