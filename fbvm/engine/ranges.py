@@ -145,7 +145,7 @@ def _remainder(node: Node, of: RangeOf) -> Range:
     low, high = of(node[2])
     if divisor := constant_integer(node[3]):
         most = abs(divisor) - 1
-        return (max(low, -most) if low < 0 else 0), (min(high, most) if high > 0 else 0)
+        low, high = max(low, -most), min(high, most)
     return min(low, 0), max(high, 0)
 
 
