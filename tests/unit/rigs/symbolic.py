@@ -1,6 +1,7 @@
 """Scans of the encoder with inputs that are not known, compared with scans of the engine for some values of these inputs.
 
-Terms are evaluated here, by Python's integers: what the encoder's factory has simplified has to mean the same."""
+Terms are evaluated here, by Python's integers: what the encoder's factory has simplified has to mean the same.  As the solver
+does, this refuses operands of several widths."""
 
 from __future__ import annotations
 
@@ -37,6 +38,8 @@ def term_value(term: Term, values: Mapping[Term, int], known: dict[Term, int] | 
 
 def _result(term: Term, args: list[int]) -> int:
     op, width = term.op, term.args[0].width
+    alike = {arg.width for arg in (term.args[1:] if op == "ite" else term.args)}
+    assert len(alike) == 1 or op == "concat", f"{op} of {alike} bits"
     if op in _PLAIN:
         return int(_PLAIN[op](*args))
     if op in ("slt", "sle", "sdiv", "srem"):
