@@ -35,12 +35,13 @@ def copied(summary: Summary, hit: Term) -> Iterator[Kept]:
     """The conditions of what the variables of a property are copied from; `hit` is that of the property, behind a scan."""
     behind = {term: variable for variable, term in summary.next.items() if not term.is_constant and variable in summary.cells}
     [condition] = substituted(summary.terms, [hit], dict(behind))
-    sources, found = _sources(summary), {condition}
+    owners, found, seen = _owners(summary), {condition}, set[Term]()
     for _ in range(MOST_LEVELS):
         variables = leaves([condition])
         if not variables or not variables <= summary.cells.keys():
             return
-        known = {variable: sources.get(variable, variable) for variable in variables}
+        seen |= variables  # whose copies are not gone back to, if there is another way
+        known = {variable: _source(summary, owners, variable, seen) for variable in variables}
         if all(source is variable for variable, source in known.items()):
             return
         [condition] = substituted(summary.terms, [condition], known)
@@ -62,19 +63,21 @@ def _ways(term: Term) -> Iterator[Term]:
             waiting += fresh
 
 
-def _sources(summary: Summary) -> dict[Term, Term]:
-    """For each variable another one in which a scan may leave the same."""
+def _owners(summary: Summary) -> dict[Term, list[Term]]:
+    """For each term the variables in which a scan may leave it."""
     owners: dict[Term, list[Term]] = {}
     for variable in summary.cells:
         for way in _ways(summary.next[variable]):
             owners.setdefault(way, []).append(variable)
-    found = {}
-    for variable in summary.cells:
-        others = (owner for way in _ways(summary.next[variable]) for owner in owners[way]
-                  if owner is not variable and owner.width == variable.width)  # fmt: skip
-        if (other := next(others, None)) is not None:
-            found[variable] = other
-    return found
+    return owners
+
+
+def _source(summary: Summary, owners: dict[Term, list[Term]], variable: Term, seen: set[Term]) -> Term:
+    """Another variable in which a scan may leave the same, if possible one that was not seen; the variable itself if there is
+    none."""
+    others = [owner for way in _ways(summary.next[variable]) for owner in owners[way]
+              if owner is not variable and owner.width == variable.width]  # fmt: skip
+    return next((owner for owner in others if owner not in seen), others[0] if others else variable)
 
 
 def _value(condition: Term, values: dict[Term, int]) -> int:

@@ -30,6 +30,7 @@ def image_of(code: str) -> Image:
     ("a := n; b := n + 1;", "a = b", ["(eq (sext b) (sext n))"]),
     ("a := n + 1;", "a = 5", []),  # it is no copy
     ("a := n;", "In AND a = 5", []),  # nothing is known of inputs
+    ("IF In THEN a := n; END_IF IF x THEN b := a; END_IF x := NOT x;", "b = 5", ["(eq a 5)", "(eq n 5)"]),
     ("IF In THEN a := n; ELSE b := n; END_IF", "a = 5", ["(eq n 5)"]),
 ))  # fmt: skip
 def test_a_condition_is_tried_of_what_its_variables_are_copied_from(code: str, never: str, tried: list[str]) -> None:
@@ -51,3 +52,10 @@ def test_what_holds_of_a_copy_is_proved_together_with_what_holds_of_the_original
     verdict = prove(image, Question(NEVER, "Main.a > 4"), Limits(), said.append)
     assert (verdict.word, verdict.how) == ("proved", "by induction over 2 scans with 1 invariant")
     assert "trying the property of what was copied" in said
+
+
+def test_a_copy_of_a_copy_is_proved_with_both_that_it_is_made_of() -> None:
+    image = image_of("IF In AND n < 400 THEN n := n + 1; END_IF IF In THEN a := n; END_IF\n"
+                     "IF In AND x THEN b := a; END_IF x := NOT x;")  # fmt: skip
+    verdict = prove(image, Question(NEVER, "Main.b > 400"))
+    assert (verdict.word, verdict.how) == ("proved", "by induction over 2 scans with 2 invariants")
