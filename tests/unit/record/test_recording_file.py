@@ -17,7 +17,7 @@ from fbvm import Etn21, LoopNetwork, Plc, compile_files, compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Phase
 from fbvm.net.peers import ModbusPeer
-from fbvm.record.recording import container, file_reader, recording
+from fbvm.record.recording import container, recording
 from fbvm.record.recording.container import MAGIC, RecordingError
 from fbvm.record.recording.file_reader import RecordingFile
 from fbvm.record.recording.file_scans import FileScans
@@ -408,15 +408,6 @@ def test_blocks_that_are_much_larger_when_unpacked(monkeypatch: pytest.MonkeyPat
     check = container._checksum(packed, head.kind, head.plc, head.first, head.scans)
     block = container._HEAD.pack(head.kind, len(packed), check, head.plc, head.first, head.scans) + packed
     assert "is too large" in damaged(whole[: head.at] + block + whole[blocks(whole)[3][0].at :])
-
-
-def test_what_is_told_of_a_plc_has_a_largest_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = written(COUNTER, 5, nothing)
-    size = len(blocks(whole)[1][1])
-    monkeypatch.setattr(file_reader, "LARGEST_HEAD_BYTES", size)
-    assert list(opened(whole)) == ["pump"]
-    monkeypatch.setattr(file_reader, "LARGEST_HEAD_BYTES", size - 1)
-    assert damaged(whole) == "what the recording tells of a PLC is too large"
 
 
 @pytest.mark.parametrize("payload", [b"[" * 100_000, b'{"format":' * 50_000, b'{"a":' + b"9" * 5000 + b"}"])
