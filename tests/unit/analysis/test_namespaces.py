@@ -10,15 +10,17 @@ from fbvm.analysis.outline import outline
 from fbvm.analysis.program import Program
 from fbvm.analysis.references import rename
 
-PLANT = """\
-USING Plant;
+OPENED = """\
 NAMESPACE Plant
 TYPE Mode : (Idle, Busy); END_TYPE
 FUNCTION Twice : INT
 VAR_INPUT x : INT; END_VAR
     Twice := 2 * x;
 END_FUNCTION
-NAMESPACE Pumps
+"""
+PLANT = f"""\
+USING Plant;
+{OPENED}NAMESPACE Pumps
 FUNCTION_BLOCK Pump
 VAR_OUTPUT q : INT; m : Mode; END_VAR
     q := q + Twice(1);
@@ -114,14 +116,8 @@ def test_names_are_looked_up_anew_when_a_using_changes() -> None:
     assert [each.code for each in program.diagnostics("pump.st")] == ["S0401"]
 
 
-OWN = """\
-NAMESPACE Plant
-TYPE Mode : (Idle, Busy); END_TYPE
-FUNCTION Twice : INT
-VAR_INPUT x : INT; END_VAR
-    Twice := 2 * x;
-END_FUNCTION
-END_NAMESPACE
+OWN = f"""\
+{OPENED}END_NAMESPACE
 FUNCTION_BLOCK Pump USING Plant;
 VAR_OUTPUT q : Mode; n : INT; END_VAR
     q := Mode#Busy; n := Twice(x := 1);
