@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from fbvm.base.arithmetic import NAN, Undefined, width
+from fbvm.base.arithmetic import NAN, Undefined, limits, width
 from fbvm.code.builder.evaluation import value_of
 from fbvm.code.operations import (
     BIT_MASK,
@@ -345,7 +345,8 @@ def _extreme(name: str) -> Row:
 
 def _check(x: Execution, state: State, machine: str, a: Node, low: int, high: int, code: str, site: int) -> Term:
     terms, value = x.terms, x.value(state, a)
-    least, greatest = (terms.constant(value.width, limit) for limit in (low, high))
+    lowest, highest = limits(machine)  # a bound may be wider than the type, as that of a time of day is
+    least, greatest = terms.constant(value.width, max(low, lowest)), terms.constant(value.width, min(high, highest))
     sign = is_signed(machine)
     inside = terms.and_(terms.less(least, value, sign, True), terms.less(value, greatest, sign, True))
     x.trap(state, terms.not_(inside), code, site)
