@@ -65,8 +65,7 @@ class Comments:
             return
         gaps = [self.text.count("\n", before, here) for before, here in zip(
             [start, *(stop for _, stop in found)], [*(begin for begin, _ in found), end], strict=True)]
-        parted = [at for at, count in enumerate(gaps) if count]
-        first_end, last_end = (parted[0], parted[-1]) if parted else (len(gaps), 0)
+        first_end, last_end = _ends(gaps)
         ahead: list[Comment] = []
         behind: list[Comment] = []
         for at, (begin, stop) in enumerate(found):
@@ -148,3 +147,9 @@ def _comments(text: str, start: int, end: int) -> Iterator[tuple[int, int]]:
         elif not found[0].startswith("//"):
             at, _ = comment_end(text, found.start())
         yield found.start(), at
+
+
+def _ends(gaps: Sequence[int]) -> tuple[int, int]:
+    """The first and the last of the gaps that have a line end; of none, that behind the last and the first."""
+    parted = [at for at, count in enumerate(gaps) if count]
+    return (parted[0], parted[-1]) if parted else (len(gaps), 0)
