@@ -305,10 +305,9 @@ def test_the_filter_and_only_what_changes(shown: Any) -> None:
     where(shown)
     assert shown.eval_on_selector_all(".label", "rows => rows.map(row => row.title)") == ["Main.Done"]
     shown.fill("#filter", "")
-    where(shown)
-    everything = shown.locator(".label").count()
+    everything = len(labels_of(shown))
     shown.check("#moving")
-    where(shown)
+    shown.wait_for_function("window.fbvm.written()")
     assert 0 < shown.locator(".label").count() <= everything
 
 
