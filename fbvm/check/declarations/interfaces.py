@@ -108,7 +108,7 @@ class _Interface:
     def _construct(self, constructed: tree.Pou) -> None:
         """Take the tree with the construction of instances at its start, and declare what that needs."""
         added = constructed.sections[len(self.pou.tree.sections):]
-        self.pou.tree = constructed
+        self.pou.tree, self.pou.as_written = constructed, False
         for section in added:
             self._section(section)
 
