@@ -108,10 +108,11 @@ class Context:
         self._checked_before = checked_before
         self._blocks: dict[int, Pou] = {}
         self._descendants: dict[str, list[Pou]] = {}
-        self._candidates: dict[Pou, dict[Pou, list[int]]] = {}
         """By name of a type the blocks whose types have that name or are derived from one that has."""
+        self._candidates: dict[Pou, dict[Pou, list[int]]] = {}
+        """What `candidates` has found, by what calls name."""
         self._indexed = 0
-        """How many blocks there were when that was made."""
+        """How many blocks there were when these two were made."""
         self._identifiers = 0
         self._anonymous = 0
         self._resolving = 0
