@@ -106,15 +106,14 @@ class Process:
 def started() -> Process:
     """A new process.  To be called inside of `signals_held`, until who ends the process knows it: Ctrl-C might come between.
     Raises OSError."""
-    with signals_held():
-        door = connection.Listener()  # where only this user comes in
-        code = CODE.format(address=door.address, path=sys.path)
-        try:
-            return Process(subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                            stderr=subprocess.DEVNULL), door)  # fmt: skip
-        except OSError:
-            door.close()
-            raise
+    door = connection.Listener()  # where only this user comes in
+    code = CODE.format(address=door.address, path=sys.path)
+    try:
+        return Process(subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                        stderr=subprocess.DEVNULL), door)  # fmt: skip
+    except OSError:
+        door.close()
+        raise
 
 
 @dataclass
