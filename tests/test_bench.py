@@ -9,6 +9,7 @@ import re
 import shutil
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, redirect_stdout
@@ -19,8 +20,10 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from fbvm.base.data import cache_folder
 from fbvm.cli.main import main
 from fbvm.cli.running.demo import modbus_server
+from fbvm.code.compiler import compile_text
 from fbvm.engine.native.engine import available
 from fbvm.machine.plc import Plc
 
@@ -147,6 +150,19 @@ def test_the_script_many(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(script, "RUN_MS", 20)
     for name, pace in (("timer", "cyclic"), ("logic", "event")):
         script.measure(name, 2, pace, 10)
+
+
+@needs_machine_code
+def test_only_what_is_measured_writes_into_a_new_cache(load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load("native")
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "before"))
+    plc = Plc(compile_text(SMALL).image, engine="native")  # fast code of it is compiled in the background
+    plc.scan()
+    with script.new_cache() as folder:
+        assert cache_folder() == folder and not list(folder.iterdir())
+        assert plc.engine.optimised
+        assert script.COMPILER not in {thread.name for thread in threading.enumerate()}
+    assert cache_folder() == tmp_path / "before" and not folder.exists()
 
 
 @needs_machine_code

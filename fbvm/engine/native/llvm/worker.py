@@ -19,6 +19,8 @@ from fbvm.base.host import give_way
 from fbvm.engine.apart import DEAF, run_apart
 from fbvm.engine.native.llvm.compiler import compile_text, search_less
 
+COMPILER = "fbvm compiler"
+"""The name of the thread that waits for the helper process."""
 _SIZE_BYTES = 8
 LONGEST_HERE = {0: 4 << 20, 1: 1 << 20, 2: 1 << 19}
 """Characters of the text of a module, by level of optimisation, that LLVM compiles in half a second."""
@@ -92,7 +94,7 @@ class Worker:
             self._jobs.append(ref(job))
             if not self._busy:
                 try:
-                    threading.Thread(target=self._work, name="fbvm compiler", daemon=True).start()
+                    threading.Thread(target=self._work, name=COMPILER, daemon=True).start()
                 except RuntimeError:  # the system has no more threads for this process
                     self._jobs.clear()
                 else:
