@@ -83,7 +83,8 @@ def meant(text: str) -> str:
     return MISSPELT.get(word, "VAR")
 
 
-_DRAWN = re.compile(r"(?:[ \t]*[│├┃┣][^\n]*\n)+")
+_RAILS = "│├┃┣"
+_DRAWN = re.compile(rf"(?:[ \t]*[{_RAILS}][^\n]*\n)+")
 """Lines that begin with the left rail of a rung."""
 END_OF_FILE = "\x1a\0"
 """Characters with which older systems fill a file behind its end."""
@@ -148,12 +149,12 @@ def lexis() -> Lexis:
         r"|=<|<<|>>|->|!=|&&|\|\||[-+*/]=|=:|:[ \t]+=(?!>)|(?:\+\+|--)(?=\s*;)|[!|~]|%(?![A-Za-z*])")
     patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
     alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
-    known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
+    begins = "|".join(patterns[name] for name in ("COMMENT", "FOREIGN", "SIGN"))
     return Lexis(
         words, conditions, frozenset({*conditions, "MISSPELT", "LADDER"}), frozenset(reserved),
         frozenset(OPERAND_ENDS | set(words.values()) - reserved), signs,
         re.compile(rf"\s*(?:{alternatives})"), re.compile(r"\s*(" + patterns["LOCATION"] + ")"),
-        re.compile(rf"[^\s\w{known}]+"), re.compile(r"[^\W0-9]\w*"), re.compile(patterns["SET_ASSIGN"]))
+        re.compile(rf"(?:(?!{begins})[^\s\w'\"{{%])+"), re.compile(r"[^\W0-9]\w*"), re.compile(patterns["SET_ASSIGN"]))
 
 
 def _pattern(terminal: Terminal) -> str:
@@ -314,7 +315,7 @@ class Lexer:
             return None, len(text)
         if character in "'\"":
             return self._open_string(at)
-        if drawn := _DRAWN.match(text, self._begin(at)):
+        if character in _RAILS and (drawn := _DRAWN.match(text, self._begin(at))):
             self.report("S0101", at, min(drawn.end(), text.find("\n", at)), "these lines are a rung that is drawn",
                         "rungs stand between LADDER and END_LADDER", False)
             return None, drawn.end()

@@ -201,3 +201,12 @@ def test_an_odd_character_does_not_hide_an_open_block() -> None:
 def test_words_that_matter_in_one_place_can_be_set_and_reset() -> None:
     pou, diagnostics = body("on S= TRUE; with R= step; step S= on; IF S=1 THEN ; END_IF")
     assert diagnostics == [] and [getattr(s, "op", "") for s in pou.body] == ["S=", "R=", "S=", ""]
+
+
+@pytest.mark.parametrize(("signs", "pieces"), [
+    ("??", ["??"]), ("?" * 5000, ["?" * 5000]), ("@?#", ["@?#"]), ("? ?", ["?", "?"]), ("???= 1", ["??"]), ("@+ 1", ["@"]),
+    ("@'a'", ["@"]), ("@(* *)", ["@"]), ("@%MW3", ["@"]), ("@5", ["@"])])
+def test_signs_that_begin_no_token_are_one_error_up_to_the_next_token(signs: str, pieces: list[str]) -> None:
+    _, diagnostics = body(f"x := y {signs};")
+    odd = [d for d in diagnostics if d.code == "S0102"]
+    assert [d.source.text[d.start:d.end] for d in odd] == pieces
