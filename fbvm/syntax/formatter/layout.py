@@ -323,17 +323,22 @@ def shifted(text: str, by: int) -> list[str]:
 def _text(lines: list[_Line]) -> str:
     """All lines, the comments behind them aligned."""
     columns = _columns(lines)
-    written: list[str] = []
-    for line, column in zip(lines, columns, strict=True):
-        text = line.text
-        if line.remarks:
-            text = text.ljust(column)
-            for comment in line.remarks:
-                text += "" if text.endswith(" ") else " "
-                last = text.rsplit("\n", 1)[-1]
-                text += "\n".join(shifted(comment.text, len(last) - comment.column))
-        written.append(text)
+    written = [_with_remarks(line, column) if line.remarks else line.text for line, column in zip(lines, columns, strict=True)]
     return "\n".join(written).strip("\n") + "\n" if any(written) else ""
+
+
+def _with_remarks(line: _Line, column: int) -> str:
+    """A line with the comments behind it, which begin at a column."""
+    pieces = [line.text.ljust(column)]
+    width = len(pieces[0])
+    for comment in line.remarks:
+        if not pieces[-1].endswith(" "):
+            pieces.append(" ")
+            width += 1
+        first, *more = shifted(comment.text, width - comment.column)
+        pieces += [first, *(f"\n{shown}" for shown in more)]
+        width = len(more[-1]) if more else width + len(first)
+    return "".join(pieces)
 
 
 def _columns(lines: list[_Line]) -> list[int]:

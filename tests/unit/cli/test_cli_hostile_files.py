@@ -6,14 +6,13 @@ import os
 import re
 import struct
 import sys
-import time
 import zlib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from growth import least_s
+from growth import assert_linear
 from old_files import write_old_journal, write_old_trace
 from rows import each_of, first_quick
 
@@ -160,13 +159,15 @@ def test_names_that_no_file_system_has(fbvm: Fbvm) -> None:
 
 @pytest.mark.slow
 def test_the_time_of_an_import_grows_with_its_pous() -> None:
-    def took_s(count: int) -> float:
-        began_s = time.process_time()
-        assert len(import_xml(XML.format("".join(POU.format(f"P{at}") for at in range(count))).encode()).files) == count
-        return time.process_time() - began_s
+    def prepared(count: int) -> Callable[[], None]:
+        document = XML.format("".join(POU.format(f"P{at}") for at in range(count))).encode()
 
-    took_s(10)
-    assert took_s(8000) < 8 * took_s(2000)
+        def imports() -> None:
+            assert len(import_xml(document).files) == count
+
+        return imports
+
+    assert_linear(prepared, 2000)
 
 
 def of_interfaces(count: int) -> str:
@@ -236,6 +237,11 @@ def of_comments_on_one_line(count: int) -> str:
     return f"PROGRAM Main VAR n : INT; END_VAR {'n := 1; (* a *) ' * count}END_PROGRAM\n"
 
 
+def of_comments_behind_a_statement(count: int) -> str:
+    """A program with many comments behind its only statement."""
+    return f"PROGRAM Main VAR n : INT; END_VAR n := 1;{' (* a *)' * count}\nEND_PROGRAM\n"
+
+
 def of_properties(count: int) -> str:
     """A block with properties."""
     parts = "".join(f"PROPERTY PUBLIC P{at} : INT GET P{at} := 1; END_GET END_PROPERTY\n" for at in range(count))
@@ -262,18 +268,20 @@ def exported(source: Source) -> bool:
 @each_of(("made", "few", "work"), [
     (of_interfaces, 150, compiled), (of_one_interface, 70, compiled), (of_jumps, 500, compiled), (of_far_jumps, 100, compiled),
     (of_bases, 50, compiled), (of_namespaces, 500, compiled), (of_drawn_contacts, 200, compiled), (of_drawn_coils, 200, compiled),
-    (of_unknown_names, 1500, refused), (of_comments_on_one_line, 3000, laid_out), (of_properties, 400, exported),
+    (of_unknown_names, 1500, refused), (of_comments_on_one_line, 3000, laid_out),
+    (of_comments_behind_a_statement, 10000, laid_out), (of_properties, 400, exported),
 ])  # fmt: skip
 def test_the_time_of_a_compilation_grows_with_its_parts(made: Callable[[int], str], few: int,
                                                         work: Callable[[Source], bool]) -> None:  # fmt: skip
-    def took_s(count: int) -> float:
+    def prepared(count: int) -> Callable[[], None]:
         source = Source("x.st", made(count))
-        ended: list[bool] = []
-        took = least_s(lambda: ended.append(work(source)))
-        assert all(ended)
-        return took
 
-    assert took_s(4 * few) < 8 * took_s(few)
+        def works() -> None:
+            assert work(source)
+
+        return works
+
+    assert_linear(prepared, few)
 
 
 @needs_devices
