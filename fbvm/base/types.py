@@ -67,6 +67,14 @@ class ArrayType(Type):
         """The number of elements in all dimensions."""
         return _elements(self.bounds)
 
+    def subscripts(self, number: int) -> str:
+        """The subscripts of an element by its number in memory, from 0, as they are written: "2, -1"."""
+        written: list[str] = []
+        for low, high in reversed(self.bounds):
+            number, behind = divmod(number, high - low + 1)
+            written.insert(0, str(low + behind))
+        return ", ".join(written)
+
 
 @dataclass(frozen=True)
 class OpenArrayType(Type):

@@ -243,7 +243,7 @@ def _part(place: Place, offset: int) -> Place | None:
     if isinstance(kind, ArrayType):
         size = kind.element.size
         number = (offset - place.offset) // size
-        name = f"{place.name}[{', '.join(map(str, _subscripts(kind, number)))}]"
+        name = f"{place.name}[{kind.subscripts(number)}]"
         return place.inner(name, kind.element, number * size)
     assert isinstance(kind, StructType)
     for field in kind.fields.values():
@@ -252,14 +252,6 @@ def _part(place: Place, offset: int) -> Place | None:
             inner = member(place, field.name)
             return replace(inner, type=_bound(field.type), hops=()) if inner.hops else inner
     return None
-
-
-def _subscripts(kind: ArrayType, number: int) -> list[int]:
-    subscripts: list[int] = []
-    for low, high in reversed(kind.bounds):
-        number, rest = divmod(number, high - low + 1)
-        subscripts.insert(0, low + rest)
-    return subscripts
 
 
 def _address(areas: Mapping[str, Area], area: Area, offset: int, bit: int | None) -> Place:

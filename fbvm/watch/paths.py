@@ -341,12 +341,7 @@ def _element(place: Place, text: str) -> Place:
 
 def element(place: Place, kind: ArrayType, number: int) -> Place:
     """The element of an array with index `number` in memory order, counted from 0."""
-    subscripts: list[str] = []
-    left = number
-    for low, high in reversed(kind.bounds):
-        left, behind = divmod(left, high - low + 1)
-        subscripts.insert(0, str(low + behind))
-    name = f"{place.name}[{', '.join(subscripts)}]"
+    name = f"{place.name}[{kind.subscripts(number)}]"
     if place.bit is not None:
         return place.inner(name, kind.element, (place.bit + number) // 8, (place.bit + number) % 8)
     return _followed(place.inner(name, kind.element, number * kind.element.size))

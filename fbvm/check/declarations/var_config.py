@@ -110,9 +110,10 @@ class VarConfig:
     def _declaration(self, spot: Spot) -> Variable | None:
         """The variable of a block or program that a path leads to; None for a member of a structure, and for an element."""
         holder = self._holder(spot)
-        step = spot.steps[-1] if spot.steps else None
-        if holder is None or not holder.block or not isinstance(step, Field):
+        if holder is None or not holder.block:
             return None
+        step = spot.steps[-1]
+        assert isinstance(step, Field)
         return self.context.block_of(holder).variables.get(fold(step.name))
 
     def _holder(self, spot: Spot) -> StructType | None:
@@ -259,7 +260,7 @@ class VarConfig:
             return
         if isinstance(kind, ArrayType):
             for index in range(kind.count):
-                yield from self._open_in(_inner(spot, index, kind.element), f"{path}[{kind.bounds[0][0] + index}]")
+                yield from self._open_in(_inner(spot, index, kind.element), f"{path}[{kind.subscripts(index)}]")
         elif isinstance(kind, StructType) and not kind.block:
             for field in kind.fields.values():
                 yield from self._open_in(_inner(spot, field, field.type), f"{path}.{field.name}")

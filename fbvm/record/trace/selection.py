@@ -12,7 +12,7 @@ from fbvm.base.types import ArrayType, Field, StructType, followed
 from fbvm.watch.paths import Place, Span, UnknownPlace, element, find, member
 
 MOST_ELEMENTS = 4096
-"""Elements of an array of structures that are compared with a pattern with a star."""
+"""Elements of an array that are compared with a pattern with a star."""
 
 FEW_ELEMENTS = 32
 """Elements that an array may have to be shown by default."""
@@ -77,14 +77,12 @@ def _within(place: Place, fits: object) -> Iterator[Place]:
         for inner in _members(place):
             yield from _within(inner, fits)
     elif isinstance(place.type, ArrayType):
-        low = place.type.bounds[0][0]
-        if not isinstance(place.type.element, StructType | ArrayType):
-            if fits(f"{place.name}[{low}]"):
-                yield place
+        elements = [element(place, place.type, number) for number in range(min(place.type.count, MOST_ELEMENTS))]
+        if not isinstance(place.type.element, StructType | ArrayType) and all(fits(each.name) for each in elements):
+            yield place
             return
-        for number in range(min(place.type.count, MOST_ELEMENTS)):
-            element = place.inner(f"{place.name}[{low + number}]", place.type.element, number * place.type.element.size)
-            yield from _within(element, fits)
+        for each in elements:
+            yield from _within(each, fits)
 
 
 def symbol_places(symbols: Mapping[str, Field]) -> Iterator[Place]:
