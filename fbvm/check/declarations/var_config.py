@@ -212,8 +212,8 @@ class VarConfig:
         return Spot(of.root, (*of.steps, field), field.type)
 
     def _is_open(self, kind: Type, field: Field) -> bool:
-        assert isinstance(kind, StructType)
-        return kind.block and self.context.block_of(kind).variables[fold(field.name)].open
+        assert isinstance(kind, StructType) and kind.block, "no member of a structure is a reference"
+        return self.context.block_of(kind).variables[fold(field.name)].open
 
     def _element(self, of: Spot, path: tree.Index, source: Source) -> Spot | None:
         kind = of.type
