@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from rows import each_of
 
+from fbvm.base.diagnostics import Source
 from fbvm.check.instructions import _wrapped
-from fbvm.code.compiler.driver import compile_text
+from fbvm.code.compiler.driver import compile_sources, compile_text
 
 G = "FUNCTION_BLOCK G END_FUNCTION_BLOCK\n"
 NOTHING = "extends and implements nothing"
@@ -51,11 +52,12 @@ def test_a_head_that_is_wrong_has_one_message(text: str, said: list[tuple[str, i
 
 def test_a_second_configuration_is_shown_beside_the_first() -> None:
     run = "RESOURCE R ON PLC TASK T(INTERVAL := T#10ms, PRIORITY := 1); PROGRAM P WITH T : Main; END_RESOURCE END_CONFIGURATION"
-    [error] = compile_text(f"PROGRAM Main END_PROGRAM\nCONFIGURATION First {run}\nCONFIGURATION Second {run}").errors
-    assert (error.code, error.line, error.message, error.hint) == \
-        ("S0801", 3, "there is a second CONFIGURATION", "a project has one")  # fmt: skip
+    first = Source("first.st", f"PROGRAM Main END_PROGRAM\nCONFIGURATION First {run}")
+    [error] = compile_sources([first, Source("second.st", f"CONFIGURATION Second {run}")]).errors
+    assert (error.source.name, error.code, error.line, error.message, error.hint) == \
+        ("second.st", "S0801", 1, "there is a second CONFIGURATION", "a project has one")  # fmt: skip
     assert error.related is not None
-    assert (error.related[0].place(error.related[1]), error.related[2]) == ((2, 15), "the first")
+    assert (error.related[0].name, first.place(error.related[1]), error.related[2]) == ("first.st", (2, 15), "the first")
 
 
 @each_of("text, width, lines", [
