@@ -90,7 +90,6 @@ class Configurations:
         key = ("", fold(name))
         other = self.project.globals.get(key)
         if other is not None and other.type is pou.type and other not in self._run:
-            self._run.append(other)
             task.runs.append(Run(other, pou))
             return True
         if other is not None:
