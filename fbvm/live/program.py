@@ -6,9 +6,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from typing import Any
 
-from fbvm.base.types import BOOL, ArrayType, Field, StructType, base
+from fbvm.base.types import BOOL, Field, StructType, base, fold
 from fbvm.code.image import Image
 from fbvm.machine.plc import Phase, Plc
 from fbvm.machine.power import Power
@@ -24,8 +25,10 @@ from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place, UnknownPlace, find
+from fbvm.watch.scopes import every_instance
 
-MOST_INSTANCES = 2000
+MOST_INSTANCES, MOST_ELEMENTS = 2000, 100
+"""Instances of a program that are listed, and elements of an array of them."""
 MOST_PICTURES = 200
 """Rungs and charts of one instance that are drawn."""
 MOST_ON_LINE = 8
@@ -44,25 +47,9 @@ _HIDDEN = re.compile(r"//.*|\(\*.*?\*\)|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
 
 def instances(image: Image) -> list[dict[str, str]]:
     """Path and type of each program and function block instance that has statements, rungs or charts of its own."""
-    kinds = {body.name.upper() for body in image.bodies}
-    return [{"path": path, "pou": kind} for path, kind in _instances(image.symbols) if kind.upper() in kinds]
-
-
-def _instances(symbols: Mapping[str, Field]) -> Iterator[tuple[str, str]]:
-    waiting = [(field.name, field.type) for field in symbols.values() if not field.reference]
-    found = 0
-    while waiting and found < MOST_INSTANCES:
-        path, kind = waiting.pop(0)
-        if isinstance(kind, ArrayType):
-            low, high = kind.bounds[0]
-            if len(kind.bounds) == 1 and isinstance(kind.element, StructType) and kind.element.block:
-                waiting += [(f"{path}[{number}]", kind.element) for number in range(low, min(high, low + 99) + 1)]
-        elif isinstance(kind, StructType):
-            if kind.block:
-                found += 1
-                yield path, kind.name
-            waiting += [(f"{path}.{field.name}", field.type) for field in kind.fields.values()
-                        if not field.reference and not field.absolute and "$" not in field.name]  # fmt: skip
+    kinds = {fold(body.name) for body in image.bodies}
+    shown = (place for place in every_instance(image.symbols, MOST_ELEMENTS) if "$" not in place.name)
+    return [{"path": place.name, "pou": place.type.name} for place in islice(shown, MOST_INSTANCES) if fold(place.type.name) in kinds]
 
 
 def source_of(image: Image, areas: Any, texts: Mapping[str, str], instance: str) -> Generator[None, None, dict[str, Any]]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
+from itertools import islice
 
 from fbvm.base.types import ArrayType, Field, StructType, fold
 from fbvm.watch.paths import Place, Span, UnknownPlace, element
@@ -59,32 +60,45 @@ class Scope:
 
 def instances(symbols: Mapping[str, Field], pou: str, most: int) -> list[Place]:
     """The first `most` instances of a program or function block, those nearest to the top first."""
-    found: list[Place] = []
-    waiting = deque(Place(field.name, field.type, field.offset) for field in symbols.values() if not field.reference)
+    return list(islice(_instances(symbols, most, fold(pou)), most))
+
+
+def every_instance(symbols: Mapping[str, Field], most_elements: int) -> Iterator[Place]:
+    """The instances of all programs and function blocks, those nearest to the top first; of an array its first elements."""
+    return _instances(symbols, most_elements, "")
+
+
+def _instances(symbols: Mapping[str, Field], most_elements: int, pou: str) -> Iterator[Place]:
     holds: dict[int, bool] = {}
-    while waiting and len(found) < most:
+    waiting = deque(Place(field.name, field.type, field.offset) for field in symbols.values()
+                    if not field.reference and _holds(field.type, pou, holds))  # fmt: skip
+    while waiting:
         place = waiting.popleft()
         kind = place.type
-        if isinstance(kind, ArrayType) and _holds(kind, fold(pou), holds):
-            waiting.extend(element(place, kind, number) for number in range(min(kind.count, most)))
-        elif isinstance(kind, StructType) and kind.block:
-            if fold(kind.name) == fold(pou):
-                found.append(place)
+        if isinstance(kind, ArrayType):
+            waiting.extend(element(place, kind, number) for number in range(min(kind.count, most_elements)))
+        elif isinstance(kind, StructType):
+            if _is_instance(kind, pou):
+                yield place
             for field in kind.fields.values():
-                if not field.reference and _holds(field.type, fold(pou), holds):
+                if not field.reference and _holds(field.type, pou, holds):
                     offset = field.offset if field.absolute else place.offset + field.offset
                     waiting.append(replace(place, name=f"{place.name}.{field.name}", type=field.type, offset=offset))
-    return found
+
+
+def _is_instance(kind: StructType, pou: str) -> bool:
+    """Whether a value of a type is an instance of a POU, of any with ""."""
+    return kind.block and pou in ("", fold(kind.name))
 
 
 def _holds(kind: object, pou: str, known: dict[int, bool]) -> bool:
-    """True if a value of a type is or has an instance of a POU."""
+    """True if a value of a type is or has an instance of a POU, of any with ""."""
     if isinstance(kind, ArrayType):
         return _holds(kind.element, pou, known)
-    if not isinstance(kind, StructType) or not kind.block:
+    if not isinstance(kind, StructType):
         return False
     if id(kind) not in known:
-        known[id(kind)] = fold(kind.name) == pou or any(
+        known[id(kind)] = _is_instance(kind, pou) or any(
             _holds(field.type, pou, known) for field in kind.fields.values() if not field.reference)
     return known[id(kind)]
 

@@ -175,10 +175,11 @@ FUNCTION_BLOCK Out VAR_IN_OUT x : In; END_VAR VAR a : In; b : ARRAY[1..2] OF In;
 END_FUNCTION_BLOCK
 PROGRAM Main VAR o : Out; i : In; grid : ARRAY[1..2, 1..2] OF In; k : INT; END_VAR k := 1; o(x := i); END_PROGRAM""")
     found = page.done("program", plc="pump")["instances"]
-    assert [(row["path"], row["pou"]) for row in found[:7]] == [
-        ("Main", "Main"), ("Main.o", "Out"), ("Main.i", "In"), ("Main.o.a", "In"), ("Main.o.t", "TON"), ("Main.o.b[1]", "In"),
+    assert [(row["path"], row["pou"]) for row in found[:11]] == [
+        ("Main", "Main"), ("Main.o", "Out"), ("Main.i", "In"), ("Main.o.a", "In"), ("Main.o.t", "TON"), ("Main.grid[1, 1]", "In"),
+        ("Main.grid[1, 2]", "In"), ("Main.grid[2, 1]", "In"), ("Main.grid[2, 2]", "In"), ("Main.o.b[1]", "In"),
         ("Main.o.b[2]", "In")]  # fmt: skip
-    assert [row["path"] for row in found[7:]] == [f"Main.o.w[{number}]" for number in range(100)], "of an array the first hundred"
+    assert [row["path"] for row in found[11:]] == [f"Main.o.w[{number}]" for number in range(100)], "of an array the first hundred"
     assert found == page.done("hello", version=1)["plcs"][0]["instances"]
 
 

@@ -14,7 +14,7 @@ from fbvm.watch.bits import bits_of, meet, written_bits, written_twice
 from fbvm.watch.changes import changed
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, UnknownPlace
-from fbvm.watch.scopes import Scope, instances, place_of
+from fbvm.watch.scopes import Scope, every_instance, instances, place_of
 
 TEXT = """
 TYPE Pair : STRUCT a : INT; b : REAL; END_STRUCT END_TYPE
@@ -94,6 +94,20 @@ def test_instances_are_found_those_nearest_to_the_top_first(plc: Plc, pou: str, 
     made = instances(plc.image.symbols, pou, most)
     assert sorted(each.name for each in made) == sorted(found)
     assert all(each.offset == place(plc, each.name).offset for each in made)
+
+
+def test_instances_in_structures_and_in_arrays_of_two_dimensions_are_found() -> None:
+    plc = Plc(compile_text("""FUNCTION_BLOCK Pump VAR n : INT; END_VAR n := n + 1; END_FUNCTION_BLOCK
+TYPE Line : STRUCT id : INT; p : Pump; q : ARRAY [0..1, 2..3] OF Pump; END_STRUCT;
+     Plain : STRUCT n : INT; END_STRUCT; END_TYPE
+PROGRAM Main VAR l : Line; plain : ARRAY [1..9] OF Plain; k : ARRAY [5..6] OF Line; END_VAR l.p(); END_PROGRAM""").image)
+    made = instances(plc.image.symbols, "Pump", 99)
+    inside = ("p", *(f"q[{row}, {column}]" for row in (0, 1) for column in (2, 3)))
+    assert sorted(each.name for each in made) == sorted(
+        f"Main.{line}.{name}" for line in ("l", "k[5]", "k[6]") for name in inside)
+    assert all(each.offset == place(plc, each.name).offset for each in made)
+    assert [each.name for each in every_instance(plc.image.symbols, 1)] == [
+        "Main", "Main.l.p", "Main.l.q[0, 2]", "Main.k[5].p", "Main.k[5].q[0, 2]"]
 
 
 def test_a_reference_is_read_as_the_name_of_what_it_points_to(plc: Plc) -> None:
