@@ -48,8 +48,9 @@ _HIDDEN = re.compile(r"//.*|\(\*.*?\*\)|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
 def instances(image: Image) -> list[dict[str, str]]:
     """Path and type of each program and function block instance that has statements, rungs or charts of its own."""
     kinds = {fold(body.name) for body in image.bodies}
-    shown = (place for place in every_instance(image.symbols, MOST_ELEMENTS) if "$" not in place.name)
-    return [{"path": place.name, "pou": place.type.name} for place in islice(shown, MOST_INSTANCES) if fold(place.type.name) in kinds]
+    found = (place for place in every_instance(image.symbols, MOST_ELEMENTS) if "$" not in place.name)
+    first = islice(found, MOST_INSTANCES)
+    return [{"path": place.name, "pou": place.type.name} for place in first if fold(place.type.name) in kinds]
 
 
 def source_of(image: Image, areas: Any, texts: Mapping[str, str], instance: str) -> Generator[None, None, dict[str, Any]]:

@@ -179,7 +179,8 @@ PROGRAM Main VAR o : Out; i : In; grid : ARRAY[1..2, 1..2] OF In; k : INT; END_V
         ("Main", "Main"), ("Main.o", "Out"), ("Main.i", "In"), ("Main.o.a", "In"), ("Main.o.t", "TON"), ("Main.grid[1, 1]", "In"),
         ("Main.grid[1, 2]", "In"), ("Main.grid[2, 1]", "In"), ("Main.grid[2, 2]", "In"), ("Main.o.b[1]", "In"),
         ("Main.o.b[2]", "In")]  # fmt: skip
-    assert [row["path"] for row in found[11:]] == [f"Main.o.w[{number}]" for number in range(100)], "of an array the first hundred"
+    first = [f"Main.o.w[{number}]" for number in range(100)]
+    assert [row["path"] for row in found[11:]] == first, "of an array the first hundred"
     assert found == page.done("hello", version=1)["plcs"][0]["instances"]
 
 
