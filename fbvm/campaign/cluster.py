@@ -108,7 +108,6 @@ class Cluster(Generic[Task, Result]):
 
     def __init__(self, bench: Workable[Task, Result | Late | Crashed], address: str, jobs: int) -> None:
         self._bench, self._address, self._jobs = bench, address, jobs
-        self._stack = ExitStack()
         self.count = jobs
         """How many tasks are done at once: the threads of all workers that there were in the beginning."""
 

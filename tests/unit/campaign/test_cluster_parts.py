@@ -160,7 +160,7 @@ def test_each_thread_has_four_tasks_at_a_time_and_the_next_ones_come_with_result
         sent.append((given, named))
         return Future(f"key {len(sent)}", given)
 
-    executor: Any = cluster.Cluster(SimpleNamespace(mark="m"), cluster.LOCAL, 2)  # type: ignore[arg-type]
+    executor: Any = cluster.Cluster(SimpleNamespace(mark="m"), cluster.LOCAL, 2)
     executor._client = SimpleNamespace(submit=submit, loop="the loop")
     monkeypatch.setattr(cluster, "as_completed", completed)
     found = []
@@ -190,7 +190,7 @@ def test_a_cluster_is_as_large_as_its_threads_and_left_when_it_cannot_be_used(mo
         raise OSError("gone")
 
     monkeypatch.setattr(cluster, "connected", connected)
-    executor = cluster.Cluster(SimpleNamespace(mark="m"), "tcp://h:1", 5)  # type: ignore[arg-type]
+    executor = cluster.Cluster(SimpleNamespace(mark="m"), "tcp://h:1", 5)
     assert executor.count == 5
     with pytest.raises(OSError, match="gone"), executor:
         raise AssertionError("it was used")
