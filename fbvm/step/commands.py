@@ -182,13 +182,13 @@ class Commands:
             yield f"{rest} was not reached in {scans} scans"
 
     def _back(self, rest: str) -> Iterator[str]:
-        if rest == "scan":
+        if rest.lower() == "scan":
             self.session.back_scan()
         elif not rest or rest.isdecimal():
             for _ in range(_count(rest)):
                 self.session.back()
         else:
-            if rest == "run":
+            if rest.lower() == "run":
                 if not self.breakpoints:
                     raise CommandError("set breakpoints first, or say where to: a line or a condition")
                 reached = self._moved(self.debugger.reverse())
@@ -281,7 +281,7 @@ class Commands:
 
     def _power(self, rest: str) -> None:
         self._between()
-        if rest not in ("", "cold"):
+        if rest.lower() not in ("", "cold"):
             raise CommandError("power, or power cold")
         self.session.act(Plc.cold_start if rest else Plc.warm_start)
 
@@ -330,10 +330,11 @@ class Commands:
             raise ExpectationError(f"{rest} does not hold in {self.report.place()}")
 
     def _help(self, rest: str) -> Iterator[str]:
-        if rest and rest not in COMMANDS_BY_WORD:
+        asked = COMMANDS_BY_WORD.get(rest.lower())
+        if rest and not asked:
             raise CommandError(f"{rest!r} is no command{_near(rest)}")
         for command in COMMANDS:
-            if not rest or COMMANDS_BY_WORD[rest] is command:
+            if asked in (None, command):
                 short = f"{command.short:<2}" if command.short else "  "
                 yield f"  {short} {command.usage:<32} {command.help}"
         if not rest:
@@ -364,7 +365,7 @@ class Commands:
 def completed(session: Stepping, takes: str, word: str, words: Mapping[str, object] | list[str]) -> list[str]:
     """Completions of a word: paths of the program, or for `help` names of commands."""
     if takes == "command":
-        return [each for each in words if each.startswith(word)]
+        return [each for each in words if each.startswith(word.lower())]
     if takes not in ("place", "line"):
         return []
     front, dot, last = word.rpartition(".")
