@@ -99,10 +99,12 @@ def test_words_of_units_in_a_file_are_told_and_not_set(tmp_path: Path, monkeypat
     assert image is not None
     file = tmp_path / "memory.json"
     file.touch()
-    monkeypatch.setattr(serve.memory_images, "load", lambda memory, path: {"CIO": range(1500, 1525), "D": range(30000, 30001)})
+    monkeypatch.setattr(serve.memory_images, "load", lambda memory, path: {
+        "CIO": range(1500, 1525), "W": range(7, 9), "D": range(30000, 30001)})
     serve._load(Plc(image), file)
     assert capsys.readouterr().err == (
         f"{file}: CIO 1500 to 1524: not set, since these words belong to units\n"
+        f"{file}: W 7 to 8: not set, since these words belong to units\n"
         f"{file}: D 30000: not set, since these words belong to units\n")
     for error, said in ((OSError(13, "Permission denied"), f"{file} cannot be read: permission denied"),
                         (serve.memory_images.ImageError("no image"), "no image")):
