@@ -136,10 +136,11 @@ def _class(learners: Path, out: Path) -> None:
         raise click.UsageError(f"{named(out)} lies among the learners of {named(learners)}; choose another --report")
     with writing(out):
         results = check_class(learners, out)
-        page = out / "report.html"
-        write_file(page, report(results, lessons(), out))
     if not results:
         raise click.UsageError(f"{named(learners)} holds no folders of learners")
+    page = out / "report.html"
+    with writing(page):
+        write_file(page, report(results, lessons(), out))
     for line in summary(results, lessons()):
         say(line)
     say(f"written to {page}")

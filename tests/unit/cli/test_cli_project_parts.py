@@ -140,7 +140,10 @@ def test_a_class_is_reported(counter: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("fbvm.testing.course.lessons.check_class", lambda learners, out: (out.mkdir(exist_ok=True), results)[1])
     monkeypatch.setattr("fbvm.testing.course.class_report.report", lambda results, lessons, out: f"{len(results)} learners")
     monkeypatch.setattr("fbvm.testing.course.class_report.summary", lambda results, lessons: ["learner 1", "anna ok"])
+    Path("out").mkdir()
+    Path("out/report.html").write_text("of another class", encoding="utf-8")
     assert "class holds no folders of learners" in learned("--class", "class", "--report", "out")[1]
+    assert Path("out/report.html").read_text(encoding="utf-8") == "of another class"
     results["anna"] = {}
     assert learned("--class", "class", "--report", "out") == (0, "learner 1\nanna ok\nwritten to out/report.html\n")
     assert Path("out/report.html").read_text() == "1 learners"
