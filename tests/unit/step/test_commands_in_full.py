@@ -92,6 +92,12 @@ def test_where_a_move_ends_and_what_it_says(lines: str, printed: list[str], stan
     assert ([said(made, line) for line in lines.split("|")][-1], place(made)) == (printed, stands)
 
 
+@each_of("ahead_ms, scans", [(5, 1), (15, 1), (20, 2), (39, 3)])
+def test_a_run_looks_through_one_scan_at_least(ahead_ms: int, scans: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "LOOK_AHEAD_NS", ahead_ms * MS)
+    assert said(commands(), "run Main.N = -3") == [f"Main.N = -3 was not reached in {scans} scans"]
+
+
 def test_a_refused_move_is_what_an_empty_line_does_again() -> None:
     made = commands()
     refused = ["! 'x' is no number of steps"]
