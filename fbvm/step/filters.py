@@ -13,7 +13,7 @@ from fbvm.watch.paths import Place
 from fbvm.watch.values import show_time
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu, Splitter, decode_reply
-from fbvm.wire.tap import DATA, TapEvent
+from fbvm.wire.tap import DATA, TapEvent, TapKind
 
 RESPONSE_CODE = "Response Code"
 """How units call the word of their response code."""
@@ -106,10 +106,13 @@ class BetweenScans:
         return True
 
     def _tap(self, now_ns: int, unit: str, event: TapEvent) -> None:
+        if event.kind is TapKind.OPEN:  # ports come again: what an earlier connection has left is not this one's
+            for out in (True, False):
+                self._streams.pop((event.local, event.remote, out), None)
         if event.kind is not DATA or event.mirrored and not event.out:  # its other end has told of it
             return
         stream = self._streams.setdefault((event.local, event.remote, event.out), Splitter())
-        for frame in stream.feed(event.data) if not stream.broken else ():
+        for frame in stream.feed(event.data):
             if isinstance(frame, Adu) and frame.pdu and frame.pdu[0] & 0x80:
                 reply = decode_reply(frame.pdu)
                 codes = self.wanted["modbus"]
