@@ -162,8 +162,10 @@ def test_a_stop_tells_the_place_the_source_what_changed_and_what_is_watched() ->
     assert list(made.run("scan")) == [*stop, "  Main.N: 0 -> 1", "  Main.R: 0 -> -12", "  Main.T.A: 0 -> 1", "  Main.T.Q: 0 -> 2",
                                       "Main.R = -12"]
     assert list(made.run("step"))[-4:] == ["  Main.N: 1 -> 2", "Main.N = 2", "D7 = 0 (16#0000)", "Main.R = -12"]
+    list(made.run("watch main.r D7"))
+    assert [(each.name, each.condition is None) for each in made.watches] == [("Main.N", False), ("main.r", True), ("D7", True)]
     list(made.run("unwatch MAIN.N"))
-    assert [each.name for each in made.watches] == ["D7", "Main.R"]
+    assert [each.name for each in made.watches] == ["main.r", "D7"]
     list(made.run("unwatch"))
     assert made.watches == []
 
