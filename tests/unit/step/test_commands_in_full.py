@@ -225,6 +225,16 @@ def test_how_a_line_may_go_on(text: str, wanted: list[str]) -> None:
     assert commands().completions(text) == wanted
 
 
+def test_a_rung_may_have_the_number_0() -> None:
+    text = "PROGRAM Main\nLADDER\nRUNG 0\nLD 0.00\nOUT 1.00\nRUNG 1\nLD 0.01\nOUT 1.01\nEND_LADDER\nEND_PROGRAM\n"
+    image = compile_text(text).image
+    assert image is not None
+    session = Session.of(lambda: Plc(image))
+    made = Commands(session, StopReport(session, {"text.st": text}))
+    assert [said(made, f"rung {number}")[0].split()[:2] for number in (0, 1)] == [["RUNG", "0"], ["RUNG", "1"]]
+    assert said(made, "rung 2") == ["! there is no rung 2; rungs are 0 to 1"]
+
+
 @each_of("text, least, wanted", [("", 1, 1), ("", 0, 1), ("1", 1, 1), ("0", 0, 0), ("12", 1, 12), ("0", 1, None), ("-1", 0, None),
                                  ("+1", 1, None), ("1.0", 1, None), ("1_0", 1, None)])
 def test_how_many_is_a_number_in_digits(text: str, least: int, wanted: int | None) -> None:
