@@ -225,6 +225,7 @@ def test_how_a_line_may_go_on(text: str, wanted: list[str]) -> None:
     assert commands().completions(text) == wanted
 
 
+@pytest.mark.slow
 def test_a_rung_may_have_the_number_0() -> None:
     text = "PROGRAM Main\nLADDER\nRUNG 0\nLD 0.00\nOUT 1.00\nRUNG 1\nLD 0.01\nOUT 1.01\nEND_LADDER\nEND_PROGRAM\n"
     image = compile_text(text).image

@@ -171,18 +171,19 @@ def results() -> dict[str, dict[str, Result]]:
     wrong = [WrongAnswer("true or false?", "<no>", "true"), WrongAnswer("which?", "4", "5")]
     return {"anna": {"01-late": Result(True, 2, 2),
                      "02-edge": Result(True, 3, 4, [("test_program[2]", "AssertionError: Lamp is OFF <b>")], wrong)},
-            "bert b": {"02-edge": Result(False, 4, 4, [("test_prediction", "assert 1 == 2")])}, "cleo": {}}  # fmt: skip
+            "bert b": {"01-late": Result(), "02-edge": Result(False, 4, 4, [("test_prediction", "assert 1 == 2")])},
+            "cleo": {}}  # fmt: skip
 
 
 SUMMARY = """\
            1     2  done
 anna      ok   4/5     1
-bert b     -   4/5     0
+bert b   0/1   4/5     0
 cleo       -     -     0
 """
 ROWS = """\
 <tr><th>anna<td class="good">✓ 2/2<td class="bad"><a href="#anna-2">✓ 3/4</a><td>1
-<tr><th>bert b<td class="none">-<td class="bad"><a href="#bert%20b-2">✗ 4/4</a><td>0
+<tr><th>bert b<td class="bad">✗ 0/0<td class="bad"><a href="#bert%20b-2">✗ 4/4</a><td>0
 <tr><th>cleo<td class="none">-<td class="none">-<td>0
 """
 WRONG = """\
