@@ -225,6 +225,17 @@ def test_how_a_line_may_go_on(text: str, wanted: list[str]) -> None:
     assert commands().completions(text) == wanted
 
 
+@each_of("line, kept", [("power", 3), ("power cold", 0), ("power COLD", 0)])
+def test_what_is_retained_is_forgotten_by_a_cold_start_only(line: str, kept: int) -> None:
+    text = "PROGRAM Main\nVAR n : INT; END_VAR\nVAR RETAIN k : INT; END_VAR\n    n := n + 1; k := k + 1;\nEND_PROGRAM\n"
+    image = compile_text(text).image
+    assert image is not None
+    session = Session.of(lambda: Plc(image))
+    made = Commands(session, StopReport(session, {"text.st": text}))
+    assert said(made, "scan 3") == said(made, line) == []
+    assert [session.read(f"Main.{name}") for name in ("n", "k")] == [0, kept]
+
+
 @pytest.mark.slow
 def test_a_rung_may_have_the_number_0() -> None:
     text = "PROGRAM Main\nLADDER\nRUNG 0\nLD 0.00\nOUT 1.00\nRUNG 1\nLD 0.01\nOUT 1.01\nEND_LADDER\nEND_PROGRAM\n"
