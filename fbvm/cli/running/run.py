@@ -313,7 +313,7 @@ def _check_usage(
     *, live: bool, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
     max_ns: int | None, debug_port: int | None, **others: Any,
 ) -> None:  # fmt: skip
-    if live and (both := [said for name, said in NEVER_LIVE.items() if {"debug_port": debug_port, **others}.get(name)]):
+    if live and (both := [said for name, said in NEVER_LIVE.items() if {"debug_port": debug_port is not None, **others}.get(name)]):
         raise click.UsageError(f"--live shows it on the page: leave out {', '.join(both)}")
     if debug_port is not None and (both := [said for name, said in NEVER_WITH_DEBUG.items() if others.get(name)]):
         raise click.UsageError(f"--debug looks into scans itself: leave out {', '.join(both)}")
