@@ -145,7 +145,7 @@ def test_of_several_things_in_a_scan_the_first_filter_tells() -> None:
 
 @each_of("delay_ms, wanted, scans, late", [
     (9.9, [], 5, False), (10, [], 5, True), (4.9, [5], 5, False), (5, [5], 5, True), (5, [7, 5, 9], 5, True), (5, [], 5, False),
-    (10, [], 1, False), (10, [], 2, True), (0, [0], 5, False), (0.1, [0], 5, True), (-3, [0], 5, False)])
+    (10, [], 1, False), (10, [], 2, True), (0, [0], 5, False), (0.1, [0], 5, True), (1e-6, [0], 5, True), (-3, [0], 5, False)])
 def test_a_scan_is_late_from_the_delay_on_that_is_asked_for(delay_ms: float, wanted: list[int], scans: int, late: bool) -> None:
     made, filters = plc(), BetweenScans({"late": frozenset(wanted)})
     filters.attached(made)
