@@ -55,6 +55,7 @@ def event(data: bytes = BAD, *, kind: TapKind = TapKind.DATA, remote: Peer = SER
     ([event(b"\0\1\0\0\xff\xff"), event()], [], ""),
     ([event(b"\0\1\0\0\xff\xff"), event(b"", kind=TapKind.OPEN), event()], [], SAID),
     ([event(BAD[:4]), event(b"", kind=TapKind.OPEN, out=True), event()], [], SAID),
+    ([event(BAD[:4], out=True), event(b"", kind=TapKind.OPEN), event(out=True)], [], SAID),
     ([event(BAD[:4]), event(b"", kind=TapKind.OPEN, remote=OTHER), event(BAD[4:])], [], SAID),
 ])
 def test_exception_replies_that_pass_a_network(events: list[TapEvent], codes: list[int], said: str) -> None:
