@@ -119,7 +119,7 @@ def command(
     if project := project_argument(files):
         sys.exit(run_project(project, click.get_current_context()))
     options["net"] = net_of(options["net"], options["doors"])
-    _check_usage(**options)
+    _check_usage(as_json=as_json, **options)
     _check_endpoints(**options)
     check_outputs(options["html"])
     drawn = bool(options["rungs"])
@@ -305,7 +305,7 @@ def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, pl
 
 
 NEVER_LIVE = {"html": "--html", "rungs": "--ladder", "charts": "--sfc", "charted": "--chart", "shown": "--show", "pcap": "--pcap",
-              "debug_port": "--debug", "scan_time": "--scan-time"}  # fmt: skip
+              "debug_port": "--debug", "scan_time": "--scan-time", "as_json": "--json"}  # fmt: skip
 """Options whose results the page shows itself, by the names of their parameters."""
 
 
@@ -313,7 +313,8 @@ def _check_usage(
     *, live: bool, net: str, doors: tuple[Door, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
     max_ns: int | None, debug_port: int | None, **others: Any,
 ) -> None:  # fmt: skip
-    if live and (both := [said for name, said in NEVER_LIVE.items() if {"debug_port": debug_port is not None, **others}.get(name)]):
+    given = {**others, "debug_port": debug_port is not None}
+    if live and (both := [said for name, said in NEVER_LIVE.items() if given.get(name)]):
         raise click.UsageError(f"--live shows it on the page: leave out {', '.join(both)}")
     if debug_port is not None and (both := [said for name, said in NEVER_WITH_DEBUG.items() if others.get(name)]):
         raise click.UsageError(f"--debug looks into scans itself: leave out {', '.join(both)}")

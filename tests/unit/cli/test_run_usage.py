@@ -20,7 +20,7 @@ from fbvm.wire.link import Peer
 MS = 1_000_000
 UNIT = Peer("10.0.0.1", 502)
 NOTHING: dict[str, Any] = {
-    "live": False, "net": "loop", "doors": (), "pace": "cyclic", "debug_port": None, "scan_time": False,
+    "live": False, "net": "loop", "doors": (), "pace": "cyclic", "debug_port": None, "scan_time": False, "as_json": False,
     **dict.fromkeys(("lines", "watched", "conditions", "charted", "shown"), ()),
     **dict.fromkeys(("scans", "for_ns", "until", "max_ns", "pcap", "journal", "trace", "html", "rungs", "charts"))}  # fmt: skip
 ENDS = "say when to end by one of --scans, --for and --until; {} given (such as --for 1s)"
@@ -40,7 +40,8 @@ ENDS = "say when to end by one of --scans, --for and --until; {} given (such as 
     ({"live": True, "html": "a", "shown": ("n",)}, "--live shows it on the page: leave out --html, --show"),
     ({"live": True, "rungs": "1", "charts": "2", "charted": ("n",), "pcap": "f", "debug_port": 5, "scan_time": True},
      "--live shows it on the page: leave out --ladder, --sfc, --chart, --pcap, --debug, --scan-time"),
-    ({"live": True, "trace": "a", "lines": ("3",)}, ""),
+    ({"live": True, "as_json": True}, "--live shows it on the page: leave out --json"),
+    ({"debug_port": 0, "as_json": True}, ""), ({"live": True, "trace": "a", "lines": ("3",)}, ""),
     ({"debug_port": 5, "trace": "a", "lines": ("3",)}, "--debug looks into scans itself: leave out --trace, --break"),
     ({"debug_port": 0, "journal": "a", "html": "a", "rungs": "1", "charts": "1", "charted": ("n",), "watched": ("n",),
       "conditions": ("n",)}, "--debug looks into scans itself: leave out --journal, --html, --ladder, --sfc, --chart, --watch, "
