@@ -187,9 +187,9 @@ def _addresses(rungs: Sequence[RungText]) -> Iterator[str]:
 
 
 def _kind(address: str) -> str:
-    """The area of an address and whether it is that of a bit; "" for what is none."""
+    """The area of an address, which need not be written for CIO, and whether it is that of a bit; "" for what is none."""
     found = _ADDRESS.fullmatch(address)
-    return f"{found[1].upper()} {'bit' if found[2] else 'word'}" if found else ""
+    return f"{found[1].upper().removeprefix('CIO')} {'bit' if found[2] else 'word'}" if found else ""
 
 
 def _lettered(line: Line) -> Iterator[tuple[str, str]]:
