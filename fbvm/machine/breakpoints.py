@@ -164,8 +164,7 @@ class BreakpointRows:
 
     def condition(self, when: str, hits: str = "") -> Breakpoint:
         """Stops behind the statement that makes a condition TRUE: `n > 5 AND D100 = 0`.  Raises ValueError as `change` does."""
-        condition = self._condition(when)
-        assert condition is not None
+        condition = parse_condition(when, self._inspected.find)
         extents: list[tuple[int, int]] = [run for place in condition.places for run in _extents(place)[0]]
         row = Watchpoint(extents, test=self._test(condition), edge=True, wanted=parse_passes(hits))
         return self._put(Breakpoint("condition", when, "", hits), row)

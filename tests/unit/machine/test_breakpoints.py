@@ -227,6 +227,8 @@ def test_a_condition_that_is_none_is_refused(plc: Plc) -> None:
         plc.breakpoints.condition("D100 +")
     with pytest.raises(ConditionError):
         plc.breakpoints.line("text.st:4", when="D100")
+    with pytest.raises(ValueError, match="ends too early"):
+        plc.breakpoints.condition("")
 
 
 # --- engines agree --------------------------------------------------------------------------------------------------
