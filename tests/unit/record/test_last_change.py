@@ -88,3 +88,8 @@ def test_the_first_change_of_some_scans_is_found_by_running_to_it() -> None:
         found = last_change._first_in(recorded, places, range(start, stop))  # type: ignore[arg-type]
         assert found == scan, (places, start, stop)
     assert last_change._first_in(recorded, [w], range(12)) == 9  # type: ignore[list-item]
+    answers = iter(([b"before"], [b"behind"]))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(last_change, "_seen", lambda memory, places: next(answers))
+        found = last_change._first_in(recorded, [k], range(8, 12))  # type: ignore[list-item]
+    assert found == 11, "what a unit has changed behind the last statement is of the last scan"
