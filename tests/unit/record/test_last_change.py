@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from itertools import combinations
 from types import SimpleNamespace
 from typing import Any
@@ -93,3 +94,14 @@ def test_the_first_change_of_some_scans_is_found_by_running_to_it() -> None:
         patch.setattr(last_change, "_seen", lambda memory, places: next(answers))
         found = last_change._first_in(recorded, [k], range(8, 12))  # type: ignore[list-item]
     assert found == 11, "what a unit has changed behind the last statement is of the last scan"
+
+
+def test_of_a_bit_the_bit_is_looked_at_and_of_others_their_bytes() -> None:
+    image = compile_text(TEXT).image
+    assert image is not None
+    plc = Plc(image)
+    places: Any = [plc.find(f"Main.{name}") for name in ("k", "b", "other")]
+    assert last_change._seen(plc.memory, places) == [b"\0\0", 0, 0]
+    plc.write("Main.k", 0x0102)
+    plc.write("Main.other", True)
+    assert last_change._seen(plc.memory, places) == [(0x0102).to_bytes(2, sys.byteorder), 0, 1]
