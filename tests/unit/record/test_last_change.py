@@ -105,3 +105,10 @@ def test_of_a_bit_the_bit_is_looked_at_and_of_others_their_bytes() -> None:
     plc.write("Main.k", 0x0102)
     plc.write("Main.other", True)
     assert last_change._seen(plc.memory, places) == [(0x0102).to_bytes(2, sys.byteorder), 0, 1]
+    narrow = compile_text("PROGRAM Main VAR s, t : SINT; f, g : BOOL; END_VAR s := t; f := g; END_PROGRAM").image
+    assert narrow is not None
+    plc = Plc(narrow)
+    for name in ("t", "g"):
+        plc.write(f"Main.{name}", 1)
+    places = [plc.find("Main.s"), plc.find("Main.t"), plc.find("Main.f"), plc.find("Main.g")]
+    assert last_change._seen(plc.memory, places) == [b"\0", b"\1", b"\0", b"\1"]
