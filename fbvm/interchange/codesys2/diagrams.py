@@ -148,7 +148,7 @@ class _Reader:
         return self._assigned()
 
     def _negated(self, value: Value) -> Value:
-        return Value("not", parts=(value,)) if self._signed() else value
+        return Value("not", parts=(value,), at=value.at) if self._signed() else value
 
     def _outputs(self) -> tuple[Output, ...]:
         return tuple(self._output() for _ in range(self._count("_OUTPUTS")))
@@ -165,7 +165,7 @@ class _Reader:
         at, kind = self.at, self.word.removeprefix("_").lower()
         if self.word == "_EMPTY":
             self._next()
-            return Value("empty")
+            return Value("empty", at=at)
         self._expect("_OPERAND", "_LD_CONTACT", "_LD_AND", "_LD_OR", "_OPERATOR", "_FUNCTION", "_FUNCTIONBLOCK")
         if kind == "operand":
             negated = self._signed()

@@ -12,12 +12,15 @@ from collections.abc import Callable, Sequence
 from fbvm.interchange.codesys2.diagrams import Network, Output, Unreadable
 from fbvm.interchange.codesys2.diagrams import Value as Node
 from fbvm.interchange.plcopen.read.values import ATOM, CHAINED, FALSE, INFIX, TRUE, Value, both, either, joined, negation, written
+from fbvm.syntax.ladder.operands import OperandError, Operands
 from fbvm.syntax.ladder.text import instruction_text
+from fbvm.syntax.tree import Index, Member, NameRef
 
 Pins = Callable[[str], tuple[Sequence[str], Sequence[str]] | None]
 """The inputs and outputs of a type of function blocks; None if nothing declares it."""
 _OPERAND = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*|\[\d+\])*")
-"""What a contact or coil of a rung can be; others, such as addresses and bits of words, stand in statements."""
+"""What a contact or coil of a rung can look like; others, such as addresses and bits of words, stand in statements."""
+_TEMPORARY = re.compile(r"TR\d+", re.IGNORECASE)
 _COILS = {(False, False): "OUT", (True, False): "OUTNOT", (False, True): "SET", (True, True): "RSET"}
 
 
@@ -46,7 +49,7 @@ class Writer:
                 value = Value(name)
             self._boxes(value, network.boxes)
         self._assign(value, network.outputs)
-        if not network.boxes and not network.outputs and network.value.kind not in ("functionblock", "empty"):
+        if not network.boxes and not network.outputs and network.value.kind != "empty" and len(self.lines) == len(notes):
             raise Unreadable(network.start, "nothing comes of a network")
         return self.lines
 
@@ -61,15 +64,16 @@ class Writer:
         self.lines += inner if power.is_true else [f"IF {power.text} THEN", *inner, "END_IF;"]
 
     def _assign(self, value: Value, outputs: Sequence[Output]) -> None:
-        """Give a value to all outputs: plain ones first, each of which then holds it."""
-        for output in sorted((one for one in outputs if one.name), key=lambda one: one.stores):
-            if output.stores:
-                stored = f"{output.name} := {'FALSE' if output.negated else 'TRUE'};"
-                self.lines.append(stored if value.is_true else f"IF {value.text} THEN {stored} END_IF;")
-                continue
-            given = negation(value) if output.negated else value
-            self.lines.append(f"{output.name} := {given.text};")
-            value = negation(Value(output.name)) if output.negated else Value(output.name)
+        """Give a value to all outputs: plain ones first, each of which then holds it.  Those that store do so behind one
+        condition, which may read what they change."""
+        stored = [f"{one.name} := {'FALSE' if one.negated else 'TRUE'};" for one in outputs if one.name and one.stores]
+        for output in outputs:
+            if output.name and not output.stores:
+                given = negation(value) if output.negated else value
+                self.lines.append(f"{output.name} := {given.text};")
+                value = negation(Value(output.name)) if output.negated else Value(output.name)
+        if stored:
+            self.lines += stored if value.is_true else [f"IF {value.text} THEN {' '.join(stored)} END_IF;"]
 
     # --- values ---
 
@@ -148,7 +152,7 @@ def _rung(network: Network) -> list[str]:
     """The steps of a network of contacts and coils; none if it has something else."""
     if network.boxes or not network.outputs or not _is_plain(network.value):
         return []
-    if any(not _OPERAND.fullmatch(output.name) for output in network.outputs):
+    if not all(_is_bit(output.name) for output in network.outputs):
         return []
     coils = (instruction_text(_COILS[one.negated, one.stores], one.name) for one in network.outputs)
     return [*_steps(network.value, "LD"), *coils]
@@ -156,8 +160,18 @@ def _rung(network: Network) -> list[str]:
 
 def _is_plain(node: Node) -> bool:
     if node.kind == "ld_contact":
-        return _OPERAND.fullmatch(node.text) is not None and node.text.upper() not in ("TRUE", "FALSE")
+        return _is_bit(node.text)
     return node.kind in ("ld_and", "ld_or") and not node.negated and bool(node.parts) and all(map(_is_plain, node.parts))
+
+
+def _is_bit(text: str) -> bool:
+    """Whether a rung can name it, which reads names such as T1, D5 and P_On as its own."""
+    if not _OPERAND.fullmatch(text) or _TEMPORARY.fullmatch(text) or text.upper() in ("TRUE", "FALSE"):
+        return False
+    try:
+        return isinstance(Operands().expression(text, "b", 0, 0), (NameRef, Member, Index))
+    except OperandError:
+        return False
 
 
 def _steps(node: Node, how: str) -> list[str]:

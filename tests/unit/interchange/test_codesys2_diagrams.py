@@ -38,7 +38,8 @@ def test_contacts_and_coils_are_rungs() -> None:
     text = export(rung(row("AND", row("OR", contact("a"), contact("p")), contact("b", "_NEGATIV")), "p", "-q"),
                   rung(contact("c"), "set m.0", "reset m.1"))
     source, _ = as_source(Source("a.exp", text))
-    assert source.text.count("RUNG") == 1 and "RUNG 1 Says 0" in source.text and "IF c THEN m.0 := TRUE; END_IF;" in source.text
+    assert source.text.count("RUNG") == 1 and "RUNG 1 Says 0" in source.text
+    assert "IF c THEN m.0 := TRUE; m.1 := FALSE; END_IF;" in source.text
     assert text.split("\n")[source.text[:source.text.index("LADDER")].count("\n")] == "_NETWORK"
     for rows in run(text, "p q m", "", "a", "", "b", "c"):
         assert rows == [[False, True, 0], [True, False, 0], [True, False, 0], [False, True, 0], [False, True, 1]]
@@ -65,6 +66,12 @@ def test_boxes_with_en_are_executed_while_there_is_power_and_coils_get_it_as_it_
         assert rows == [[1, True, False], [1, False, False], [2, True, True]]
 
 
+def test_outputs_that_store_a_value_do_not_change_it_for_each_other() -> None:
+    text = export(assigned(box("AND", operand("a"), box("NOT", operand("p"))), "set p", "set q", "reset c"), language="FBD")
+    for rows in run(text, "p q c", "c", "a c", "a c"):
+        assert rows == [[False, False, True], [True, True, False], [True, True, True]]
+
+
 def test_values_of_fbd_are_statements() -> None:
     double = instance("d", "Double", (operand("n"), operand("b")), "q")
     text = export(assigned(box("ADD", operand("n"), operand("3"), box("MUL", operand("n"), operand("2"))), "n", "m"),
@@ -83,6 +90,10 @@ def test_values_of_fbd_are_statements() -> None:
     (export(assigned(instance("x", "Other", ()), "p"), language="FBD"), "nothing in the file declares Other", "_FUNCTIONBLOCK"),
     (export(assigned(box("ADD", operand("n"), operand("1"), enabled="_ENABLED"), "n"), language="FBD"),
      "a box with EN stands outside of ENABLELIST", "_OPERATOR"),
+    (export(assigned(box("ADD", operand("n"), "_EMPTY"), "n"), language="FBD"), "an input of a function has no operand",
+     "_EMPTY"),
+    (export(rung(contact("a"), boxes=(assigned(box("ABS", operand("n"), enabled="_ENABLED"), "n").replace(
+        "_POSITIV _OUTPUTS", "_NEGATIV _OUTPUTS"),))), "a box without EN stands among those with EN", "_OPERATOR"),
     (export("", language="CFC"), "only ladder and FBD are read", "_CFC_BODY"),
     (export(rung(contact("a"), "p")).replace("_NETWORKS : 1", "_NETWORKS : 2"), "it ends too early", "END_PROGRAM"),
 ])

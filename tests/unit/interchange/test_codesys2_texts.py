@@ -24,7 +24,7 @@ NETWORKS = {
     (assigned(box("SUB", operand("n"), operand("m"), operand("1")), "k"),): "k := SUB(n, m, 1);",
     (assigned(box("GT", operand("n"), operand("m"), sign="_NEGATIV"), "p"),): "p := NOT (n > m);",
     (assigned(operand("TRUE"), "p", "set q", "reset c"),):
-        "p := TRUE; IF p THEN q := TRUE; END_IF; IF p THEN c := FALSE; END_IF;",
+        "p := TRUE; IF p THEN q := TRUE; c := FALSE; END_IF;",
     (assigned(operand("TRUE"), "set q", "reset c"),): "q := TRUE; c := FALSE;",
     (assigned(operand("a"), "p", "-q", "set c"),): "p := a; q := NOT p; IF NOT q THEN c := TRUE; END_IF;",
     (assigned(operand("FALSE"), "p"),): "p := FALSE;",
@@ -52,6 +52,9 @@ NETWORKS = {
     (rung(row("AND", contact("a"), instance("t", "TON", ("_EMPTY", operand("t#1s")))), "p"),):
         "t(IN := a, PT := t#1s); p := t.Q;",
     (assigned(instance("t", "TON", ("_EMPTY", operand("t#1s"))), "p"),): "t(IN := TRUE, PT := t#1s); p := t.Q;",
+    (rung(row("AND", contact("a"), instance("t", "TON", ("_EMPTY", operand("t#1s"))))),): "t(IN := a, PT := t#1s);",
+    (rung(row("OR", contact("a"), instance("t", "TON", ("_EMPTY",)))),): "t(IN := TRUE);",
+    (assigned(operand("%IX0.1"), "set q", "_EMPTY", "p", "reset c"),): "p := %IX0.1; IF p THEN q := TRUE; c := FALSE; END_IF;",
     (instance("d", "Double", (operand("n"),)).join(["_ASSIGN ", " _EXPRESSION _POSITIV _OUTPUTS:0 "]),): "d(x := n);",
 }  # fmt: skip
 
@@ -67,6 +70,17 @@ def statements(*networks: str) -> str:
 @each_of("networks", NETWORKS, ids=lambda networks: NETWORKS[networks])
 def test_a_network_becomes_rungs_or_statements(networks: tuple[str, ...]) -> None:
     assert statements(*networks) == NETWORKS[networks]
+
+
+@each_of("name", ["A1", "D5", "T1", "c5", "H3", "CIO1", "DR0", "TR0", "tr15", "P_On", "%IX0.0", "n.0", "list[i]", "a.b[1].2"])
+def test_a_name_that_a_rung_reads_otherwise_stands_in_statements(name: str) -> None:
+    assert statements(rung(contact(name), "p")) == f"p := {name};" and statements(rung(contact("a"), name)) == f"{name} := a;"
+    assert statements(rung(row("AND", contact("a"), contact(name, "_NEGATIV")), "p")) == f"p := a AND NOT {name};"
+
+
+@each_of("name", ["A", "TR", "TRUE1", "P_On_1", "t.Q", "list[3].on", "D5_on"])
+def test_other_names_stand_in_rungs(name: str) -> None:
+    assert statements(rung(contact(name), name)) == f"LADDER RUNG 1 Says 0 LD {name} OUT {name} END_LADDER"
 
 
 REFUSED = {
