@@ -43,6 +43,7 @@ Drawn = dict[tuple[object, ...], tuple[str, str]]
 _PATH = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[\s*\d+\s*\])*")
 _HIDDEN = re.compile(r"//.*|\(\*.*?\*\)|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
 """Comments and texts on one line, in which no variable stands."""
+_END = re.compile(r"\bEND_(?:PROGRAM|FUNCTION_BLOCK|FUNCTION|METHOD)\b", re.IGNORECASE)
 
 
 def instances(image: Image) -> list[dict[str, str]]:
@@ -76,8 +77,7 @@ def source_of(image: Image, areas: Any, texts: Mapping[str, str], instance: str)
     numbers = [line for of, line in sites if of == file]
     first = yield from _begin(rows, min(numbers), place.type.name)
     last = min(len(rows), max(numbers) + 3)
-    end = next((at for at in range(max(0, last - 4), len(rows))
-                if re.match(r"\s*END_(PROGRAM|FUNCTION_BLOCK|FUNCTION|METHOD)\b", rows[at], re.I)), last - 1)  # fmt: skip
+    end = next((at for at in range(max(numbers) - 1, len(rows)) if _END.search(_HIDDEN.sub(" ", rows[at]))), last - 1)
     lines = []
     for row in rows[first - 1 : end + 1]:
         lines.append({"text": row, "names": list(_names_on(row, image.symbols, areas, instance))})
@@ -107,8 +107,8 @@ def _names_on(row: str, symbols: Mapping[str, Field], areas: Any, instance: str)
                 place = find(symbols, areas, path)
             except (UnknownPlace, ValueError):
                 continue
-            if isinstance(place, Place) and is_single(place) and place.name not in seen and len(seen) < MOST_ON_LINE:
-                seen.add(place.name)
+            if isinstance(place, Place) and is_single(place) and place.name.upper() not in seen and len(seen) < MOST_ON_LINE:
+                seen.add(place.name.upper())
                 yield path
             break
 
