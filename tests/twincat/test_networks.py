@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from archives import END, LEADS, NOTHING, assign, box, drawn, leaf, network, operand, parallel, pou, wire
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
@@ -21,8 +22,8 @@ def logic(kind: str, *inputs: str, bits: tuple[int, ...] = ()) -> str:
     return box(kind, inputs, kind.title(), input_bits=bits)
 
 
-def timer(given: str, *targets: str) -> str:
-    return box("TON", [given, leaf("pt", "TIME")], "FunctionBlock", instance="t", names=("IN PT", "BOOL TIME"),
+def timer(given: str, *targets: str, bits: int = 0) -> str:
+    return box("TON", [given, leaf("pt", "TIME")], "FunctionBlock", instance="t", names=("IN PT", "BOOL TIME"), bits=bits,
                outs=("Q ET", "BOOL TIME"), targets=targets or (LEADS, operand("", "TIME")))
 
 
@@ -88,6 +89,51 @@ FORMS = {
     "a method": ("Fbd", [network(box("f.Reset", [leaf("n", "INT")], "Method", names=("to", "INT"), outs=("Reset", "BOOL"),
                                      targets=(operand("p"),)))],
                  ["// network 1", "p := f.Reset(to := n);"]),
+    "a negated box": ("Fbd", [network(assign(box("OR", [leaf("a"), leaf("b")], "Or", bits=NEGATED), operand("p")))],
+                      ["// network 1", "p := NOT (a OR b);"]),
+    "a negated box in ladder": ("Ld", [network(assign(box("AND", [leaf("a"), leaf("b")], "And", bits=NEGATED), operand("p")))],
+                                ["// network 1", "p := NOT (a AND b);"]),
+    "the output of a block that is negated leads on": (
+        "Fbd", [network(assign(timer(leaf("a"), LEADS, operand("pt", "TIME"), bits=NEGATED), operand("p")))],
+        ["// network 1", "t(IN := a, PT := pt);", "pt := t.ET;", "p := NOT t.Q;"]),
+    "of outputs of which none leads on the first is negated": (
+        "Fbd", [network(timer(leaf("a"), operand("p"), operand("pt", "TIME"), bits=NEGATED))],
+        ["// network 1", "t(IN := a, PT := pt);", "p := NOT t.Q;", "pt := t.ET;"]),
+    "the second output leads on": ("Fbd", [network(assign(timer(leaf("a"), operand("p"), LEADS), operand("pt", "TIME")))],
+                                   ["// network 1", "t(IN := a, PT := pt);", "p := t.Q;", "pt := t.ET;"]),
+    "a function whose output is not listed": (
+        "Fbd", [network(assign(box("ABS", [leaf("n", "INT")], "Abs", outs=("", ""), targets=()), operand("m", "INT")))],
+        ["// network 1", "m := ABS(n);"]),
+    "a block in a row of contacts": ("Ld", [network(assign(logic("AND", leaf("a"), timer(leaf("b")), leaf("c")), operand("p")))],
+                                     ["// network 1", "t(IN := b, PT := pt);", "p := a AND t.Q AND c;"]),
+    "a coil in a row of contacts": (
+        "Ld", [network(assign(logic("AND", leaf("a"), assign(leaf("b"), operand("p")), leaf("c")), operand("q")))],
+        ["LADDER", "RUNG 1", "LD a", "AND b", "OUT p", "AND c", "OUT q", "END_LADDER"]),
+    "inputs of a block without a value": (
+        "Fbd", [network(timer(leaf(""), operand("p"), NOTHING).replace(leaf("pt", "TIME"), NOTHING))],
+        ["// network 1", "t();", "p := t.Q;"]),
+    "words as bits": ("Ld", [network(assign(box("AND", [leaf("n", "INT"), leaf("m", "INT")], "And"), operand("k", "INT")))],
+                      ["// network 1", "k := n AND m;"]),
+    "inputs without names": (
+        "Fbd", [network(box("SUB", [leaf("n", "INT"), leaf("m", "INT")], "Sub", targets=(operand("k", "INT"),)))],
+        ["// network 1", "k := n - m;"]),
+    "the size of a variable": ("Fbd", [network(assign(box("SIZEOF", [leaf("n", "INT")], "Sizeof"), operand("k", "INT")))],
+                               ["// network 1", "k := SIZEOF(IN := n);"]),
+    "the address of a variable": ("Fbd", [network(assign(box("Adr", [leaf("n", "INT")], "Adr"), operand("k", "INT")))],
+                                  ["// network 1", "k := Adr(IN := n);"]),
+    "a title and a comment": (
+        "Ld", [network(assign(leaf("a"), operand("p", bits=FALLING)), comment="two").replace(
+            '<n n="Label"', '<v n="Title">" one "</v><n n="Label"')],
+        ["LADDER", "RUNG 1 one", "'two", "LD a", "DIFD p", "END_LADDER"]),
+    "negated jump and return": (
+        "Ld", [network(assign(leaf("a"), operand("on", bits=JUMP | NEGATED))),
+               network(assign(leaf("b"), operand("", bits=RETURN | NEGATED))), network(label=" on ")],
+        ["// network 1", "IF NOT a THEN JMP on; END_IF;", "// network 2", "IF NOT b THEN RETURN; END_IF;", "// network 3",
+         "on:"]),
+    "a jump in FBD": ("Fbd", [network(assign(END, operand("on", bits=JUMP))), network(assign(END, operand("", bits=RETURN))),
+                              network(label="on")],
+                      ["// network 1", "JMP on;", "// network 2", "RETURN;", "// network 3", "on:"]),
+    "a network as deep as one may be": ("Ld", [network("<o n='Input' t='BoxTreeTerminator'>" * 150 + "</o>" * 150)], []),
 }  # fmt: skip
 
 
@@ -116,8 +162,26 @@ REFUSED = {
                                                           operand("p")),
     "an output of the box T has no name": box("T", [], "FunctionBlock", instance="t", outs=("", ""), targets=(operand("p"),)),
     "a box has Structured Text in it": box("EXECUTE", [], "Execute").replace('Snippet">false', 'Snippet">true'),
-    "the network is deeper than 150": "<o n='Input' t='BoxTreeTerminator'>" * 152 + "</o>" * 152,
+    "the network is deeper than 150": "<o n='Input' t='BoxTreeTerminator'>" * 151 + "</o>" * 151,
 }  # fmt: skip
+
+
+NOTHING_READ = {
+    "nothing is assigned": network(assign(END, operand("p"))),
+    "an operand is missing": network(assign(leaf("a"), operand("???"))),
+    "the network is an instruction list": network().replace('<l2 n="ILLines" />', '<l2 n="ILLines"><o /></l2>'),
+    "the box TON has no instance": network(box("TON", [], "FunctionBlock")),
+}  # fmt: skip
+
+
+@each_of("why", NOTHING_READ)
+def test_what_is_not_understood_in_fbd_is_refused(why: str) -> None:
+    assert made("Fbd", NOTHING_READ[why]) == ([], [f"a network of Main is not read: {why}"])
+
+
+def test_a_branch_without_a_value_is_a_wire_past_the_others() -> None:
+    lines, said = made("Ld", network(assign(logic("OR", leaf("a"), END), operand("p"))))
+    assert (lines, said) == (["// network 1", "p := TRUE;"], ["nothing comes of a: it reaches no output"])
 
 
 @pytest.mark.parametrize("why", REFUSED)

@@ -47,7 +47,7 @@ _LOGIC = ("BOOL", "BIT", "")
 _SERIES = ("AND", "OR")
 _CALLS = ("functionblock", "method", "function", "program", "action")
 _MORE = ("ADR", "SIZEOF")
-"""Boxes that are no function of the standard."""
+"""Boxes that are no function of the standard; their only input is IN."""
 Feeds = tuple[tuple[str, str], ...]
 """Where a value comes from: localIds of elements and the names of their outputs; several are a wired OR, none is TRUE."""
 
@@ -286,13 +286,14 @@ class _Network:
         """The inputs and the in-outs of a box."""
         modifiers = [bits(entry) for _, entry in listed(tree, "InputFlags")]
         types = words(tree, "InputParam", "Types")
+        is_lone = text(tree, "BoxType").strip().upper() in _MORE
         pins: list[Element] = []
         in_outs: list[Element] = []
         for at, (entry, inner) in enumerate(listed(tree, "InputItems")):
             own = modifiers[at] if at < len(modifiers) else 0
             if own & ~_MODIFIERS:
                 raise Unreadable(inner, "an input has flags that are not known")
-            pin = _variable(inner, (names[at] if at < len(names) else "") or f"IN{at + 1}", own)
+            pin = _variable(inner, (names[at] if at < len(names) else "") or ("IN" if is_lone else f"IN{at + 1}"), own)
             is_in_out = at < len(types) and types[at].endswith("[REF]")
             (in_outs if is_in_out else pins).append(pin)
             operand = member(inner, "Operand") if entry == "BoxTreeOperand" else None
