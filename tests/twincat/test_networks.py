@@ -114,6 +114,14 @@ FORMS = {
         ["// network 1", "t();", "p := t.Q;"]),
     "words as bits": ("Ld", [network(assign(box("AND", [leaf("n", "INT"), leaf("m", "INT")], "And"), operand("k", "INT")))],
                       ["// network 1", "k := n AND m;"]),
+    "contacts of a box that is no series": ("Ld", [network(assign(logic("XOR", leaf("a"), leaf("b")), operand("p")))],
+                                            ["// network 1", "p := a XOR b;"]),
+    "contacts of a box with EN": (
+        "Ld", [network(box("OR", [leaf("a"), leaf("b"), leaf("c")], "Or", names=("EN", "BOOL"), outs=("ENO -", "BOOL -"),
+                           targets=(NOTHING, operand("p")), enabled=True))],
+        ["VAR_TEMP Enabled_10000000005 : BOOL; END_VAR VAR Result_10000000005 : BOOL; END_VAR", "// network 1",
+         "Enabled_10000000005 := a;", "IF Enabled_10000000005 THEN Result_10000000005 := b OR c; END_IF;",
+         "IF Enabled_10000000005 THEN p := Result_10000000005; END_IF;"]),
     "inputs without names": (
         "Fbd", [network(box("SUB", [leaf("n", "INT"), leaf("m", "INT")], "Sub", targets=(operand("k", "INT"),)))],
         ["// network 1", "k := n - m;"]),
