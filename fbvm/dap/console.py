@@ -8,7 +8,7 @@ from dataclasses import replace
 from fbvm.base.types import ELEMENTARY, LREAL, TIME, Type, fold, string
 from fbvm.dap.session import Arguments, Body, DebugSession, Refusal
 from fbvm.dap.variables import property_row, text_of, variable
-from fbvm.step.commands import COMMANDS_BY_WORD, CommandError, completed
+from fbvm.step.commands import COMMANDS_BY_WORD, CommandError, command_of, completed
 from fbvm.step.past_session import PastSession
 from fbvm.step.properties import PropertyValue
 from fbvm.step.session import Session
@@ -18,7 +18,7 @@ from fbvm.watch.scopes import Scope
 from fbvm.watch.values import Value, show
 
 _WORD = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[[^\]]*\])*")
-_SILENT = re.compile(r"\(\*.*?\*\)|//.*|'[^']*'|\"[^\"]*\"")
+_SILENT = re.compile(r"\(\*.*?\*\)|//.*|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
 _KINDS: dict[str, Type] = {"number": LREAL, "time": TIME, "text": string()}
 """As what the value of literals alone is shown, by their class."""
 KEPT_BACK = {"quit", "break", "unbreak"}
@@ -38,7 +38,7 @@ def evaluate(debug: DebugSession, arguments: Arguments) -> Body:
         return _value(debug, scope, plc, text, arguments.get("context") == "clipboard")
     except (ConditionError, UnknownPlace) as error:
         context = arguments.get("context")
-        if context in (None, "repl") and text.partition(" ")[0].lower() in COMMANDS_BY_WORD:  # what is watched moves nothing
+        if context in (None, "repl") and command_of(text):  # what is watched moves nothing
             return _command(debug, plc, text)
         if context == "repl" and re.search(r":=|(?<![<>])=", text):
             return _command(debug, plc, text)
@@ -100,7 +100,7 @@ def _value(debug: DebugSession, scope: Scope, plc: str | None, text: str, is_bar
 
 def _command(debug: DebugSession, plc: str | None, text: str) -> Body:
     """A line of the language of `fbvm step`."""
-    command = COMMANDS_BY_WORD.get(text.partition(" ")[0].lower())
+    command = command_of(text)
     if command and command.name in KEPT_BACK:
         raise Refusal(f"{command.name}: the editor has that of its own")
     commands = debug.commands(plc)
@@ -121,8 +121,9 @@ CHANGING = {"write", "force", "unforce", "mode", "power"}
 def completions(debug: DebugSession, arguments: Arguments) -> Body:
     """completions: names in the words of `--until`, members behind a dot, and commands at the beginning of a line."""
     text = str(arguments.get("text", ""))
-    column = int(arguments.get("column") or len(text) + 1) - (1 if debug.client.get("columnsStartAt1", True) else 0)
-    before = text[: max(0, column)]
+    first = 1 if debug.client.get("columnsStartAt1", True) else 0
+    column = arguments.get("column")
+    before = text if column is None else text[: max(0, int(column) - first)]
     word = re.split(r"[\s,(=<>+*/-]", before)[-1]
     frame = debug.frame_of(arguments)
     session = debug.plc(frame.plc if frame else None)
@@ -134,7 +135,7 @@ def completions(debug: DebugSession, arguments: Arguments) -> Body:
     if before.strip() == word and "." not in word:
         found |= {name: "keyword" for name, each in COMMANDS_BY_WORD.items()
                   if name == each.name and name.startswith(fold(word).lower()) and name not in KEPT_BACK}  # fmt: skip
-    start = len(before) - len(word) + (1 if debug.client.get("columnsStartAt1", True) else 0)
+    start = len(before) - len(word) + first
     rows = [{"label": name, "text": name, "type": kind, "start": start, "length": len(word)} for name, kind in found.items()]
     return {"targets": [row for row in rows if "$" not in str(row["label"])]}
 

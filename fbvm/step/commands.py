@@ -96,6 +96,12 @@ COMMANDS = (
 COMMANDS_BY_WORD = {word: command for command in COMMANDS for word in (command.name, command.short) if word}
 
 
+def command_of(line: str) -> Command | None:
+    """The command that a line begins with; None without one, and for an assignment, whose variable may be called as one is."""
+    name, _, rest = line.partition(" ")
+    return None if rest.lstrip().startswith((":=", "=")) else COMMANDS_BY_WORD.get(name.lower())
+
+
 class Commands:
     """Executes command lines on a session.
 
@@ -116,7 +122,7 @@ class Commands:
         if line.startswith("//"):
             return
         name, _, rest = (line or self._last).partition(" ")
-        command = COMMANDS_BY_WORD.get(name.lower())
+        command = command_of(line or self._last)
         rest = rest.strip()
         if command is None and re.search(r":=|(?<![<>])=", line):
             command, rest = COMMANDS_BY_WORD["write"], line

@@ -282,6 +282,15 @@ def test_what_a_breakpoint_is_follows_from_how_its_place_is_written(where: str, 
     assert list(Commands(made, StopReport(made, {"text.st": MOTORS})).run(f"break {where}")) == [f"  1  {shown}"]
 
 
+@each_of("line, written", [
+    ("n := 7", 7), ("n = 8", 8), ("N  :=  9", 9), ("n:=10", 10), ("n =11", 11), ("write n = 12", 12), ("Main.n := 13", 13),
+])
+def test_an_assignment_is_one_where_its_variable_is_called_as_a_command(line: str, written: int) -> None:
+    made = session()
+    list(Commands(made, StopReport(made, {"text.st": MOTORS})).run(line))
+    assert (made.here, made.read("Main.n")) == (Position(1, 0), written)
+
+
 @each_of("lines", [26, 10**12])
 def test_the_whole_text_is_listed_however_many_lines_are_asked_for(lines: int) -> None:
     made = session()
