@@ -15,8 +15,10 @@ from fbvm.engine.trap import Trap
 from fbvm.live.messages import MOST_NAMES, MOST_TEXT
 from fbvm.live.plcs import MOST_CAPTURE_BYTES
 from fbvm.live.updates import ACTS, MEMORY_WORDS, MOST_SHOWN, UPDATE_NS, VIEW_NS
-from fbvm.live.workbench import FASTEST, MOST_STEPS, SLOWEST, fault_rows
+from fbvm.live.workbench import FASTEST, MOST_STEPS, SLOWEST, Workbench, fault_rows
 from fbvm.net.faults import Fault, fault
+from fbvm.run.interactive import Control
+from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.tap import TapEvent, TapKind
 
 CHART = """PROGRAM Main
@@ -54,7 +56,9 @@ def page() -> Page:
     ("fault", {"kind": "slow", "time": "0s"}, "0s is not a time that can pass"),
     ("unbreak", {"plc": "pump", "number": 0}, "no breakpoint"),
     ("fault", {"kind": "slow", "peer": "192.168.250.256"}, "no IPv4 address"),
-    ("fault", {"kind": "slow", "peer": "1.2.3"}, "no IPv4"),
+    ("fault", {"kind": "slow", "peer": "1.2.3"}, "no IPv4"), ("fault", {"kind": "slow", "peer": "1.2.3.0004"}, "no IPv4"),
+    ("fault", {"kind": "slow", "peer": "1.2.3.4:65536"}, "'65536' is no port"),
+    ("fault", {"kind": "slow", "peer": "1.2.3.4:000502"}, "'000502' is no port"),
     ("force", {"plc": "pump", "name": "D10..D11", "value": "1"}, "a range; force its places one by one"),
     ("group", {"name": "a", "names": ["D1"]}, "no file beside which"),
     ("predict", {"names": [], "values": []}, "has no lesson"), ("check", {}, "has no lesson"),
@@ -89,7 +93,10 @@ def test_bounds_are_taken(page: Page) -> None:
     assert [(row.lose_percent, row.duplicate_percent) for row in page.network.faults] == [(100, 0), (0, 7)]
     assert page.network.faults[1].peer == Peer("255.255.255.255", 65535)
     page.done("fault", kind="lossy", percent=0)
-    assert page.network.faults[2].lose_percent == 0
+    page.done("fault", kind="slow", time="1ns", peer="1.2.3.4:65535")
+    page.done("fault", kind="interrupted")
+    assert page.network.faults[2:] == [fault("lossy", lose_percent=0), fault("slow", latency_ns=1, peer=Peer("1.2.3.4", 65535)),
+                                       fault("interrupted", reset_after_bytes=16)]
     assert page.done("search", plc="pump", text="x" * MOST_TEXT)["found"] == []
     assert len(page.done("look", plc="pump", names=["D0"] * MOST_NAMES)["rows"]) == 1
     assert page.done("write", plc="pump", name="D10..D12", value="1,2,3")["value"] == "1, 2, 3"
@@ -114,6 +121,26 @@ def test_with_allow_write_only_values_are_changed() -> None:
         if do == "branch":
             page.done("view", plc="pump")
     assert page.plc.scans == 3 and page.plc.mode.value == "RUN" and not len(page.plc.breakpoints)
+
+
+def test_a_name_that_may_be_written_is_found_in_any_plc() -> None:
+    for texts in ((PUMP, CHART), (CHART, PUMP)):
+        lives = [Page(text).live for text in texts]
+        lives[0].name = "first"
+        assert Workbench(lives, Control(), writable=["Main.Level", "Main.go"]).writable == ["Main.Level", "Main.go"]
+    with pytest.raises(UnknownPlace, match="Nowhere"):
+        Workbench(lives, Control(), writable=["Main.Nowhere"])
+
+
+def test_what_is_written_inside_a_scan_is_there_in_the_scans_behind_it(page: Page) -> None:
+    page.done("break", plc="pump", kind="line", where="Main", when="Level = 22")
+    page.run(20)
+    page.done("write", plc="pump", name="Main.Level", value="60")
+    page.done("unbreak", plc="pump")
+    page.done("run")
+    page.scan(5)
+    seen = page.done("history", plc="pump", names=["Main.Level"], scans=5)["values"]["Main.Level"]
+    assert (seen[1:], page.plc.read("Main.Level")) == (["62", "63", "64", "65"], 65)
 
 
 def test_with_real_connections_time_passes_as_it_does() -> None:
@@ -345,6 +372,7 @@ def test_what_a_restart_has_kept_is_noted_as_writes(page: Page) -> None:
     page.bench.note_restart(old.bench, {"pump": [place]}, {"pump": trap})
     assert [(act.what, act.scan, act.name, act.value) for act in page.bench.acts] == [
         ("restart", 0, "", None), ("restart", 0, "", None), ("keep", 0, "Main.Level", page.plc.read("Main.Level"))]
+    assert page.bench.acts[2].now_ns == 0
     assert [act.text for act in page.bench.acts] == [
         "restart with the changed ; 1 retained variables kept their values",
         f"FB_exit of the program before ended with {trap}", "Main.Level kept"]  # fmt: skip
