@@ -119,8 +119,6 @@ class Workbench:
         found = self._to_change(live, name)
         given = parse_for(found, value)
         live.plc.write(found, given)
-        if live.plc.halted:
-            live.recorded.changed()
         self._note(live, "inside" if live.plc.halted else "write", f"{found.name} := {_text(found, given)}", found.name, given)
         return _text(found, live.plc.read(found))
 
