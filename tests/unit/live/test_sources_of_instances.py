@@ -45,6 +45,7 @@ def source(text: str, instance: str = "Main") -> dict[str, Any]:
     ("", "PROGRAM Main\nVAR n : INT; END_VAR\nn := 1;\nEND_PROGRAM", "\n", "Main"),
     ("", "PROGRAM Main VAR n : INT; END_VAR n := 1; END_PROGRAM", "", "Main"),
     ("// one\n\n", "  program main var n : int; end_var\n\n n := 1;\n\n\n\n\n end_program // yes", "\n// two\n", "Main"),
+    ("", "PROGRAM Main\nVAR n : INT; END_VAR\nEND_PROGRAM", "\n", "Main"),
     # between others
     ("FUNCTION F : INT F := 1;\nEND_FUNCTION\n", "PROGRAM Main\nVAR n : INT; END_VAR\nn := n + 1; END_PROGRAM", "", "Main"),
     (BLOCK, "PROGRAM Main\nVAR n : INT; b : B; END_VAR\nn := 1; END_PROGRAM", f"\n{BLOCK.replace(' B', ' C')}", "Main"),
@@ -107,6 +108,8 @@ def test_a_text_that_is_shorter_than_the_program_is_shown_to_its_end() -> None:
     assert (seen["first"], [line["text"] for line in seen["lines"]]) == (1, ["PROGRAM Main", "VAR END_VAR"])
     open_end, _ = found(image, {FILE: "PROGRAM Main\n" + "x\n" * 20}, "Main")
     assert len(open_end["lines"]) == 9, "three lines behind the last statement"
+    headless, _ = found(image, {FILE: "x\n" * 9 + "PROGRAM Main"}, "Main")
+    assert (headless["first"], len(headless["lines"])) == (1, 9)
 
 
 def test_instances_are_listed_where_their_bodies_are_and_up_to_a_bound() -> None:
