@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import cast
 
-from fbvm.base.arithmetic import quotient, remainder
-from fbvm.base.types import BOOL, DATE, DINT, LREAL, REAL, TIME, EnumType, Type, base, common, fold
+from fbvm.base.arithmetic import nearest, quotient, remainder
+from fbvm.base.types import BOOL, DATE, DINT, LREAL, REAL, TIME, EnumType, Type, base, common, families, fold
 from fbvm.watch.paths import Place
 from fbvm.watch.scanner import ConditionError
 from fbvm.watch.values import DATES, Value, conform, literal, nearest_real, refusal, sort_of
@@ -116,16 +116,25 @@ def pair(sign: str, left: Term, right: Term, whole: str) -> Term:
     signs, kind = _COMPUTES.get((sorts[0], sorts[1]), ("", DINT))
     if sign not in signs.split():
         raise ConditionError(f"{sign} needs numbers in {whole!r}, not {left.described} and {right.described}")
+    if sign == "MOD" and (_is_real(left) or _is_real(right)):
+        raise ConditionError(f"MOD needs whole numbers in {whole!r}")
     if sign in ("/", "MOD") and right.constant == 0:
         raise ConditionError(f"division by zero in {whole!r}")
     left, right = _rounded(left, right), _rounded(right, left)
     if sort_of(kind) == "number":
         known = [term.type for term in (left, right) if term.type]
         found = common(known[0], known[-1]) if known else None
+        if found and "ANY_REAL" not in families(found) and (_is_real(left) or _is_real(right)):
+            found = LREAL
         return _computed(text, sign, left, right, "number", found)
     if kind is DATE:  # the same day or instant, later or earlier
         return _computed(text, sign, left, right, left.sort, left.type)
     return _computed(text, sign, left, right, sort_of(kind), kind)
+
+
+def _is_real(term: Term) -> bool:
+    """Whether the value of a number is a floating-point one."""
+    return "ANY_REAL" in families(term.type) if term.type else isinstance(term.constant, float)
 
 
 def signed(sign: str, inner: Term, whole: str) -> Term:
@@ -148,13 +157,15 @@ def inverted(inner: Term, whole: str) -> Term:
 
 def _computed(text: str, sign: str, left: Term, right: Term, sort: str, kind: Type | None) -> Term:
     function = LEVELS[LEVEL_OF[sign]][sign]
-    single = kind is not None and base(kind) is REAL
+    single, whole = kind is not None and base(kind) is REAL, sort == "time"
 
     def value(read: Read) -> Value:
         a, b = left.value(read), right.value(read)
         if a is None or b is None:
             raise TypeError("a reference on the way is null")
         result = function(a, b)
+        if whole and isinstance(result, float):
+            return nearest(result, "i64")
         return nearest_real(cast(float, result)) if single else result
 
     constant = None

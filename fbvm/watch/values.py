@@ -42,7 +42,7 @@ Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | 
 """The value of a place.  A reference is None if it is null, else its 64 bits, or the text that `Names` makes of them."""
 
 _PIECE = re.compile(r"(\d[\d_]*(?:\.\d+)?)(ms|us|ns|d|h|m|s)_?", re.I)
-_PREFIX = re.compile(r"(?:TIME|LTIME|LT|T)#", re.I)
+_PREFIX = re.compile(r"(-?)(?:TIME|LTIME|LT|T)#(?:\+(?=\d))?", re.I)
 _REAL = re.compile(r"[+-]?\d[\d_]*(\.\d[\d_]*)?([eE][+-]?\d+)?")
 _INTEGER = re.compile(r"([+-]?)(?:2#([01][01_]*)|8#([0-7][0-7_]*)|(?:16#|0x)([0-9A-F][0-9A-F_]*)|(\d[\d_]*))", re.I)
 _RADIXES = (2, 8, 16, 10)
@@ -55,7 +55,9 @@ def parse_time_ns(text: str) -> int:
     >>> parse_time_ns("1.5s"), parse_time_ns("T#1m30s"), parse_time_ns("-5us")
     (1500000000, 90000000000, -5000)
     """
-    rest = _PREFIX.sub("", text.strip(), count=1)
+    rest = text.strip()
+    if prefix := _PREFIX.match(rest):
+        rest = prefix[1] + rest[prefix.end() :]
     sign, rest = (-1, rest[1:]) if rest.startswith("-") else (1, rest)
     total, at = 0, 0
     while piece := _PIECE.match(rest, at):
@@ -243,6 +245,7 @@ def literal(text: str) -> tuple[Value, Type | None]:
     raise NoLiteral(f"{text!r} is no literal")
 
 
+_PARTS = re.compile(r"'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"|.", re.S)
 _QUOTED = re.compile(r"(W?(STRING|CHAR)#)?['\"].", re.I | re.S)
 _BITS = {"TRUE": True, "FALSE": False, "ON": True, "OFF": False}
 
@@ -283,6 +286,8 @@ def _literal_of(kind: Type, text: str, name: str) -> Value:
         raise ValueError(f"{name}: {error}") from None
     sort = sort_of(shown) if shown else "text" if isinstance(value, str) else "number"
     fits = sort == wanted or not wanted or wanted == "enumeration" or wanted == "BOOL" and value in (0, 1)
+    if isinstance(value, float) and math.isinf(value):
+        raise ValueError(f"{name}: {text} is out of range of LREAL")
     truncated = wanted == "number" and isinstance(value, float) and "ANY_REAL" not in families(kind)
     if not fits or truncated:
         raise refusal(kind, name, text)
@@ -291,18 +296,20 @@ def _literal_of(kind: Type, text: str, name: str) -> Value:
 
 def split_list(text: str) -> list[str]:
     """The parts of `1,2,3` or `[1, 2, 3]`: commas within brackets and quotes do not separate."""
-    text = text.strip()
-    if text.startswith("[") and text.endswith("]"):
-        text = text[1:-1]
-    parts, depth, quote = [""], 0, ""
-    for character in text:
-        if quote or character in "'\"":
-            quote = "" if character == quote else quote or character
-        depth += {"[": 1, "]": -1}.get(character, 0) if not quote else 0
-        if character == "," and depth == 0 and not quote:
+    parts = _parted(text)
+    if len(parts) == 1 and parts[0].startswith("[") and parts[0].endswith("]"):
+        return _parted(parts[0][1:-1])
+    return parts
+
+
+def _parted(text: str) -> list[str]:
+    parts, depth = [""], 0
+    for piece in _PARTS.findall(text):
+        depth += {"[": 1, "]": -1}.get(piece, 0)
+        if piece == "," and depth == 0:
             parts.append("")
         else:
-            parts[-1] += character
+            parts[-1] += piece
     return [part.strip() for part in parts]
 
 

@@ -6,7 +6,7 @@ from rows import each_of
 from fbvm.base import types as t
 from fbvm.base.areas import AREAS, SLOTS_OFFSET, e_bank
 from fbvm.base.types import EnumType, Field
-from fbvm.watch.conditions import ConditionError, parse_condition
+from fbvm.watch.conditions import ConditionError, parse_condition, parse_expression
 from fbvm.watch.paths import Place, Span, find
 from fbvm.watch.values import Value, nearest_real
 
@@ -42,6 +42,16 @@ def holds(text: str) -> bool:
 ])  # fmt: skip
 def test_holds(text: str) -> None:
     assert holds(text)
+
+
+@each_of(("text", "described"), [
+    ("n + 1", "INT"), ("n / 2.0", "LREAL"), ("0.5 + n", "LREAL"), ("r + 0.5", "REAL"), ("r + n", "REAL"), ("long - n", "LREAL"),
+    ("1 + 1", "a number"), ("1 / 2.0", "a number"), ("wait * 1.5", "TIME"), ("n = 1.0", "BOOL"), ("-n", "INT"),
+    ("list[0] + DINT#1", "DINT"),
+    ("when + 1s", "DATE_AND_TIME"), ("when - when", "TIME"), ("day - 1d", "DATE"), ("'a'", "a text"), ("5s", "a time"),
+])
+def test_an_expression_has_the_type_of_its_value(text: str, described: str) -> None:
+    assert parse_expression(text, resolve).described == described
 
 
 def test_a_condition_knows_the_places_that_it_reads() -> None:
@@ -81,7 +91,8 @@ def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
     "when = DT#1970-01-02-00:00:00", "when > DT#1970-01-01-00:00:00",
     "when + 1d = DT#1970-01-03-00:00:00", "when + 1d > when", "DT#1970-01-02-00:00:00 - 1s < when", "day + 1d = D#1970-01-02",
     "day < D#2024-01-31", "2 * wait = 3s", "wait + 500ms = 2s", "wait * 2 = 3s",
-    "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'",
+    "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'", "wait * 1.5 = 2s250ms", "wait / 2.5 = 600ms", "wait * r = 750ms",
+    "3ns * 0.5 = 2ns", "1ns * 0.5 = 0ns", "-3ns / 2.0 = -2ns", "wait / 2 = 750ms", "3ns / 2 = 1ns",
 ])
 def test_literals_are_those_of_a_program(text: str) -> None:
     assert holds(text)
@@ -104,7 +115,8 @@ def test_literals_are_those_of_a_program(text: str) -> None:
     ("tenth = 1e39", "out of range of REAL"),
     (" * ".join(["1" + "0" * 39] * 9) + " * 1.5 = 1", "* 1.5 cannot be computed: int too large"),
     ("tenth + 1e39 = 1", "1e39 is out of range of REAL"), ("REAL#1e38 * 10 = 1", "REAL#1e38 * 10 cannot be computed: "),
-    ("n / 0 = 1", "division by zero"),
+    ("n / 0 = 1", "division by zero"), ("r MOD 2 = 1", "MOD needs whole numbers in 'r MOD 2 = 1'"),
+    ("n MOD 2.5 = 1", "MOD needs whole numbers"), ("2.5 MOD n = 1", "MOD needs whole numbers"),
     ("n MOD (1 - 1) = 1", "division by zero"),
     ("1 / 0 = 1", "division by zero"),
     ("c = Blue", "there is no Blue; known here"),

@@ -38,13 +38,14 @@ BLOCK, RECORD = (StructType("Kept", 8, 8, WITH_CONSTANT, block=block) for block 
 @each_of(("text", "time_ns"), [
     ("10ms", 10_000_000), ("1.5s", 1_500_000_000), ("T#10ms", 10_000_000), ("time#1m30s", 90_000_000_000),
     ("LT#5us3ns", 5003), ("-2s", -2_000_000_000), ("T#-2s", -2_000_000_000), ("1d_2h", 93_600_000_000_000), ("0s", 0),
-    ("0.5ms", 500_000),
+    ("0.5ms", 500_000), ("T#+5s", 5_000_000_000), ("-T#5s", -5_000_000_000), ("ltime#+1us", 1000), (" LT#1ns ", 1),
 ])  # fmt: skip
 def test_times_are_read(text: str, time_ns: int) -> None:
     assert parse_time_ns(text) == time_ns
 
 
-@each_of("text", ["", "10", "ms", "10 ms x", "5s,", "T#", "T#T#1s"])
+@each_of("text", [
+    "", "10", "ms", "10 ms x", "5s,", "T#", "T#T#1s", "5sT#", "1mT#30s", "+5s", "T#+-5s", "-T#-5s", "--5s", "-", "XT#5s", "T#+"])
 def test_what_is_no_time_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is no time; write 10ms"):
         parse_time_ns(text)
@@ -93,7 +94,11 @@ def test_literals(text: str, value: object) -> None:
     (t.string(), "a\u00ff", "a\u00ff"),
     (t.array(((1, 3),), t.INT), "1,2,3", [1, 2, 3]), (t.array(((1, 3),), t.INT), "[1, -2, 16#F]", [1, -2, 15]),
     (t.array(((0, 1),), t.array(((0, 1),), t.INT)), "[[1, 2], [3, 4]]", [[1, 2], [3, 4]]),
-    (t.array(((1, 2),), t.string()), "'a,b', c", ["a,b", "c"]), (COLOUR, "5", 5), (LEVEL, "100", 100),
+    (t.array(((1, 2),), t.string()), "'a,b', c", ["a,b", "c"]),
+    (t.array(((1, 2),), t.string()), "['a$',b', \"[c\"]", ["a',b", "[c"]),
+    (t.array(((1, 2),), t.string()), "it's, $", ["it's", "$"]),
+    (t.array(((0, 1),), t.array(((0, 1),), t.INT)), "[1, 2], [3, 4]", [[1, 2], [3, 4]]),
+    (COLOUR, "5", 5), (LEVEL, "100", 100),
     (CHAR, "a", "a"), (CHAR, "'", "'"), (CHAR, "'$0A'", "\n"), (CHAR, "CHAR#'x'", "x"), (WCHAR, '"$20AC"', "\u20ac"),
     (WCHAR, "\u20ac", "\u20ac"), (WIDE, '"a$00e9"', "a\u00e9"), (WIDE, "\u20ac1", "\u20ac1"), (WIDE, "WSTRING#'ab'", "ab"),
 ])  # fmt: skip
@@ -152,7 +157,9 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
     (t.BYTE, "-129", "x: -129 is out of range of BYTE, which holds 0..255"),
     (FEW, "0", "x: 0 is out of range of Few, which holds 1..5"),
     (COLOUR, "Shape.Red", "x: Colour has no member Shape.Red; it has Red, Green"),
-    (t.INT, "INT", "x: 'INT' is no literal; INT takes a whole number"),
+    (t.INT, "INT", "x: 'INT' is no literal; INT takes a whole number"), (t.LREAL, "-1e999", "x: -1e999 is out of range of LREAL"),
+    (t.array(((1, 2),), t.INT), "", "x is ARRAY [1..2] OF INT and takes 2 values parted by commas, not 1"),
+    (t.array(((1, 2),), t.INT), "1,2,", "x is ARRAY [1..2] OF INT and takes 2 values parted by commas, not 3"),
     (t.INT, "noon", "x: 'noon' is no literal; INT takes a whole number"),
     (t.INT, "2#9", "x: '2#9' is no literal; INT takes a whole number"),
     (t.INT, "8#8", "x: '8#8' is no literal; INT takes a whole number"),
