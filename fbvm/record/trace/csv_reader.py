@@ -46,21 +46,25 @@ class Column:
 def read_csv(file: TextIO, out: BinaryIO) -> int:
     """Writes a trace with the scans of a CSV table to `out`; returns the number of scans.  Raises CsvError."""
     table = csv.reader(file)
+    rows, line = [], 1
     try:
-        rows = list(table)
+        for row in table:
+            rows += [(line, row)] if row else []
+            line = table.line_num + 1
     except csv.Error as error:
         raise CsvError(f"line {table.line_num}: {error}") from None
-    if not rows or rows[0][:2] != [SCAN, TIME_MS]:
+    headings = rows.pop(0)[1] if rows else []
+    if headings[:2] != [SCAN, TIME_MS]:
         raise CsvError(f"line 1: the first two columns are {SCAN} and {TIME_MS}")
-    for number, row in enumerate(rows[1:], 2):
-        if len(row) != len(rows[0]):
-            raise CsvError(f"line {number}: {len(row)} cells, {len(rows[0])} expected")
-    columns = _columns(rows[0], rows[1:])
+    for number, row in rows:
+        if len(row) != len(headings):
+            raise CsvError(f"line {number}: {len(row)} cells, {len(headings)} expected")
+    columns = _columns(headings, [row for _, row in rows])
     plc = Plc(_image(columns), engine="python")
     writer = TraceWriter(plc, out, selected=[column.name for column in columns])
-    for number, row in enumerate(rows[1:], 2):
+    for number, row in rows:
         try:
-            plc.scans = int(row[0])
+            plc.scans = _scan(row[0])
             for column, cell in zip(columns, row[2:], strict=True):
                 if cell:
                     plc.write(column.name, column.read(cell))
@@ -68,11 +72,26 @@ def read_csv(file: TextIO, out: BinaryIO) -> int:
         except (ValueError, TypeError, ArithmeticError) as error:
             raise CsvError(f"line {number}: {error}") from None
     writer.close()
-    return len(rows) - 1
+    return len(rows)
+
+
+def _scan(text: str) -> int:
+    if not _INTEGER.fullmatch(text):
+        raise ValueError(f"{text!r} is no number of a scan")
+    return whole_number(text)
 
 
 def _nanoseconds(text: str) -> int:
-    return int(Decimal(text).scaleb(6))
+    """The nanoseconds of a number of milliseconds.  Raises ValueError."""
+    if not _NUMBER.fullmatch(text):
+        raise ValueError(f"{text!r} is no number of milliseconds")
+    try:
+        value = Decimal(text).scaleb(6)
+    except ArithmeticError:
+        value = Decimal("inf")
+    if abs(value) >= 1 << 63:
+        raise ValueError(f"{text} ms are more than 64 bits of nanoseconds hold")
+    return int(value)
 
 
 def _columns(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Column]:
@@ -101,9 +120,15 @@ def _kind(heading: str, cells: Sequence[str]) -> tuple[Type, Callable[[str], Any
 def _image(columns: Iterable[Column]) -> Image:
     """The image of a program without code that declares these variables."""
     tree: Parts = {}
+    addresses: set[str] = set()
+    spelled: dict[tuple[str, ...], str] = {}
     for column in columns:
-        if not _is_address(column.name):
-            _insert(tree, column)
+        address = _address(column.name)
+        if not address:
+            _insert(tree, column, spelled)
+        elif address in addresses:
+            raise CsvError(f"line 1: {column.name} stands there twice")
+        addresses.add(address)
     symbols, at = {}, SLOTS_OFFSET
     for name, what in tree.items():
         kind = _type(str(name), what)
@@ -113,24 +138,27 @@ def _image(columns: Iterable[Column]) -> Image:
     return Image(Layout(at - SLOTS_OFFSET), (), (), symbols, (), (), ())
 
 
-def _is_address(name: str) -> bool:
+def _address(name: str) -> str:
+    """The address that a column names, as it is usually written; "" if it names none."""
     try:
-        parse_address(name)
+        return str(parse_address(name))
     except AddressError:
-        return False
-    return True
+        return ""
 
 
-def _insert(tree: Parts, column: Column) -> None:
-    """Adds a variable to the tree of all variables."""
+def _insert(tree: Parts, column: Column, spelled: dict[tuple[str, ...], str]) -> None:
+    """Adds a variable to the tree of all variables; `spelled` are the names at the ends of paths as they stood there first."""
     if not _PATH.fullmatch(column.name):
         raise CsvError(f"line 1: {column.name!r} is neither a path of names nor an address")
     steps: list[Step] = [name or tuple(map(int, subscripts.split(","))) for name, subscripts in _STEP.findall(column.name)]
     inner, owner = tree, ""
+    path: tuple[str, ...] = ()
     for number, step in enumerate(steps):
         if inner and type(step) is not type(next(iter(inner))):
             raise CsvError(f"line 1: {owner} has elements and members")
         owner = step if isinstance(step, str) else owner
+        path = (*path, fold(step) if isinstance(step, str) else "[]")
+        step = spelled.setdefault(path, step) if isinstance(step, str) else step
         if number == len(steps) - 1:
             if step in inner:
                 raise CsvError(f"line 1: {column.name} stands there twice")

@@ -95,6 +95,22 @@ def test_a_table_from_elsewhere_becomes_a_trace() -> None:
     assert (trace.at(4).read("D5"), trace.at(4).read("Speed"), trace.at(3).now_ns) == (9, 2.0, 500_000)
 
 
+def test_names_are_those_of_the_language_and_empty_lines_no_scans() -> None:
+    trace = as_trace("\nscan,time_ms,Tank.Level,TANK.full,tank.Pumps[1].on,Tank.pumps[2].On\n\n3,1,7,TRUE,FALSE,TRUE\n\n")
+    assert trace.at(3).read("Tank") == {"Level": 7, "full": True, "Pumps": [{"on": False}, {"on": True}]}
+
+
+@each_of(("cells", "kind"), [
+    (["TRUE", "FALSE"], "BOOL"), ([""], "BOOL"), (["TRUE", "1"], "STRING[4]"), (["1", "-2", "+3"], "LINT"),
+    (["9223372036854775807"], "LINT"), (["9223372036854775808"], "ULINT"), (["1", "2.5"], "LREAL"), (["-1e9", "nan"], "LREAL"),
+    (["inf", "-inf"], "LREAL"), (["1.", "2"], "LREAL"), (["x", "1"], "STRING[1]"), (["x" * 254], "STRING[254]"),
+    (["1 "], "STRING[2]"),
+])
+def test_a_column_has_the_narrowest_type_that_holds_its_cells(cells: list[str], kind: str) -> None:
+    trace = as_trace("scan,time_ms,a\n" + "".join(f"{at},{at},{cell}\n" for at, cell in enumerate(cells)))
+    assert trace.find("a").type.name == kind
+
+
 @each_of(("text", "said"), [
     ("", "line 1: the first two columns"),
     ("time,scan\n", "line 1: the first two columns"),
@@ -109,8 +125,16 @@ def test_a_table_from_elsewhere_becomes_a_trace() -> None:
     ("scan,time_ms,a[1],a[2000000000]\n", "line 1: a has 2000000000 elements, and no"),
     ("scan,time_ms,a[1].b[1],a[90000].b[90000]\n", "line 1: a has 90000 elements, and no"),
     ("scan,time_ms,a[]\n", "line 1: 'a\\[\\]' is neither"),
-    ("scan,time_ms,a\nx,2,3\n", "line 2: invalid literal"),
-    ("scan,time_ms,a\n1,x,3\n", "line 2: "),
+    ("scan,time_ms,a\nx,2,3\n", "line 2: 'x' is no number of a scan"),
+    ("scan,time_ms,a\n1,x,3\n", "line 2: 'x' is no number of milliseconds"),
+    ("scan,time_ms,a\n1,nan,3\n", "line 2: 'nan' is no number of milliseconds"),
+    ("scan,time_ms,a\n1,1e999999,3\n", "line 2: 1e999999 ms are more than 64 bits of nanoseconds hold"),
+    ("scan,time_ms,a\n1,9223372036854.775808,3\n", "line 2: 9223372036854.775808 ms are more than 64 bits"),
+    ('scan,time_ms,a\n1,5,"two\nlines"\n\n2,6\n', "line 5: 2 cells, 3 expected"),
+    ("scan,time_ms,D5,DM5\n", "line 1: DM5 stands there twice"), ("scan,time_ms,a.b,A.B\n", "line 1: A.B stands there twice"),
+    ("scan,time_ms,a.b,A\n", "line 1: A stands there twice"), ("scan,time_ms,a,A.b\n", "line 1: A is a variable and has members"),
+    ('scan,time_ms,"a[1, 2]","A[1,2]"\n', r"line 1: A\[1,2\] stands there twice"),
+    ("scan,time_ms,a [ms],a\n", "line 1: a stands there twice"),
     ("scan,time_ms,a\n1,5,3\n2,4,3\n", "line 3: time runs forward only"),
     ("scan,time_ms,D5\n1,5,99999\n", "line 2: D5: 99999 is out of range"),
 ])  # fmt: skip
