@@ -126,7 +126,6 @@ class ScanView:
 
     def phase(self, plc: ScanState, phase: Phase) -> None:
         """Called at the end of a phase."""
-        self._power.phase(plc, phase)
         self._charts.phase(plc, phase)
         self.scan = plc.scans
 

@@ -8,10 +8,13 @@ from typing import Any
 
 import pytest
 from browsers import Page
+from test_workbench import CHART
 
+from fbvm.code.compiler import compile_text
 from fbvm.live.host import LiveHost
-from fbvm.live.program import _values_now
+from fbvm.live.program import PowerView, _values_now
 from fbvm.live.updates import UPDATE_NS
+from fbvm.machine.plc import Plc
 
 RUNGS = """\
 PROGRAM Main
@@ -80,6 +83,27 @@ def test_values_that_are_no_bits_stand_beside_the_contacts_of_the_present() -> N
     assert _values_now(page.plc, rung, "Main") == {
         (0, "m"): "7", (1, "n"): "7", (1, "few[2]"): "3", (1, "D100"): "18", (1, "Word1"): "18", (1, "%D100"): "18",
         (1, "W3"): "0000h"}, "bits, what is no single value, and what is no place have none"
+
+
+def test_transitions_that_machine_code_has_noted_are_drawn_as_tested() -> None:
+    image = compile_text(CHART).image
+    assert image is not None
+    plc = Plc(image)
+    plc.scan()
+    chart = image.charts[0]
+    rows = [site for site, *_ in chart.transitions]
+    drawn = []
+    for noted in ({}, {rows[0]: True}, {rows[0]: False}, {rows[1]: True}):
+        power: Any = SimpleNamespace(body=lambda name: (chart.body, plc.find("Main").offset),
+                                     elements=lambda name, noted=noted: {(site, 0): value for site, value in noted.items()})
+        steps = PowerView(plc, power, "Main", {}).steps_of("Main")
+        assert next(steps) is None
+        with pytest.raises(StopIteration) as ended:
+            next(steps)
+        made = ended.value.value
+        assert (made["scan"], made["executed"], len(made["pictures"])) == (0, [], 1)
+        drawn.append(made["pictures"][0][1])
+    assert len(set(drawn)) == 4, "not tested; passed; not passed; the other one passed"
 
 
 def texts(svg: str) -> str:
