@@ -74,6 +74,7 @@ def test_beside_a_line_stand_the_values_of_its_words_but_not_those_of_texts_and_
     assert console.client.ask("fbvm/inlineValues", source={"path": "/nowhere.st"}, startLine=1, endLine=9) == {"values": []}
 
 
+@pytest.mark.slow
 def test_completions_are_places_and_at_the_beginning_commands(console: Console, tmp_path: Path) -> None:
     assert console.completed("Main.o") == {"Main.own": ("variable", 1, 6)}
     members = ("k", "q", "Twice", "Wrong")
@@ -123,6 +124,7 @@ def test_what_cannot_be_evaluated_says_why(console: Console, text: str, context:
     assert str(refused.value) == said
 
 
+@pytest.mark.slow
 def test_commands_are_taken_where_somebody_types_and_nowhere_else(tmp_path: Path) -> None:
     console = Console(tmp_path / "own.st")
     for context in ("watch", "hover", "clipboard", "variables"):
@@ -135,6 +137,7 @@ def test_commands_are_taken_where_somebody_types_and_nowhere_else(tmp_path: Path
     assert "5" in console.evaluated("PRINT n")["result"] and "5" in console.client.value("p n", "repl")
 
 
+@pytest.mark.slow
 def test_an_assignment_is_one_where_its_variable_is_called_as_a_command(tmp_path: Path) -> None:
     console = Console(tmp_path / "own.st")
     for text, name, value in (("n := 7", "n", "7"), ("S := 'new'", "s", "'new'"), ("b := TRUE", "b", "TRUE"),
@@ -143,3 +146,23 @@ def test_an_assignment_is_one_where_its_variable_is_called_as_a_command(tmp_path
         assert console.client.value(name) == value, text
     assert console.client.value("b = FALSE", "repl") == "FALSE", "what has a value is no command"
     assert (console.client.value("n"), console.client.line) == ("8", 16)
+
+
+@pytest.mark.slow
+def test_names_are_those_of_the_plc_whose_frame_is_asked(tmp_path: Path) -> None:
+    (tmp_path / "fbvm.toml").write_text('[plc.one]\nsources = ["one.st"]\n[plc.two]\nsources = ["two.st"]\n', encoding="utf-8")
+    for name, value in (("one", 1), ("two", 2)):
+        text = f"PROGRAM Main\nVAR n, {name}_only : INT := {value}; END_VAR\nn := {value};\nEND_PROGRAM\n"
+        (tmp_path / f"{name}.st").write_text(text, encoding="utf-8")
+    client = Client()
+    client._said.pop("columnsStartAt1")
+    client.begin(project=str(tmp_path))
+    frames = {name: client.ask("stackTrace", threadId=number)["stackFrames"][0]["id"]
+              for number, name in ((1, "one"), (2, "two"))}
+    for name, value in (("one", "1"), ("two", "2")):
+        source = {"path": str(tmp_path / f"{name}.st")}
+        rows = client.ask("fbvm/inlineValues", source=source, startLine=3, frameId=frames[name])["values"]
+        assert [row["text"] for row in rows] == [f"n = {value}"]
+        assert client.ask("evaluate", expression="n", frameId=frames[name])["result"] == value
+        targets = client.ask("completions", text=f"{name}_", column=5, frameId=frames[name])["targets"]
+        assert [(row["label"], row["start"]) for row in targets] == [(f"{name}_only", 1)]

@@ -97,6 +97,7 @@ def test_a_block_of_a_library_has_no_source_and_a_variable_is_no_instance() -> N
             found(image, {}, name)
 
 
+@pytest.mark.slow
 def test_a_source_with_rungs_is_told_to_be_drawn() -> None:
     text = "PROGRAM Main\nVAR a : BOOL; b : B; END_VAR\nLADDER\nRUNG 1\nLD a\nOUT a\nEND_LADDER\nb();\nEND_PROGRAM\n" + BLOCK
     assert (source(text)["drawn"], source(text, "Main.b")["drawn"]) == (True, False)
@@ -112,6 +113,7 @@ def test_a_text_that_is_shorter_than_the_program_is_shown_to_its_end() -> None:
     assert (headless["first"], len(headless["lines"])) == (1, 9)
 
 
+@pytest.mark.slow
 def test_instances_are_listed_where_their_bodies_are_and_up_to_a_bound() -> None:
     text = "PROGRAM Main VAR b : B; both : ARRAY[1..2] OF B; far : ARRAY[5..200] OF B; e : Empty; END_VAR b(); END_PROGRAM\n" \
            "FUNCTION_BLOCK Empty VAR inner : B; END_VAR END_FUNCTION_BLOCK\n" + BLOCK
