@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ FILE = "text.st"
 BLOCK = "FUNCTION_BLOCK B\nVAR x : INT; END_VAR\nx := x + 1;\nEND_FUNCTION_BLOCK\n"
 
 
+@cache
 def image_of(text: str) -> Image:
     image = compile_text(text).image
     assert image is not None

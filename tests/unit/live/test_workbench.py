@@ -123,6 +123,7 @@ def test_with_allow_write_only_values_are_changed() -> None:
     assert page.plc.scans == 3 and page.plc.mode.value == "RUN" and not len(page.plc.breakpoints)
 
 
+@pytest.mark.slow
 def test_a_name_that_may_be_written_is_found_in_any_plc() -> None:
     for texts in ((PUMP, CHART), (CHART, PUMP)):
         lives = [Page(text).live for text in texts]
