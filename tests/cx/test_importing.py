@@ -40,6 +40,17 @@ def parsed(data: bytes, encoding: str = "") -> CxText:
     return text
 
 
+@each_of("number, declared", [
+    ("0", "UINT := 0"), ("65535", "UINT := 65535"), ("65536", "UDINT := 65536"), ("+7", "UINT := 7"), ("-1", "INT := -1"),
+    ("4294967295", "UDINT := 4294967295"), ("4294967296", "ULINT := 4294967296"), ("9999999999", "ULINT := 9999999999"),
+    ("-32768", "INT := -32768"), ("-32769", "DINT := -32769"), ("-2147483648", "DINT := -2147483648"),
+    ("-2147483649", "LINT := -2147483649"),
+])
+def test_a_number_has_a_type_that_holds_it(number: str, declared: str) -> None:
+    made = imported(Cxt((f"Most,{number},NUMBER,,,",)))
+    assert f"    Most : {declared};" in made.files["globals.st"] and not made.diagnostics
+
+
 # --- the text ---
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.digits import whole_number
+from fbvm.base.types import DINT, INT, LINT, UDINT, UINT, ULINT
 from fbvm.interchange.cx.markup import Row
 from fbvm.syntax.st.lexer import lexis
 
@@ -54,7 +55,9 @@ class Symbol:
             if not re.fullmatch(r"[+-]?\d{1,10}", self.address):
                 raise SymbolError(f"{self.address} is no number")
             value = whole_number(self.address)
-            return f"{self.own} : {'UDINT' if value > 65535 else 'UINT' if value >= 0 else 'INT'} := {value};"
+            kinds = (DINT, LINT) if value < INT.low else (INT,) if value < 0 else (UINT, UDINT, ULINT)
+            kind = next(kind for kind in kinds if value in range(kind.low, kind.high + 1))
+            return f"{self.own} : {kind.name} := {value};"
         place = f" AT {location(self.address, self.type)}" if self.address else ""
         return f"{self.own}{place} : {block or self._spec()};"
 
