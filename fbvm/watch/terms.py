@@ -122,14 +122,18 @@ def pair(sign: str, left: Term, right: Term, whole: str) -> Term:
         raise ConditionError(f"division by zero in {whole!r}")
     left, right = _rounded(left, right), _rounded(right, left)
     if sort_of(kind) == "number":
-        known = [term.type for term in (left, right) if term.type]
-        found = common(known[0], known[-1]) if known else None
-        if found and "ANY_REAL" not in families(found) and (_is_real(left) or _is_real(right)):
-            found = LREAL
-        return _computed(text, sign, left, right, "number", found)
+        return _computed(text, sign, left, right, "number", _number_type(left, right))
     if kind is DATE:  # the same day or instant, later or earlier
         return _computed(text, sign, left, right, left.sort, left.type)
     return _computed(text, sign, left, right, sort_of(kind), kind)
+
+
+def _number_type(left: Term, right: Term) -> Type | None:
+    """The type of what two numbers make; None for literals alone, and for types that have none in common."""
+    known = [term.type for term in (left, right) if term.type]
+    found = common(known[0], known[-1]) if known else None
+    is_whole = found is not None and "ANY_REAL" not in families(found)
+    return LREAL if is_whole and (_is_real(left) or _is_real(right)) else found
 
 
 def _is_real(term: Term) -> bool:
