@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from fbvm.base.areas import Area
+from fbvm.base.digits import whole_number
 from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, Field, StructType, base
 from fbvm.dap.memory import reference_of
 from fbvm.dap.session import Body, Container, DebugSession, Refusal, StackFrame
@@ -213,7 +214,7 @@ def _area(debug: DebugSession, session: Session | PastSession, area: Area) -> Bo
         for number in range(start, min(start + count, units)):
             bits = number * width
             unit = Place("", BOOL, area.offset + bits // 8, bits % 8 if width == 1 else None)
-            name = session.names.address(unit)
+            name = f"{area.name}{number}" if area.unit_bits == 1 else session.names.address(unit)
             if name:
                 found.append(variable(debug, session, _found(session, name), name))
         return found
@@ -252,7 +253,7 @@ def variable(debug: DebugSession, session: Session | PastSession, place: Place, 
     """The row of a variable or address; `bare` without what marks it as forced."""
     plain = base(place.type)
     row: Body = {"name": name, "value": text_of(debug, session, place, bare=bare), "type": place.type.name,
-                 "evaluateName": place.name, "variablesReference": 0}  # fmt: skip
+                 "evaluateName": _expression(place), "variablesReference": 0}  # fmt: skip
     hint: Body = {"attributes": []}
     if place.constant:
         hint["attributes"] += ["constant", "readOnly"]
@@ -280,6 +281,11 @@ def variable(debug: DebugSession, session: Session | PastSession, place: Place, 
     elif place.area:
         row["memoryReference"] = reference_of(place.offset)
     return row
+
+
+def _expression(place: Place) -> str:
+    """What names a place in expressions, in which T0005 is the present value of a timer."""
+    return f"{place.area}{whole_number(place.name[1:])}" if place.area in ("TF", "CNF") else place.name
 
 
 def text_of(debug: DebugSession, session: Session | PastSession, place: Place, *, bare: bool = False) -> str:

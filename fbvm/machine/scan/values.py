@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
+from fbvm.base.digits import whole_number
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.net.journal import Journal
 from fbvm.watch import places
-from fbvm.watch.paths import Place, Span, find, find_place
+from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place
 from fbvm.watch.values import Value
+
+_FLAG = re.compile(r"([TC])(\d{4})")
+"""How places name completion flags; read again, the name is that of the present value, which takes no BOOL."""
 
 
 class NamedValues:
@@ -38,14 +43,16 @@ class NamedValues:
 
     def write(self, where: str | Place | Span, value: object) -> None:
         """Writes a variable, an address, or a range (a list).  Raises UnknownPlace, ValueError (range), TypeError."""
-        found = self.find(where) if isinstance(where, str) else where
+        found = self._meant(where, value) if isinstance(where, str) else where
         if self._journal:
             self._journal.remark(f"{found.name} := {value!r}")
         places.write_found(self.memory, found, value)
 
     def force(self, where: str, value: object) -> None:
         """Holds a variable or an address at `value` before and after the program, until `unforce`."""
-        place = find_place(self.image.symbols, self.memory.areas, where)
+        place = self._meant(where, value)
+        if isinstance(place, Span):
+            raise UnknownPlace(f"{where} is a range; name one place")
         places.write(self.memory, place, value)
         self._forces[place] = places.read(self.memory, place)
 
@@ -54,7 +61,13 @@ class NamedValues:
         if where is None:
             self._forces.clear()
         else:
-            self._forces.pop(find_place(self.image.symbols, self.memory.areas, where), None)
+            named = next((place for place in self._forces if place.name == where), None)
+            self._forces.pop(named or find_place(self.image.symbols, self.memory.areas, where), None)
+
+    def _meant(self, where: str, value: object) -> Place | Span:
+        """The place that gets a value: of T0005 and a BOOL the completion flag."""
+        flag = _FLAG.fullmatch(where) if isinstance(value, bool) else None
+        return self.find(f"{'TF' if flag[1] == 'T' else 'CNF'}{whole_number(flag[2])}" if flag else where)
 
     @property
     def is_forced(self) -> bool:

@@ -250,6 +250,24 @@ def test_a_forced_bit_leaves_its_neighbours(plc: Plc) -> None:
     assert plc.read("CIO 100") == 0
 
 
+@each_of("name", ["TF7", "T0007", "CNF12", "C0012"])
+def test_a_completion_flag_is_forced_and_written_by_its_name_as_it_is_shown(name: str) -> None:
+    image = compile_text("PROGRAM Main VAR n : INT; END_VAR n := 1; END_PROGRAM").image
+    assert image is not None
+    plc = Plc(image)
+    flag, value = ("TF7", "T7") if name[0] == "T" else ("CNF12", "C12")
+    plc.force(name, True)
+    assert (plc.read(flag), plc.read(value), plc.forces) == (True, 0, {f"{name[0]}{flag.strip('TFCN'):0>4}": True})
+    plc.force(value, 9)
+    plc.unforce(next(iter(plc.forces)))
+    assert (plc.read(flag), plc.forces) == (True, {value: 9})
+    plc.write(name, False)
+    plc.unforce(value)
+    assert (plc.read(flag), plc.read(value), plc.forces) == (False, 9, {})
+    plc.write("T0007", 5)
+    assert plc.read("T7") == 5, "a number is for the present value"
+
+
 def test_a_range_is_not_forced(plc: Plc) -> None:
     with pytest.raises(UnknownPlace, match="is a range"):
         plc.force("D1..D2", 1)

@@ -318,12 +318,15 @@ def test_forces_are_inputs(image: Image, again_ns: int, monkeypatch: pytest.Monk
     for scan in range(8):
         if scan in (2, 4):
             plc.force("Main.Go" if scan == 2 else "D7", scan == 2 or 5)
+        elif scan == 5:
+            plc.force("TF7", True)
         elif scan == 6:
             plc.unforce()
         plc.scan()
-        seen.append((plc.forces, plc.read("Main.Steps.Count"), plc.read("D7")))
-    assert [(done.forces, done.read("Main.Steps.Count"), done.read("D7")) for done in kept.again(range(8))] == seen
-    assert [len(forces) for forces, _, _ in seen] == [0, 0, 1, 1, 2, 2, 0, 0]  # type: ignore[misc]
+        seen.append((plc.forces, plc.read("Main.Steps.Count"), plc.read("D7"), plc.read("TF7")))
+    assert [(done.forces, done.read("Main.Steps.Count"), done.read("D7"), done.read("TF7"))
+            for done in kept.again(range(8))] == seen
+    assert [len(forces) for forces, *_ in seen] == [0, 0, 1, 1, 2, 3, 0, 0]  # type: ignore[misc]
 
 
 def test_many_inputs_lead_to_a_keyframe(image: Image, monkeypatch: pytest.MonkeyPatch) -> None:
