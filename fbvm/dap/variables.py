@@ -26,7 +26,7 @@ MOST_ROWS = 256
 SECTIONS = (("Inputs", ("VAR_INPUT",), "arguments"), ("Outputs", ("VAR_OUTPUT",), ""), ("In-outs", ("VAR_IN_OUT",), ""))
 """Scopes by the sections of a POU, and their presentation hints; all others are Locals."""
 FORCED = " (forced)"
-_BESIDE = re.compile(r" \((?:16#[0-9A-F]+|-?\d+)\)(?:  .*)?$", re.S)
+_BESIDE = re.compile(r"(?: \((?:16#[0-9A-F]+|-?\d+)\))?(?:  .*)?$", re.S)
 """What is shown behind a literal: its number, or its value in hexadecimal, and what the word means."""
 
 
@@ -346,9 +346,9 @@ def _runtime(debug: DebugSession, name: str) -> list[Body]:
 def _written(text: str) -> str:
     """The literal in the text of a value as it is shown, which editors send back."""
     text = text.strip()
-    if text[:1] in ("'", '"'):
+    if text[:1] in ("'", '"', "[", "("):
         return text.removesuffix(FORCED)
-    return _BESIDE.sub("", text.removesuffix(FORCED)).strip()
+    return _BESIDE.sub("", text.removesuffix(FORCED), count=1).strip()
 
 
 def set_variable(debug: DebugSession, place: Place | Span, text: str) -> Body:

@@ -122,3 +122,24 @@ def test_the_condition_of_a_filter_names_codes(condition: str, codes: set[int] |
     assert (answer["verified"], made.is_on("modbus")) == (codes is not None, codes is not None), answer
     if codes is not None:
         assert _codes(condition) == codes
+
+
+def test_filters_are_those_of_the_last_request() -> None:
+    debugged = Debugged()
+    debugged.running.plcs = {}
+    made = BreakpointRequests(debugged)  # type: ignore[arg-type]
+    made.set_exceptions({"filters": ["modbus", "trap"]})
+    made.set_exceptions({"filters": ["trap", "nobody"], "filterOptions": [{"filterId": "response"}]})
+    assert [name for name in ("modbus", "trap", "response", "nobody") if made.is_on(name)] == ["trap", "response"]
+    made.set_exceptions({})
+    assert not made.is_on("trap")
+
+
+def test_the_places_of_one_line_are_asked_for_by_its_number() -> None:
+    asked: list[tuple[str, int, int]] = []
+    sources = SimpleNamespace(name_of=lambda source: source.get("path"), line=lambda number: number,
+                              locations=lambda *given: asked.append(given) or [given[1:]])  # type: ignore[func-returns-value]
+    made = BreakpointRequests(SimpleNamespace(sources=sources))  # type: ignore[arg-type]
+    for arguments, places in (({"line": 5}, [(5, 5)]), ({"line": 5, "endLine": 7}, [(5, 7)])):
+        assert made.locations({"source": {"path": "a.st"}, **arguments}) == {"breakpoints": places}
+    assert made.locations({"line": 5}) == {"breakpoints": []} and len(asked) == 2
