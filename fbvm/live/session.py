@@ -220,7 +220,8 @@ class Session:
         """The values of some names in the last recorded scans, or the last before the one that is looked at."""
         live = self._quiet(plc)
         held = live.recorded.scans
-        stop = self._seen.past[0] + 1 if self._seen.past else held.stop
+        past = self._past_of(live)
+        stop = held.stop if past is None else past + 1
         wanted = range(max(held.start, stop - min(max(1, scans), MOST_HISTORY)), stop)
         places = [place for name in names[:50] if isinstance(place := live.plc.find(name), Place) and is_single(place)]
         rows: list[list[str]] = [[] for _ in places]
@@ -241,7 +242,8 @@ class Session:
         held = live.recorded.scans
         if not held:
             raise MessageError("no scan has been recorded yet")
-        scan = self._seen.past[0] if self._seen.past else held.stop - 1
+        past = self._past_of(live)
+        scan = held.stop - 1 if past is None else past
         trace = RecordedScans(live.recorded, live.past.lines, first=max(held.start, scan - WHY_SCANS))
         text = cause_text(trace, why(trace, place, scan))
         for file in live.texts:  # a page has little room for folders
@@ -263,6 +265,10 @@ class Session:
         if live.is_real and not self._bench.control.is_paused:
             raise MessageError("pause first: while real connections are served no scan is executed again")
         return live
+
+    def _past_of(self, live: LivePlc) -> int | None:
+        """The scan of a PLC that the page looks at; None if that is the present, or a scan of another PLC."""
+        return self._seen.past[0] if self._seen.past and live is self._seen.live else None
 
     # --- a lesson -----------------------------------------------------------------------------------------------------
 

@@ -333,7 +333,8 @@ class Workbench:
             raise MessageError(f"there is no fault {number}")
         for network in self.networks:
             network.faults[:] = [] if number is None else [row for row in network.faults if row is not rows[number]]
-        self._note_all("mend", "all faults ended" if number is None else f"fault {_named(rows[number])} ended", number)
+        name = "" if number is None else f" {_named(rows[number])}".replace(" fault", "")
+        self._note_all("mend", "all faults ended" if number is None else f"fault{name} ended", number)
 
     def _check_free(self) -> None:
         if self.writable is not None:

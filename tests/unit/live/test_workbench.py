@@ -14,6 +14,7 @@ from fbvm import LoopNetwork, Peer
 from fbvm.engine.trap import Trap
 from fbvm.live.messages import MOST_NAMES, MOST_TEXT
 from fbvm.live.plcs import MOST_CAPTURE_BYTES
+from fbvm.live.session import Session
 from fbvm.live.updates import ACTS, MEMORY_WORDS, MOST_SHOWN, UPDATE_NS, VIEW_NS
 from fbvm.live.workbench import FASTEST, MOST_STEPS, SLOWEST, Workbench, fault_rows
 from fbvm.net.faults import Fault, fault
@@ -142,6 +143,20 @@ def test_what_is_written_inside_a_scan_is_there_in_the_scans_behind_it(page: Pag
     page.scan(5)
     seen = page.done("history", plc="pump", names=["Main.Level"], scans=5)["values"]["Main.Level"]
     assert (seen[1:], page.plc.read("Main.Level")) == (["62", "63", "64", "65"], 65)
+
+
+@pytest.mark.slow
+def test_of_another_plc_than_the_one_whose_past_is_looked_at_the_last_scans_are_told() -> None:
+    page, other = Page(), Page()
+    other.live.name = "slow"
+    page.session = Session(Workbench([page.live, other.live], page.control))
+    page.scan(20)
+    other.scan(3)
+    page.done("view", plc="pump", scan=15)
+    for plc, first, levels in (("slow", 1, ["22", "23"]), ("pump", 14, ["35", "36"])):
+        found = page.done("history", plc=plc, names=["Main.Level"], scans=2)
+        assert (found["first"], found["values"]) == (first, {"Main.Level": levels})
+    assert "since scan 2 (20ms)" in page.done("why", plc="slow", name="Main.Level")["text"]
 
 
 def test_with_real_connections_time_passes_as_it_does() -> None:
@@ -337,6 +352,16 @@ def test_a_change_is_told_before_it_is_checked() -> None:
     assert page.update()["change"] == {"files": ["pump.st"], "ready": False, "mistakes": []}
     assert page.ask("restart")["error"] == "the changed program cannot run yet: it is checked, or it has errors"
     assert not page.bench.wants_restart and not page.control.has_ended
+
+
+def test_the_end_of_a_fault_is_noted_by_its_kind_where_it_has_one(page: Page) -> None:
+    for percent in (0, 5):
+        page.done("fault", kind="lossy", percent=percent)
+    for _ in range(2):
+        page.done("mend", number=0)
+    page.done("mend")
+    assert [act.text for act in page.bench.acts] == ["fault lossy", "fault lossy", "fault ended", "fault lossy ended",
+                                                     "all faults ended"]
 
 
 def test_a_program_without_a_network_has_no_faults() -> None:
