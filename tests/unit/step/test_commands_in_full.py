@@ -121,7 +121,7 @@ HERE = "text.st:8 in Main"
     ("watch Main.N IF Main.N =", ["! 'Main.N =' ends too early"]),
     ("write Main.N = 5", ["Main.N = 5"]), ("write Main.N := 5", ["Main.N = 5"]), ("write Main.N=5", ["Main.N = 5"]),
     ("Main.N := 5", ["Main.N = 5"]), ("Main.N = 5", ["Main.N = 5"]), ("write Main.N 5", ["! write NAME = VALUE"]),
-    ("write = 5", ["! write NAME = VALUE"]), ("write Main.N =", ["! write NAME = VALUE"]),
+    ("write = 5", ["! there is no write; known here: Main"]), ("write Main.N =", ["! write NAME = VALUE"]),
     ("Main.N <= 5", ["! 'Main.N' is no command; `help` lists them"]),
     ("Main.N >= 5", ["! 'Main.N' is no command; `help` lists them"]),
     ("write D0..D1 = 1, 2", ["D0 = 1 (16#0001)\nD1 = 2 (16#0002)"]),

@@ -77,7 +77,7 @@ def test_warnings_of_a_file_stand_in_the_order_of_its_lines() -> None:
 
 
 @each_of("result, cell", [
-    (None, '<td class="none">-'), (Result(True, 3, 3), '<td class="good">✓ 3/3'), (Result(False, 3, 3), '<td class="good">✗ 3/3'),
+    (None, '<td class="none">-'), (Result(True, 3, 3), '<td class="good">✓ 3/3'), (Result(False, 3, 3), '<td class="bad">✗ 3/3'),
     (Result(True, 2, 3, [("t", "w")]), '<td class="bad"><a href="#Ann-4">✓ 2/3</a>'),
     (Result(False, 3, 3, [("t", "w")]), '<td class="bad"><a href="#Ann-4">✗ 3/3</a>'),
     (Result(True, 3, 3, [("t", "w")]), '<td class="good"><a href="#Ann-4">✓ 3/3</a>'),
