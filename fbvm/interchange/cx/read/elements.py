@@ -23,6 +23,8 @@ CONTACT, COIL, HORIZONTAL, VERTICAL, INSTRUCTION, BLOCK, PIN = "1", "2", "3", "4
 _CONTACTS = {"0": " ", "1": "↑", "8": "/"}
 _COILS = {"0": " ", "8": "/"}
 """Attributes of contacts and coils in bodies of function blocks -> their marks."""
+_LEAST_WORDS = {CONTACT: 1, COIL: 1, INSTRUCTION: 1, BLOCK: 2, PIN: 2}
+"""Kinds of elements -> how many words they have at least: a name, and for blocks and pins what they belong to."""
 BLOCK_COLUMNS = 2
 """Columns that the box of a function block is wide."""
 
@@ -51,7 +53,10 @@ def instructions(elements: Elements, definition: Definition) -> list[str]:
     found = []
     for row, _ in elements.rows:
         try:
-            found.append(read(row.split(elements.separator)))
+            one = read(row.split(elements.separator))
+            if len(one.words) < _LEAST_WORDS.get(one.kind, 0):
+                raise ValueError("words are missing")
+            found.append(one)
         except (IndexError, ValueError):
             raise ElementError(f"the element {row.replace(elements.separator, ' ')!a} is not understood") from None
     network = _Cells(sorted(found, key=lambda one: (one.y, one.x)), definition)
