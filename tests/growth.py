@@ -10,16 +10,23 @@ TRIES = 3
 
 
 def assert_linear(prepared: Callable[[int], Callable[[], object]], few: int) -> None:
-    """Asserts that the work on four times as many parts as `few` takes less than eight times the time, in one of three tries.
+    """Asserts that the work on four times as many parts as `few` takes less than eight times the time.
 
     `prepared` makes the work on a number of parts; only the work itself is timed."""
-    work = prepared(few)
-    most_s = 8 * min(_took_s(work) for _ in range(TRIES))
-    work = prepared(4 * few)
+    assert_within_s(prepared(4 * few), 8 * least_s(prepared(few)))
+
+
+def assert_within_s(work: Callable[[], object], most_s: float) -> None:
+    """Asserts that the work takes less than some processor time in one of three tries; those behind it are not made."""
     took_s: list[float] = []
     while not took_s or took_s[-1] >= most_s:
         assert len(took_s) < TRIES, (took_s, most_s)
         took_s.append(_took_s(work))
+
+
+def least_s(work: Callable[[], object]) -> float:
+    """The processor time that the work takes in s: the least of three times."""
+    return min(_took_s(work) for _ in range(TRIES))
 
 
 def _took_s(work: Callable[[], object]) -> float:

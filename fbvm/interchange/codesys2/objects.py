@@ -76,7 +76,7 @@ def _fits(data: bytes, start: int, keyword: int) -> bool:
         return False
     length = _number(data, start)
     return keyword - start - 4 < length <= _LONGEST_TEXT and start + 4 + length <= len(data) \
-        and b"\0" not in data[start + 4:start + 4 + length]
+        and data.find(b"\0", start + 4, start + 4 + length) < 0  # without a copy of what may be long, at each of many words
 
 
 def _number(data: bytes, at: int) -> int:

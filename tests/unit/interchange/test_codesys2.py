@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from codesys2_files import EXPORT, LIBRARY, binary_object
-from growth import assert_linear
+from growth import assert_linear, assert_within_s, least_s
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source
@@ -132,3 +132,12 @@ def test_the_time_of_an_export_grows_with_its_parts(part: str) -> None:
         return lambda: read_export(text.encode(), "many.exp")
 
     assert_linear(prepared, 1000)
+
+
+@pytest.mark.slow
+def test_the_time_of_a_damaged_library_does_not_grow_with_the_lengths_that_it_claims() -> None:
+    def work(length: int) -> Callable[[], object]:
+        data = b"CoDeSys+" + bytes(50) + (length.to_bytes(4, "little") + b"TYPE ") * 10_000 + bytes(1 << 20)
+        return lambda: import_codesys2(data, "own.lib")
+
+    assert_within_s(work((1 << 20) - 1), 3 * least_s(work(1023)))
