@@ -12,7 +12,7 @@ _LIMIT = 1 << 63
 """Numbers of TOML have 64 bits."""
 _DIGITS = re.compile(r"[0-9A-Fa-f_]{16,}")
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-_DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+((?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_DEPTH}}})")
+_DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*+(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_DEPTH}}}")
 """The beginning of a key of so many parts; how long Python reads it grows with the square of their number."""
 _PLACE = re.compile(r"(.*) \(at line (\d+), column (\d+)\)", re.S)
 
@@ -33,7 +33,7 @@ def load_toml(text: str) -> dict[str, Any]:
     {'a': [1, 2]}
     """
     if deep := _DEEP_KEY.search(text):
-        raise TomlError("values are nested too deeply", *_place(text, deep.start(1)))
+        raise TomlError("values are nested too deeply", *_place(text, deep.start()))
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -12,9 +12,9 @@ from fbvm.base.toml import TomlError, load_toml
     ("a = 1\nb = [", "Invalid value", 2, 6),
     ("a = " + "[" * 51 + "]" * 51, "values are nested too deeply", 1, 1),
     ("a = 1\n" + "a." * 50 + "b = 1\n", "values are nested too deeply", 2, 1),
-    ("\n[" + "a." * 50 + "b]\n", "values are nested too deeply", 2, 2),
-    ("[[ " + "'a' . " * 50 + "b]]\n", "values are nested too deeply", 1, 4),
-    ("a = {" + '"a."."\\"".' * 25 + "b = 1}\n", "values are nested too deeply", 1, 6),
+    ("\n[" + "a." * 50 + "b]\n", "values are nested too deeply", 2, 1),
+    ("[[ " + "'a' . " * 50 + "b]]\n", "values are nested too deeply", 1, 2),
+    ("a = {" + '"a."."\\"".' * 25 + "b = 1}\n", "values are nested too deeply", 1, 5),
     ("a." * 100_000 + "b = 1", "values are nested too deeply", 1, 1),
 ])  # fmt: skip
 def test_a_text_that_is_wrong(text: str, said: str, line: int, column: int) -> None:
