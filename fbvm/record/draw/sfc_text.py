@@ -3,7 +3,8 @@ and double lines where branches diverge and converge, arrows for jumps; of a rec
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -17,6 +18,8 @@ LEAST = 24
 """The least width of a drawing in columns."""
 WRAPPED = (60, 36, 24, 16)
 """Widths of the lines of a condition that are tried, in columns, until the chart is narrow enough."""
+MUCH = 4
+"""While a drawing has so many times the columns that there are, several branches are drawn apart before the next is made."""
 TOKEN = "●"
 NAMED = 0
 """In place of a width: conditions are written below the chart, and transitions have names."""
@@ -46,10 +49,10 @@ def sfc_surface(picture: SfcPicture, width: int = 80, seen: ChartState | None = 
         if drawing.width <= width:
             return drawing.surface()
     while drawing.width > width:
-        step = drawing.branch_of_the_widest()
-        if step is None:
+        steps = drawing.branches_of_the_widest((drawing.width - MUCH * width) // 2)
+        if not steps:
             break
-        apart |= {step}
+        apart |= steps
         drawing = _Drawing(picture, seen, NAMED, apart)
     return drawing.surface()
 
@@ -78,23 +81,34 @@ class _Drawing:
                 row += 1
         return surface
 
-    def branch_of_the_widest(self) -> int | None:
-        """The last step of the widest network that begins a branch and can be drawn apart."""
-        widest = max(self.graph.roots, key=lambda root: self._pieces[root].width)
-        inside, left = [], [widest]
+    def branches_of_the_widest(self, columns: int) -> frozenset[int]:
+        """The last steps of the widest network that begin a branch and can be drawn apart: so many as take `columns` less room,
+        at least one.  Where many branches have to go, a drawing for each would take a time that grows with their square."""
+        graph, found = self.graph, set[int]()
+        for node in self._inside(max(graph.roots, key=lambda root: self._pieces[root].width)):
+            branches = [follower for follower in graph.following[node] if not graph.is_jump(node, follower)]
+            most = len(branches) if node.is_step else len(branches) - 1
+            for branch in reversed(branches) if len(branches) > 1 else ():
+                steps = [step for step in ([branch] if branch.is_step else graph.following[branch])
+                         if step.number not in graph.apart and step not in graph.roots]  # fmt: skip
+                found |= {step.number for step in steps[:1]}
+                columns -= self._pieces[branch].width if steps else 0
+                if found and (columns <= 0 or len(steps) > 1 or len(found) == most):
+                    return frozenset(found)
+            if found:
+                break
+        return frozenset(found)
+
+    def _inside(self, root: Node) -> Iterator[Node]:
+        """The nodes of a network, those that are nearer to its root first."""
+        below: dict[Node | None, list[Node]] = {}
+        for node in self.graph.order:
+            below.setdefault(self.graph.above[node], []).append(node)
+        left = deque([root])
         while left:
-            node = left.pop(0)
-            inside.append(node)
-            left += [other for other in self.graph.order if self.graph.above[other] == node]
-        for node in inside:
-            branches = [follower for follower in self.graph.following[node] if not self.graph.is_jump(node, follower)]
-            if len(branches) > 1:
-                for branch in reversed(branches):
-                    steps = [branch] if branch.is_step else self.graph.following[branch]
-                    for step in steps:
-                        if step.number not in self.graph.apart and step not in self.graph.roots:
-                            return step.number
-        return None
+            node = left.popleft()
+            yield node
+            left += below.get(node, ())
 
     # --- pieces -----------------------------------------------------------------------------------------------------
 

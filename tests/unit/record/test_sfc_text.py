@@ -6,6 +6,7 @@ import random
 import re
 
 import pytest
+from growth import least_s
 from sfc_model import Chart, random_chart, text
 
 from fbvm.code.compiler import compile_text
@@ -164,3 +165,15 @@ def test_a_picture_has_the_same_text() -> None:
     surface = sfc_surface(picture(BATCH), 80, ChartState(frozenset({1}), {0: True}))
     svg = ladder_svg([("PROGRAM Main", surface)])
     assert all(f">{word}<" in svg for word in ("PROGRAM Main", "heater", "L T#5s")) and 'class="power"' in svg
+
+
+@pytest.mark.slow
+def test_the_time_of_a_drawing_grows_with_its_simultaneous_branches() -> None:
+    def took_s(count: int) -> float:
+        steps, names = "".join(f"STEP P{at}: END_STEP " for at in range(count)), ", ".join(f"P{at}" for at in range(count))
+        moves = f"TRANSITION FROM Z TO ({names}) := x; END_TRANSITION TRANSITION FROM ({names}) TO Z := x; END_TRANSITION"
+        image = compile_text(f"PROGRAM Main VAR x : BOOL; END_VAR INITIAL_STEP Z: END_STEP {steps}{moves} END_PROGRAM").image
+        assert image is not None
+        return least_s(lambda: sfc_text(image.charts[0], 80))
+
+    assert took_s(160) < 9 * took_s(40)
