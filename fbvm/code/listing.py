@@ -29,8 +29,11 @@ def listing(image: Image, observations: bool = False) -> str:
     >>> print(listing(compile_text("PROGRAM Main VAR n : INT; END_VAR n := 1; END_PROGRAM").image).splitlines()[-1].strip())
     1:35      store i16 self+8 <- 1"""
     lines = [*_layout(image), *_tasks(image), *_symbols(image), *_initial(image), *_retained(image), *_objects(image)]
+    files: dict[str, set[str]] = {}
+    for site in image.sites:
+        files.setdefault(site.pou, set()).add(site.file)
     for number, body in enumerate(image.bodies):
-        lines += ["", *_Writer(image, observations).body(number, body)]
+        lines += ["", *_Writer(image, observations).body(number, body, sorted(files.get(body.name, ())))]
     return "\n".join(lines)
 
 
@@ -129,9 +132,8 @@ class _Writer:
         self.indent = 0
         self.mark = ""
 
-    def body(self, number: int, body: Body) -> list[str]:
-        """The heading and the code of a body."""
-        files = sorted({site.file for site in self.image.sites if site.pou == body.name})
+    def body(self, number: int, body: Body, files: list[str]) -> list[str]:
+        """The heading and the code of a body from these files."""
         size = f", instance of {body.instance_size} bytes" if body.instance_size else ""
         self.lines.append(f"body {number}  {body.kind} {body.name}{size}" + (f", {', '.join(files)}" if files else ""))
         self.block(body.code)
