@@ -26,6 +26,8 @@ AFTER_KEY_S = 0.02
 """How long after a key the check of its POU begins: keys that come together are one change."""
 QUIET_S = 0.3
 """How long nobody types before warnings are looked for."""
+READ_S = 0.2
+"""So long at most the end of the server waits for the thread that reads; at the end of the input it is there at once."""
 TRIES = 5
 """How often a request waits for the check of texts that change meanwhile."""
 COLLECTED_AFTER_S = 10.0
@@ -49,6 +51,18 @@ class Server(LanguageServer):
         self._garbage = Garbage()
         tell_in_a_line()
         self._collection: asyncio.TimerHandle | None = None
+
+    def shutdown(self) -> None:
+        """Ends the server.  Raises KeyboardInterrupt where a thread still reads what the editor says: then a signal has asked for
+        the end, which pygls keeps to itself, and the thread cannot be waited for."""
+        pool, self._thread_pool = self._thread_pool, None
+        super().shutdown()  # type: ignore[no-untyped-call]
+        if pool:
+            pool.shutdown(wait=False)
+            for thread in pool._threads:
+                thread.join(READ_S)
+                if thread.is_alive():
+                    raise KeyboardInterrupt
 
     def report_server_error(self, error: Exception, source: Any) -> None:
         """Shows the editor what went wrong beside the answers to its requests."""

@@ -172,6 +172,30 @@ def test_every_verb_ends_at_every_signal(tmp_path: Path) -> None:
     assert wrong == []
 
 
+@pytest.mark.slow
+@needs_signals
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_language_server_ends_at_a_signal_while_its_editor_says_nothing(number: signal.Signals) -> None:
+    text = b'{"jsonrpc":"2.0","id":1,"method":"initialize","params":{"processId":null,"rootUri":null,"capabilities":{}}}'
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-m", "fbvm", "lsp"], stdin=pipe, stdout=pipe, stderr=pipe) as process:
+        try:
+            assert process.stdin and process.stdout and process.stderr
+            process.stdin.write(b"Content-Length: %d\r\n\r\n%s" % (len(text), text))
+            process.stdin.flush()
+            length = int(process.stdout.readline().split(b":")[1])
+            while process.stdout.readline().strip():
+                pass
+            assert len(process.stdout.read(length)) == length
+            time.sleep(0.3)  # the server listens again
+            process.send_signal(number)
+            assert process.wait(timeout=20) == 128 + number
+            assert process.stderr.read().decode().splitlines()[-1:] == [
+                "interrupted" if number == signal.SIGINT else "terminated"]  # fmt: skip
+        finally:
+            process.kill()
+
+
 def test_other_signals_do_what_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> None:
     def terminated(ctx: click.Context) -> None:
         signal.raise_signal(signal.SIGTERM)
