@@ -51,7 +51,7 @@ def _symbol(part: Part, node: tree.Node, name: tree.Node, text: str, kind: str, 
 def _declaration(part: Part, declared: tree.Declaration) -> Iterator[Symbol]:
     if isinstance(declared, tree.Pou):
         made = _pou(part, declared)
-        made.children += [_action(part, action) for action in declared.actions if action.end > action.name.start]
+        made.children += [_action(part, action) for action in declared.actions if action.start < action.name.start < action.end]
         made.children += _methods(part, declared)
         yield made
     elif isinstance(declared, tree.Action):

@@ -137,7 +137,8 @@ class Scope:
             readable = (*READABLE, "VAR") if block.kind == "PROGRAM" or self.checker.project.dialect.locals_are_read else READABLE
             pins = [Member(field.name, "pin", str(field.type)) for field in kind.fields.values()
                     if field.kind in readable and " " not in field.name]
-            actions = [Member(action.tree.name.text, "action", "", key_of_pou(action)) for action in block.actions.values()]
+            actions = [Member(action.tree.name.text, "action", "", key_of_pou(action)) for name, action in block.actions.items()
+                       if not is_of_rungs(name)]
             return pins + actions + self.methods(block)
         if isinstance(kind, StructType):
             return [Member(field.name, "field", str(field.type)) for field in kind.fields.values()]
@@ -187,6 +188,11 @@ def _and_bases(block: Pou | None) -> list[Pou]:
         return []
     return list(dict.fromkeys([block, *(each for parent in ([block.base] if block.base is not None else []) + block.interfaces
                                         for each in _and_bases(parent))]))  # fmt: skip
+
+
+def is_of_rungs(action: str) -> bool:
+    """True for the name of an action that is a subroutine of a LADDER: only SBS and MCRO call it."""
+    return action.startswith("$")
 
 
 def scope_at(program: Program, name: str, offset: int) -> Scope | None:
