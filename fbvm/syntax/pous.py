@@ -77,6 +77,7 @@ class SourceBuilder(SfcElements):
 
     def source_text(self, declarations: list[Declaration]) -> SourceText:
         self._usings_in_front(declarations)
+        self._refuse_outside(len(self.source.text))
         return SourceText(0, len(self.source.text), tuple(declarations))
 
     # --- namespaces ---
@@ -150,6 +151,7 @@ class SourceBuilder(SfcElements):
 
     def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None, usings: list[Using] | None,
                  sections: list[Section], items: Items, elements: list[Element], end: Token) -> Pou:
+        self._refuse_outside(word.start)
         head, sections = head.with_more(sections)
         accesses = tuple(each for each in sections if isinstance(each, AccessVars) and word.type == "PROGRAM")
         refused = tuple(_out_of_place(each) for each in sections if isinstance(each, Settings) and each not in accesses)
@@ -305,9 +307,17 @@ class SourceBuilder(SfcElements):
 
     def actions_of(self, word: Token, owner: Token | None, actions: list[Element], end: Token) -> Actions:
         for part in (each for each in actions if isinstance(each, Step | Transition)):
-            self.report("S0111", part.start, part.end, "a chart stands in its POU, not in ACTIONS", "")
+            self._refuse_chart(part)
         return Actions(word.start, end.end, self.name(owner) if owner else None,
                        tuple(each for each in actions if isinstance(each, Action)))
+
+    def _refuse_outside(self, end: int) -> None:
+        """Report the charts of actions that stand outside of POUs, up to `end`."""
+        for action in [each for each in self.charted if each.start < end]:
+            self._refuse_chart(self.charted.pop(action)[0])
+
+    def _refuse_chart(self, part: Part) -> None:
+        self.report("S0111", part.start, part.end, "a chart stands in its POU, not behind it", "")
 
 
 _ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")

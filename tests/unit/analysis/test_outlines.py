@@ -41,8 +41,10 @@ def shown(text: str, symbols: list[Symbol], indent: str = "") -> Iterator[str]:
     ("PROGRAM Main\nVAR a : BOOL; END_VAR\n" + SUBROUTINE + "END_PROGRAM\n", [
         "PROGRAM Main, 1 to 15, Main", "  variable a, 2 to 2, a", "  rung rung 1, 4 to 5, RUNG",
         "  rung rung 2 opens it, 6 to 8, RUNG opens it", "  rung rung 3, 9 to 10, RUNG", "  rung rung 4, 11 to 13, RUNG"]),
-    ("PROGRAM Main\nVAR a : BOOL; END_VAR\n;\nACTION Work:\nLADDER\nRUNG\nLD a\nOUT a\nEND_LADDER\nEND_ACTION\nEND_PROGRAM\n", [
-        "PROGRAM Main, 1 to 11, Main", "  variable a, 2 to 2, a", "  ACTION Work, 4 to 10, Work", "    rung rung 1, 6 to 8, RUNG"]),
+    ("PROGRAM Main\nVAR a : BOOL; END_VAR\n;\nACTION Work:\nLADDER\nRUNG\nLD a\nOUT a\nEND_LADDER\nEND_ACTION\n"
+     "END_PROGRAM\n", [
+        "PROGRAM Main, 1 to 11, Main", "  variable a, 2 to 2, a", "  ACTION Work, 4 to 10, Work",
+        "    rung rung 1, 6 to 8, RUNG"]),
     ("PROGRAM Main\n;\nACTION Work:\nINITIAL_STEP One: END_STEP\nEND_ACTION\nEND_PROGRAM\n", [
         "PROGRAM Main, 1 to 6, Main", "  ACTION Work, 3 to 5, Work", "    step One, 4 to 4, One"]),
     ("FUNCTION_BLOCK B\nPROPERTY Speed : INT\nGET\nVAR now : INT; END_VAR\nEND_GET\nSET\nVAR old : INT; END_VAR\nEND_SET\n"
