@@ -173,12 +173,12 @@ class BlockPrograms:
         if number in self._paused:
             executed = context.binary("AND", executed, context.negated(context.variable(_paused(number))))
         here = context.temporary(context.name("here"))
-        passes = [context.temporary(made.passes) for _ in range(2)]
         context.emit(
             context.assign(here, executed),
             context.assign(context.temporary(made.seeks), context.binary("AND", self._here(here.text), self._waits(made))),
-            context.assign(passes[0], context.binary("OR", context.negated(self._here(here.text)), self._waits(made))),
-            inhibited=(context.assign(passes[1], context.truth(True)),))
+            context.assign(context.temporary(made.passes),
+                           context.binary("OR", context.negated(self._here(here.text)), self._waits(made))),
+            inhibited=(context.assign(context.temporary(made.passes), context.truth(True)),))
         context.jumps[made.passes] = context.temporary(made.passes)
         self._open = made
 
@@ -257,13 +257,14 @@ class BlockPrograms:
             operands = [*blocks.numbered(letter), context.operand(1)]
             return blocks.called(context.variable(name, kind), [*conditions(begins), *operands])
 
-        flag = [blocks.numbered(letter)[0] for _ in range(2)]
-        waits = [context.binary(sign, self._place(self.program), context.number(self.program.places)) for sign in ("<>", "=")]
-        arrives = context.when(waits[0], context.assign(flag[0], context.truth(False)), call(True))
-        ends = context.when(flag[1], self._at_beginning(), otherwise=self._stay())
+        def waits(sign: str) -> Expr:
+            return context.binary(sign, self._place(self.program), context.number(self.program.places))
+
+        arrives = context.when(waits("<>"), context.assign(blocks.numbered(letter)[0], context.truth(False)), call(True))
+        ends = context.when(blocks.numbered(letter)[0], self._at_beginning(), otherwise=self._stay())
         passed: tuple[Statement, ...] = ()
         if late:
-            passed = (context.when(waits[1], blocks.update(context.variable(name, kind), blocks.numbered(letter))),)
+            passed = (context.when(waits("="), blocks.update(context.variable(name, kind), blocks.numbered(letter))),)
         context.emit(*context.if_reachable(arrives, call(False), ends), passed=passed)
 
     # --- pausing ---
