@@ -114,9 +114,6 @@ def test_an_address_replaces_the_sign_at_the_beginning_of_a_file_and_a_standard_
         desk.open("other.st", "%\nVAR_GLOBAL x AT %QX0.0 : BOOL; END_VAR\n")
         offered = (await desk.at("completion", "other.st", 0, 1))["items"]
         assert [(each["textEdit"]["newText"], each["textEdit"]["range"]) for each in offered] == [("%QX0.0", span(0, 0, 0, 1))]
-        desk.open("only.st", "%Q")
-        offered = (await desk.at("completion", "only.st", 0, 2))["items"]
-        assert {each["textEdit"]["newText"]: each["textEdit"]["range"] for each in offered} == {"%QX0.0": span(0, 0, 0, 2)}
         desk.replace("other.st", (0, 0), (1, 40), "FUNCTION F : INT F := ABS(1); END_FUNCTION")
         assert await desk.at("prepareRename", "other.st", 0, 9) == span(0, 9, 0, 10)
         assert await desk.at("prepareRename", "other.st", 0, 23) is None

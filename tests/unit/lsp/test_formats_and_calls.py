@@ -8,11 +8,14 @@ from typing import Any
 
 import pytest
 from in_process import PUMP, Desk, span, talk
-from lsprotocol.types import Location, Position, Range
+from lsprotocol.types import Location, Position, Range, TextEdit
+from rows import each_of
 
+from fbvm.analysis.completion import Item
+from fbvm.analysis.parts import File
 from fbvm.base.diagnostics import Source
 from fbvm.interchange.imported import Place
-from fbvm.lsp import navigation
+from fbvm.lsp import editing, navigation
 from fbvm.lsp.foreign import narrowed
 
 pytestmark = pytest.mark.slow  # pygls and the protocol take their time to be imported
@@ -109,6 +112,13 @@ def test_what_is_said_of_a_damaged_object_of_twincat_goes_when_it_is_mended(tmp_
         assert projects.forget_regrouped(tmp_path / "Kind.TcDUT") == [], "it consists of the same files as before"
 
     talk(tmp_path, about, "Kind.TcDUT")
+
+
+@each_of("text, offset, replaced", [("%Q", 2, (0, 2)), ("x:=%QX0.", 8, (3, 8)), ("%", 1, (0, 1)), ("a %M_1", 6, (2, 6))])
+def test_an_address_replaces_its_beginning(text: str, offset: int, replaced: tuple[int, int]) -> None:
+    server: Any = SimpleNamespace(positions=lambda source: SimpleNamespace(range=lambda start, end: (start, end)))
+    edit = editing._item(server, File("x.st", text), offset, Item("%QX0.0", "address")).text_edit
+    assert edit == TextEdit(replaced, "%QX0.0")  # type: ignore[arg-type]
 
 
 def test_a_declaration_whose_text_is_no_longer_there_has_no_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
