@@ -143,9 +143,7 @@ def _pins(program: Program, name: str, offset: int) -> Iterator[Item]:
 
 def _named(program: Program, scope: Scope, text: str) -> Iterator[Item]:
     yield from _variables(scope)
-    if scope.pou is not None:
-        yield from (Item(each.tree.name.text, "action", "ACTION", f"{each.tree.name.text}();", rank=3)
-                    for name, each in scope.pou.owner.actions.items() if not is_of_rungs(name))
+    yield from _actions(scope)
     yield from (_member(each, rank=3) for each in scope.methods())
     project = scope.checker.project
     for pou in list(project.pous.values()):
@@ -163,6 +161,12 @@ def _named(program: Program, scope: Scope, text: str) -> Iterator[Item]:
     yield from (Item(word, "keyword", insert=snippet, rank=7) for word, snippet in {**STATEMENTS, **SECTIONS, **METHODS}.items())
     yield from (Item(word, "keyword", rank=7) for word in OPERATORS)
     yield from (replace(item, rank=8) for item in _blocks(program, scope) if item.kind == "function")
+
+
+def _actions(scope: Scope) -> Iterator[Item]:
+    if scope.pou is not None:
+        yield from (Item(each.tree.name.text, "action", "ACTION", f"{each.tree.name.text}();", rank=3)
+                    for name, each in scope.pou.owner.actions.items() if not is_of_rungs(name))
 
 
 def _variables(scope: Scope) -> Iterator[Item]:
