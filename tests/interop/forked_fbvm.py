@@ -75,9 +75,10 @@ class Forked:
         return self.returncode
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
-        """All that is left of both outputs, which must fit into their pipes."""
+        """All that is left of both outputs, which must fit into their pipes; they are closed behind it, as Popen does."""
         self.wait(timeout)
-        return self.stdout.read(), self.stderr.read()
+        with self.stdout, self.stderr:
+            return self.stdout.read(), self.stderr.read()
 
     def __enter__(self) -> Self:
         return self
