@@ -133,3 +133,13 @@ def test_a_type_in_the_place_of_a_name_is_taken_as_it_is(written: str) -> None:
 def test_what_is_no_type_is_not_taken_for_one() -> None:
     made = imported(pou("", '<variable name="r"><type><derived name="ARRAY[1..2; x : INT] OF INT"/></type></variable>'))
     assert codes(made) == ["X0105"]
+
+
+@each_of("used, said", [
+    ("s := DONE;", ["X0301 an enumeration without a name is not exported while another one has DONE, too: Kind#DONE",
+                    "X0301 an enumeration without a name is not exported while another one has DONE, too: Kind#DONE"]),
+    ("s := IDLE;", []), ("", [])])  # fmt: skip
+def test_a_member_of_two_enumerations_without_a_name_is_exported_if_nothing_names_it(used: str, said: list[str]) -> None:
+    made = export_xml([Source("one.st", f"FUNCTION_BLOCK One VAR s : (IDLE, DONE); END_VAR {used} END_FUNCTION_BLOCK"),
+                       Source("two.st", "FUNCTION_BLOCK Two VAR p : (WAIT, DONE); END_VAR END_FUNCTION_BLOCK")])
+    assert [f"{each.code} {each.message.partition(': ')[2]}: {each.hint.rpartition(' ')[2]}" for each in made.errors] == said

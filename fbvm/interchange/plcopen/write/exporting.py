@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.pragmas import harmless
 from fbvm.syntax.text import read
+from fbvm.syntax.tree.node import walk
 
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"
 XHTML = "http://www.w3.org/1999/xhtml"
@@ -73,8 +75,9 @@ def export_xml(sources: Sequence[Source | Path | str], name: str = "project", cr
             texts.append((source, text))
     pous = (pou for _, text in texts for pou in text.declarations if isinstance(pou, tree.Pou))
     outputs = {pou.name.text.upper(): _outputs(pou) for pou in pous}
+    shared = _shared_members(texts)
     for source, text in texts:
-        _source(parts, source, text, outputs)
+        _source(parts, Types(source, _names(text), shared), text, outputs)
     for types, declared, before in parts.actions:
         _actions(parts, types, declared, before)
     unread = [d for d in parts.diagnostics if d.code[0] == "S" and d.severity == "error"]
@@ -87,9 +90,24 @@ def _outputs(pou: tree.Pou) -> frozenset[str]:
                      for variable in section.variables for name in variable.names)
 
 
-def _source(parts: _Parts, source: Source, text: tree.SourceText, outputs: Mapping[str, frozenset[str]]) -> None:
+def _shared_members(texts: Iterable[tuple[Source, tree.SourceText]]) -> frozenset[str]:
+    """What several enumerations have as a member, and statements name alone, in capitals."""
+    members, named = Counter[str](), set[str]()
+    for node in walk(tuple(text.declarations for _, text in texts)):
+        if isinstance(node, tree.EnumSpec):
+            members.update(name.text.upper() for name, _ in node.members)
+        elif isinstance(node, tree.NameRef):
+            named.add(node.text.upper())
+    return frozenset(member for member, count in members.items() if count > 1 and member in named)
+
+
+def _names(text: tree.SourceText) -> Iterator[str]:
+    return (each.name.text for each in text.declarations if isinstance(each, tree.Pou | tree.TypeDecl))
+
+
+def _source(parts: _Parts, types: Types, text: tree.SourceText, outputs: Mapping[str, frozenset[str]]) -> None:
     """Add the elements of a source; `outputs` are those of all POUs that are exported, by their names in capitals."""
-    types = Types(source, (each.name.text for each in text.declarations if isinstance(each, tree.Pou | tree.TypeDecl)))
+    source = types.source
     types.outputs |= outputs
     types.note(declared.section for declared in text.declarations if isinstance(declared, tree.GlobalVars))
     named = Path(source.name).stem

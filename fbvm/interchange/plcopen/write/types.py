@@ -46,9 +46,11 @@ class NotExportable(Exception):
 class Types:
     """Writes types, values and sections of one source; `foreign` grows by (node, message) for what only fbvm understands."""
 
-    def __init__(self, source: Source, taken: Iterable[str] = ()) -> None:
-        """`taken` are the names of types and POUs that there are."""
+    def __init__(self, source: Source, taken: Iterable[str] = (), shared: frozenset[str] = frozenset()) -> None:
+        """`taken` are the names of types and POUs that there are, `shared` members of several enumerations that
+        statements name alone, in capitals."""
         self.source = source
+        self.shared = shared
         self.taken = {name.upper() for name in taken}
         self.foreign: list[tuple[tree.Node, str]] = []
         self.kept: list[tuple[int, int]] = []
@@ -175,9 +177,14 @@ class Types:
             yield made
 
     def _kind(self, declared: tree.VarDecl) -> Element:
-        """The element of a variable's type; an enumeration or subrange without a name gets one."""
+        """The element of a variable's type; an enumeration or subrange without a name gets one.  Raises NotExportable for one
+        whose members would be those of several types then."""
         if not isinstance(declared.spec, tree.EnumSpec | tree.SubrangeSpec) or self._arguments(declared.spec):
             return self.spec(declared.spec)
+        members = declared.spec.members if isinstance(declared.spec, tree.EnumSpec) else ()
+        if twice := next((member.text for member, _ in members if member.text.upper() in self.shared), ""):
+            what = f"an enumeration without a name is not exported while another one has {twice}, too"
+            raise NotExportable(declared.spec, what, f"declare a TYPE, and write its name in front: Kind#{twice}")
         name = stem = f"{self.owner}_{declared.names[0].text}" if self.owner else f"{declared.names[0].text}_type"
         number = 1
         while name.upper() in self.taken:
