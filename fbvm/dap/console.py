@@ -14,11 +14,11 @@ from fbvm.step.properties import PropertyValue
 from fbvm.step.session import Session
 from fbvm.watch.conditions import ConditionError, parse_expression
 from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.scanner import code_of
 from fbvm.watch.scopes import Scope
 from fbvm.watch.values import Value, show
 
 _WORD = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[[^\]]*\])*")
-_SILENT = re.compile(r"\(\*.*?\*\)|//.*|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
 _KINDS: dict[str, Type] = {"number": LREAL, "time": TIME, "text": string()}
 """As what the value of literals alone is shown, by their class."""
 KEPT_BACK = {"quit", "break", "unbreak"}
@@ -151,7 +151,7 @@ def inline_values(debug: DebugSession, arguments: Arguments) -> Body:
     last = debug.sources.line(int(arguments.get("endLine") or arguments.get("startLine") or 1))
     rows: list[Body] = []
     for line, written in debug.sources.lines(name, first, last):
-        text = _SILENT.sub(lambda match: " " * len(match[0]), written)
+        text = code_of(written)
         seen: set[str] = set()
         for match in _WORD.finditer(text):
             named = _named(debug, session, scope, match[0])

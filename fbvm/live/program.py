@@ -25,6 +25,7 @@ from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place, UnknownPlace, find
+from fbvm.watch.scanner import code_of
 from fbvm.watch.scopes import every_instance
 
 MOST_INSTANCES, MOST_ELEMENTS = 2000, 100
@@ -41,8 +42,6 @@ MOST_DRAWN = 2000
 Drawn = dict[tuple[object, ...], tuple[str, str]]
 """Headline and SVG of rungs and charts by their states."""
 _PATH = re.compile(r"[^\W\d]\w*(?:\s*\.\s*[^\W\d]\w*|\[\s*\d+\s*\])*")
-_HIDDEN = re.compile(r"//.*|\(\*.*?\*\)|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
-"""Comments and texts on one line, in which no variable stands."""
 _END = re.compile(r"\bEND_(?:PROGRAM|FUNCTION_BLOCK|FUNCTION|METHOD)\b", re.IGNORECASE)
 
 
@@ -77,7 +76,7 @@ def source_of(image: Image, areas: Any, texts: Mapping[str, str], instance: str)
     numbers = [line for of, line in sites if of == file]
     first = yield from _begin(rows, min(numbers), place.type.name)
     last = min(len(rows), max(numbers) + 3)
-    end = next((at for at in range(max(numbers) - 1, len(rows)) if _END.search(_HIDDEN.sub(" ", rows[at]))), last - 1)
+    end = next((at for at in range(max(numbers) - 1, len(rows)) if _END.search(code_of(rows[at]))), last - 1)
     lines = []
     for row in rows[first - 1 : end + 1]:
         lines.append({"text": row, "names": list(_names_on(row, image.symbols, areas, instance))})
@@ -100,7 +99,7 @@ def _begin(rows: Sequence[str], line: int, pou: str) -> Generator[None, None, in
 def _names_on(row: str, symbols: Mapping[str, Field], areas: Any, instance: str) -> Iterator[str]:
     """The full names of the single values that a line mentions, in order, each once."""
     seen: set[str] = set()
-    for match in _PATH.finditer(_HIDDEN.sub(" ", row)):
+    for match in _PATH.finditer(code_of(row)):
         word = re.sub(r"\s", "", match[0])
         for path in (f"{instance}.{word}", word):
             try:

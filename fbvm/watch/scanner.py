@@ -10,6 +10,14 @@ class ConditionError(ValueError):
     """The text is no condition; the message says why."""
 
 
+_SILENT = re.compile(r"\(\*.*?\*\)|//.*|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
+
+
+def code_of(line: str) -> str:
+    """A line of a source with blanks in place of comments and texts, in which no variable stands."""
+    return _SILENT.sub(lambda match: " " * len(match[0]), line)
+
+
 ADDRESS = r"""
     %?\s*(?:CIO|DM|D|W|H|A|TF|CNF|CF|T|C|E[0-9A-F]\s*[_:])\s*\d+(?:\.\d+)?(?![\w.\[^\#])
     | %\s*(?:[IQM][XBWDL]?)?\d+(?:\.\d+)?(?![\w.])
