@@ -138,5 +138,5 @@ class Plan:
 
     @property
     def alone(self) -> bool:
-        """True if there is one PLC, whose name may be left out."""
-        return len(self.project.plcs) == 1 and self.project.plcs[0].count is None
+        """True if the name of the PLC may be left out where there is no other: no row of the project numbers its PLCs."""
+        return all(row.count is None for row in self.project.plcs)

@@ -209,7 +209,7 @@ HANDLER = (("CATCH", "__CATCH"), ("LPAR", "("), ("NUMBER", "0"), ("RPAR", ")"))
 
 def _location_behind_type(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`x : INT AT D5;`"""
-    if token.type != "AT" or anchor(automaton.states).symbol != "var_decls" or len(following) < 2:
+    if token.type != "AT" or anchor(automaton.states).symbol != "var_decls" or following[1].type != "LOCATION":
         return None
     location = automaton.next()
     names = [v[-1] for v in automaton.values if isinstance(v, list) and v and isinstance(v[-1], Name)]

@@ -73,6 +73,16 @@ def test_a_keyframe_is_packed_beside_an_earlier_one(image: Image) -> None:
     assert second.state.memory.pages == pages
 
 
+def test_a_keyframe_takes_the_pages_that_have_changed_beside_an_earlier_one(image: Image) -> None:
+    """Each of 4096 bytes; the array of 16004 bytes has four of its own, and n one."""
+    plc = Plc(image)
+    first, same = keyframe(plc), keyframe(plc)
+    for place in (1500, 3000):
+        plc.write(f"Main.big[{place}]", 1)
+    changed = keyframe(plc)
+    assert changed.size_bytes(same) - same.size_bytes(first) == 2 * 4096
+
+
 def test_of_units_only_those_have_a_memory_to_be_packed_whose_processors_are_on(image: Image) -> None:
     plc = Plc(image)
     units: list[Any] = [Etn21(0, "192.168.250.21"), Etn21(1, "192.168.250.22"), Etn21(2, "192.168.250.23")]

@@ -217,7 +217,7 @@ def project(tmp_path: Path) -> Path:
 def test_plcs_of_a_project_scan_in_the_order_of_time(project: Path) -> None:
     plant = PlantRig(project / "fbvm.toml")
     assert [*plant.rigs] == ["fast", "slow"] and plant.elapsed_ns == 0
-    plant.scan()
+    assert plant.scan() is plant
     assert (plant.fast.n, plant["slow"].n, plant.elapsed_ns) == (3, 1, 10 * MS)
     plant.run("40ms")
     assert (plant.fast.n, plant.slow.n) == (15, 2) and plant.elapsed_ns == 50 * MS
