@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic
@@ -49,6 +50,13 @@ def test_what_is_refused_with_its_place(text: str, code: str, message: str, hint
 
 def test_the_deepest_nesting_is_read() -> None:
     assert parsed("<a>" * MAX_DEPTH + "</a>" * MAX_DEPTH).name == "a"
+
+
+def test_as_many_elements_are_read_as_are_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fbvm.interchange.markup.MAX_ELEMENTS", 3)
+    assert [each.name for each in parsed("<a><b/><c/></a>").children] == ["b", "c"]
+    found = parse_markup(b"<a><b/><c/><d/></a>", "a.xml")
+    assert isinstance(found, Diagnostic) and (found.code, found.message) == ("X0103", "there are more than 3 elements")
 
 
 @each_of(("data", "message"), [

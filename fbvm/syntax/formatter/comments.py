@@ -71,8 +71,7 @@ class Comments:
         for at, (begin, stop) in enumerate(found):
             ended = last or last_end > at
             if ahead and ahead[-1].own and ahead[-1].text[0] == "{" and not gaps[at] and self.text.startswith("//", begin):
-                remark = self._comment(begin, stop, own=True, blank=False).text
-                ahead[-1] = replace(ahead[-1], text=f"{ahead[-1].text}{BESIDE}{remark}")
+                ahead[-1] = replace(ahead[-1], text=f"{ahead[-1].text}{BESIDE}{self.text[begin:stop].rstrip()}")
                 continue
             if first_end > at and start and ended:
                 behind.append(self._comment(begin, stop, own=False, blank=False))

@@ -44,7 +44,8 @@ MAIN = "PROGRAM Main VAR i : INT; END_VAR"
     (f"{MAIN} i := Nix#a; END_PROGRAM", [("S0204", 1, "there is no enumeration Nix", "")]),
     ("VAR_GLOBAL g : ARRAY [0..2000000000] OF LREAL; END_VAR\nPROGRAM Main g[0] := 1.0; END_PROGRAM",
      [("S0603", 1, "the array takes more than 64 MiB", "")]),
-    ("TYPE S : STRUCT\na : ARRAY [1..40000000] OF BYTE;\nb : ARRAY [1..40000000] OF BYTE;\nEND_STRUCT END_TYPE\nPROGRAM Main END_PROGRAM",
+    ("TYPE S : STRUCT\na : ARRAY [1..40000000] OF BYTE;\nb : ARRAY [1..40000000] OF BYTE;\nEND_STRUCT END_TYPE\n"
+     "PROGRAM Main END_PROGRAM",
      [("S0603", 3, "the structure takes more than 64 MiB", "")]),
 ])
 def test_a_head_that_is_wrong_has_one_message(text: str, said: list[tuple[str, int, str, str]]) -> None:
