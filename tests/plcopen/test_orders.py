@@ -44,6 +44,20 @@ def test_two_rungs_that_stand_crosswise(order: str, expected: list[str]) -> None
     assert statements(import_xml(document(CROSSED), order=order)) == expected
 
 
+def numbered(*orders: int) -> bytes:
+    """Two networks, the lower one first in the document, each with two results of these numbers."""
+    rows = zip("pqrs", (200, 220, 20, 40), orders, strict=True)
+    results = [result(3 + at, "1" if at < 2 else "2", name, f'executionOrderId="{order}"', f"90,{y}")
+               for at, (name, y, order) in enumerate(rows)]
+    return document(pou("".join([value(1, "a", at="10,200"), value(2, "b", at="10,20"), *results]), "a b p q r s", language="FBD"))
+
+
+@each_of(("orders", "first"), [((1, 2, 3, 4), "p := a;"), ((3, 4, 1, 2), "r := b;"), ((1, 3, 2, 4), "r := b;")])
+def test_networks_stand_in_the_order_of_their_numbers_unless_two_of_them_mix(orders: tuple[int, ...], first: str) -> None:
+    """Where they mix, networks go from top to bottom."""
+    assert statements(import_xml(numbered(*orders), order="network"))[0] == first
+
+
 SINK_BELOW = pou(value(1, "a", at="10,20") + block(2, "CTU", "CU=1", "Q,CV", "k", at="80,20") + value(3, "k.CV", at="10,300")
                  + result(4, "3", "n", at="200,300"), variable("a") + variable("n", "INT") + variable("k", "CTU"), language="FBD")
 """A block above, and far below it a variable that reads the block without a wire."""

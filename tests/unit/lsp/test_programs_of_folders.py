@@ -120,6 +120,15 @@ def test_a_test_knows_assert_and_the_blocks_beside_it_and_above(
 TWO = '[plc.a]\nsources = ["a.st", "both.st"]\ndialect = "codesys"\n[plc.b]\nsources = ["b.st", "both.st", "gone.st"]\n'
 
 
+def test_a_project_file_may_name_files_outside_of_its_folder(tmp_path: Path) -> None:
+    """An editor reads what its user has opened; the command line asks for `--allow-outside`."""
+    folder = folder_with(tmp_path, {"main.st": MAIN, "shared/Pump.st": PUMP, "line/fbvm.toml":
+                                    '[plc.a]\nsources = ["main.st", "../shared/Pump.st"]\n', "line/main.st": MAIN})
+    projects = Projects(lambda path: None)
+    [made] = projects.open(folder / "line" / "main.st")
+    assert (names(made), projects.wrong) == ("main.st Pump.st", {folder / "line" / "fbvm.toml": []})
+
+
 def test_a_project_file_says_which_files_are_programs(tmp_path: Path) -> None:
     folder = folder_with(tmp_path, {"a.st": MAIN, "b.st": MAIN, "both.st": PUMP, "free.st": MAIN, "fbvm.toml": TWO})
     projects = Projects(lambda path: None)
