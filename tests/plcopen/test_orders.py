@@ -49,7 +49,8 @@ def numbered(*orders: int) -> bytes:
     rows = zip("pqrs", (200, 220, 20, 40), orders, strict=True)
     results = [result(3 + at, "1" if at < 2 else "2", name, f'executionOrderId="{order}"', f"90,{y}")
                for at, (name, y, order) in enumerate(rows)]
-    return document(pou("".join([value(1, "a", at="10,200"), value(2, "b", at="10,20"), *results]), "a b p q r s", language="FBD"))
+    drawn = "".join([value(1, "a", at="10,200"), value(2, "b", at="10,20"), *results])
+    return document(pou(drawn, "a b p q r s", language="FBD"))
 
 
 @each_of(("orders", "first"), [((1, 2, 3, 4), "p := a;"), ((3, 4, 1, 2), "r := b;"), ((1, 3, 2, 4), "r := b;")])
