@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from rows import each_of
 from twincat_files import COUNTER, HEAD, MAIN, POINT
 
 from fbvm.interchange.twincat.objects import read_object
@@ -101,8 +102,9 @@ def test_bodies_in_other_languages_are_named_with_their_place(body: str, said: s
     assert made.source is not None and made.source.text.split()[-1] == "END_PROGRAM"
 
 
-def test_a_network_diagram_without_an_archive_is_named_with_its_place() -> None:
-    made = read_object(MAIN.replace("<ST>", "<NWL/><ST>").encode(), "MAIN.TcPOU")
+@each_of("archive", ["", '<XmlArchive><Data><o t="CFCImplementationObject"/></Data></XmlArchive>'])
+def test_a_network_diagram_without_networks_is_named_with_its_place(archive: str) -> None:
+    made = read_object(MAIN.replace("<ST>", f"<NWL>{archive}</NWL><ST>").encode(), "MAIN.TcPOU")
     [found] = made.diagnostics
     assert (found.code, found.message) == ("X0203", "the network diagram of MAIN is empty or damaged")
     assert found.source.place(found.start)[0] == 12

@@ -149,7 +149,6 @@ class Scope:
                 self.facts.constants[expr] = cut(self.facts.constants[expr], base(target))
             return True
         if self.takes_power(expr, base(target)):
-            self.facts.types[expr] = UNTYPED_REAL
             return self.adopt(expr, target, code) is not None
         self._misfit(expr, kind, target, code, role)
         return False

@@ -178,6 +178,16 @@ def rows_of(program: Image, scans: range, most: int = 1000, names: tuple[str, ..
     return found, source, found.window(scans, most)
 
 
+def test_what_a_statement_changes_behind_its_call_is_one_row() -> None:
+    """Both outputs are assigned behind the body of the block: once more the statement of the call, with two changes."""
+    made = image("FUNCTION_BLOCK F VAR_OUTPUT a, b : INT; END_VAR a := a + 1; b := b + 1; END_FUNCTION_BLOCK\n"
+                 "PROGRAM Main VAR f : F; n, late : INT; END_VAR\nf(a => n, b => late);\nEND_PROGRAM\n")
+    found, source, window = rows_of(made, range(3, 4), names=("n", "late"))
+    lines = {number: source.sites[site].line for site, number in found.sites.items() if site >= 0}
+    assert [(lines.get(where, where), moved) for where, _, *moved in window.rows[3]] == [
+        (-1, []), (3, []), (1, []), (1, []), (3, [0, "4", 1, "4"])]
+
+
 def test_a_row_is_a_statement_with_what_it_changed(program: Image) -> None:
     found, source, window = rows_of(program, range(3, 4))
     numbers = {number: source.sites[site].line for site, number in found.sites.items() if site >= 0}
