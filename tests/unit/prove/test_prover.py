@@ -403,6 +403,14 @@ def test_an_answer_within_a_time_is_proved() -> None:
 
 
 @pytest.mark.slow
+def test_induction_looks_back_as_many_scans_as_an_answer_may_take() -> None:
+    image = program("Q := s[7]; FOR i := 7 TO 1 BY -1 DO s[i] := s[i - 1]; END_FOR s[0] := In;",
+                    "s : ARRAY[0..7] OF BOOL; i : INT; Q : BOOL;")
+    verdict = answered(image, 80)
+    assert (verdict.word, verdict.how) == ("proved", "by induction over 10 scans")
+
+
+@pytest.mark.slow
 def test_an_answer_that_comes_too_late_is_shown() -> None:
     image = program(WAITING, "t : TON; Q : BOOL;")
     verdict = answered(image, 20, "NOT Main.Other")
