@@ -11,6 +11,7 @@ from rows import each_of
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.code.image import Image
 from fbvm.code.operations import Block, Node
+from fbvm.engine.native.emit.module import translate
 from fbvm.engine.powered import BodyMarks, powered, state
 
 
@@ -84,6 +85,12 @@ def test_a_body_for_several_instances_has_marks_for_as_many_as_there_can_be() ->
     assert (marks.first, marks.marks, marks.low, marks.size, marks.count) == (0, 2, SLOTS_OFFSET, size, room // size + 1)
     assert made.image.marks == 2 * marks.count
     assert [node[2] for node in made.image.bodies[1].code if node[0] == "mark"] == [(SLOTS_OFFSET, size, marks.count, 2)] * 2
+
+
+def test_machine_code_has_room_for_all_marks_in_front_of_the_fields_of_its_context() -> None:
+    made = powered(several()).image
+    code, without = translate(made), translate(several())
+    assert -code.kept_bytes == code.marks_at <= -made.marks and without.kept_bytes == without.marks_at == 0
 
 
 def test_a_state_is_that_of_its_marks_and_unknown_as_long_as_one_of_them_is() -> None:
