@@ -6,6 +6,7 @@ import signal
 
 import pytest
 
+from fbvm.run import loop
 from fbvm.run.interrupts import Interrupts
 
 
@@ -24,3 +25,9 @@ def test_ctrl_c_ends_a_wait_at_once_and_is_noted_otherwise() -> None:
         with pytest.raises(KeyboardInterrupt):
             interrupts.begin_wait()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_behind_the_wait_for_a_scan_ctrl_c_is_noted_again() -> None:
+    with Interrupts() as interrupts:
+        now_ns, _ = loop._RealClock([], [], 0, interrupts).reach(1_000_000)
+        assert now_ns >= 1_000_000 and not interrupts.waits
