@@ -107,8 +107,7 @@ def bits(w: Writer, machine: str, source: str, a: Node) -> str:
         value = canonical_bits(w, value, source)
     if is_float(machine):
         kind = ir(machine)
-        number = w.new(f"bitcast {ir(source)} {value} to {kind}") if not is_float(source) else w.new(
-            f"bitcast i{width(source)} {value} to {kind}")
+        number = w.new(f"bitcast i{width(source)} {value} to {kind}")
         return w.new(f"bitcast i{width(machine)} {canonical_bits(w, number, machine)} to {kind}")
     return value
 
