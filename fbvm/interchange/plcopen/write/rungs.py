@@ -360,6 +360,8 @@ class RungWriter:
         inputs += [(f"OP{at}", self.numbered.get(text.upper(), text)) for at, text in enumerate(step.operands, 1)]
         self.drawing.block(step.mnemonic, "", inputs, [("ENO", "")], column + 1, place, step.prefix + step.mnemonic)
         self.rows = max(self.rows, place + len(inputs) // 2 + 1)
+        if row.inputs:
+            self.power.row = self.rows
         self.columns = max(self.columns, column + 3)
 
     def _call(self) -> None:
