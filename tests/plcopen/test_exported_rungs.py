@@ -191,3 +191,39 @@ def test_where_the_elements_of_a_rung_stand_and_what_their_wires_come_from(steps
     made = exported(rungs(steps))
     assert "; ".join(drawn(made)) == drawing
     assert lie_on_each_other(made) == []
+
+
+def declared(made: Exported) -> list[str]:
+    """The variables of the program as `name` and `name : type`, where the type is a derived one."""
+    return [" : ".join(filter(None, [one.get("name"), *(kind.get("name") for kind in one.walk() if kind.name == "derived")]))
+            for one in root(made).walk() if one.name == "variable" and one.get("name")]
+
+
+UP = "LADDER\n{} a\nUP\nOUT x\nEND_LADDER\n"
+
+
+@each_of("first, behind, names", [
+    (UP.format("LD"), "", ["Edge1 : R_TRIG"]),
+    (UP.format("LD a\nUP\nAND"), "", ["Edge1 : R_TRIG", "Edge2 : R_TRIG"]),
+    (UP.format("LD"), f"ACTION one:\n{UP.format('LD')}END_ACTION\nACTION two:\n{UP.format('LD')}END_ACTION",
+     ["Edge1 : R_TRIG", "Edge2 : R_TRIG", "Edge3 : R_TRIG"]),
+    (UP.format("LD edge1\nOR EDGE2\nAND"), "", ["Edge3 : R_TRIG"]),  # variables of the project
+    (UP.format("LD"), "ACTION one:\nLADDER\nLD a\nFBCALL TON Edge1 IN:=*\nEND_LADDER\nEND_ACTION",
+     ["Edge2 : R_TRIG", "Edge1 : TON"]),
+    ("LADDER\nLD a\nFBCALL TON fresh IN:=*\nEND_LADDER\nx := a;\nLADDER\nLD a\nFBCALL TON Fresh IN:=*\nEND_LADDER\n",
+     "ACTION one:\nLADDER\nLD a\nFBCALL TON FRESH IN:=*\nEND_LADDER\nEND_ACTION", ["fresh : TON"]),
+    ("LADDER\nLD a\nFBCALL TON T IN:=*\nEND_LADDER\n", "", []),
+])  # fmt: skip
+def test_what_rungs_need_is_declared_once_and_each_edge_has_an_instance_of_its_own(
+        first: str, behind: str, names: list[str]) -> None:
+    made = exported(first, behind=behind)
+    assert declared(made)[HEAD.count(",") + HEAD.count(":"):] == names
+    used = [one.get("instanceName") for one in root(made).walk() if one.get("typeName") == "R_TRIG"]
+    assert sorted(used) == [name.split()[0] for name in names if "R_TRIG" in name]
+
+
+def test_a_method_has_no_instance_that_rungs_of_its_block_name() -> None:
+    call = "LADDER\nLD a\nFBCALL TON fresh IN:=*\nEND_LADDER\n"
+    block = f"FUNCTION_BLOCK Main\n{HEAD}METHOD m\n{call}END_METHOD\n{call}END_FUNCTION_BLOCK\n"
+    assert [each.message for each in export_xml([Source("Main.st", block)]).errors] == [
+        "Main: the rungs of METHOD m need memory of their own"]

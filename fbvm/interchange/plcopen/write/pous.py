@@ -42,7 +42,8 @@ def pou(types: Types, declared: tree.Pou) -> Element:
     types.note(sections)
     types.instances = _instances(variables)
     lists = objects.lists(types, declared)
-    taken = {name.text.upper() for variable in variables for name in variable.names}
+    names = {name.text.upper() for variable in variables for name in variable.names}
+    taken = set(names)
     transitions: list[Element] = []
     if declared.body and isinstance(declared.body[0], Sfc):
         inner, transitions, instances = _chart(types, declared.body[0], taken)
@@ -51,7 +52,7 @@ def pou(types: Types, declared: tree.Pou) -> Element:
     actions = [_action(types, action, taken, instances) for action in declared.actions if not _is_hidden(action)]
     if instances:
         lists.append(element("localVars", *instances.values()))
-    members = objects.members(types, declared, lambda method, start, end: _method_body(types, method, start, end, taken))
+    members = objects.members(types, declared, lambda method, start, end: _method_body(types, method, start, end, names))
     result = element("returnType", types.spec(declared.result)) if declared.result is not None else None
     head = objects.added(objects.inherited("pouinheritance", declared.bases, declared.interfaces),
                          objects.access([word.text for word in declared.modifiers]), objects.attributes(types, declared.start))
@@ -68,7 +69,7 @@ def _instances(variables: Sequence[tree.VarDecl]) -> dict[str, str]:
 
 def _method_body(types: Types, method: tree.Pou, start: int, end: int, taken: set[str]) -> Element:
     """The element of the body of a method, which has nothing that lasts from one call to the next.  Raises NotExportable."""
-    variables = [variable for section in method.sections for variable in section.variables]
+    variables = [variable for section in method.sections if not section.hidden for variable in section.variables]
     outer, types.instances = types.instances, types.instances | _instances(variables)
     inner, instances = _body(types, method.body, start, end,
                              taken | {name.text.upper() for variable in variables for name in variable.names})

@@ -70,7 +70,8 @@ class Power:
 
 
 class RungWriter:
-    """Draws the rungs of one POU; `declared` grows by the variables that the drawing needs, by name."""
+    """Draws the rungs of one body; `declared` grows by the variables that the drawing needs, by name, and `taken`, the names of
+    the POU's variables in capitals, by theirs."""
 
     def __init__(self, drawing: Drawing, types: Types, taken: set[str]) -> None:
         self.drawing, self.types, self.taken = drawing, types, taken
@@ -88,7 +89,8 @@ class RungWriter:
                                     "have no name", f"give it a number, as in {symbol.name},T0005,TIMER,,,,")
         for instance in ladder.instances:
             name = instance.names[0].text
-            if name.upper() not in self.taken and name not in self.declared:
+            if name.upper() not in self.taken:
+                self.taken.add(name.upper())
                 self.declared[name] = self._declared(instance)
         for rung in ladder.rungs:
             notes = [text.lstrip("'/ ").rstrip() for _, text in rung.notes]
@@ -333,12 +335,12 @@ class RungWriter:
 
     def _up(self) -> None:
         """UP: an R_TRIG that the power goes through.  DOWN is refused: F_TRIG also has an edge in its first call."""
-        name, last = "Edge", 1
-        while f"{name}{last}".upper() in self.taken | {known.upper() for known in self.declared}:
+        last = 1
+        while (name := f"Edge{last}").upper() in self.taken or re.search(rf"(?i)\b{name}\b", self.types.source.text):
             last += 1
-        kind = element("type", element("derived", name="R_TRIG"))
-        self.declared[f"{name}{last}"] = element("variable", kind, name=f"{name}{last}")
-        self._function("R_TRIG", "CLK", "Q", f"{name}{last}")
+        self.taken.add(name.upper())
+        self.declared[name] = element("variable", element("type", element("derived", name="R_TRIG")), name=name)
+        self._function("R_TRIG", "CLK", "Q", name)
 
     def _instruction(self, step: Step, row: Instruction) -> None:
         """Draw an instruction of Omron's as a box of its name: conditions, then operands as they are written."""
