@@ -23,6 +23,12 @@ def root(made: Exported) -> Element:
     return found[1]
 
 
+def said(made: Exported) -> list[str]:
+    """Each message behind the text that it marks."""
+    return [f"{each.code} {each.source.text[each.start:each.end]}: {each.message.removeprefix('Main: ')}"
+            for each in made.diagnostics]
+
+
 def drawn(made: Exported) -> list[str]:
     """The elements of the drawings by their numbers.  Contacts, coils and blocks have a column and a row, rails their height in
     rows and the right one its column, too; `<3.Q` is a wire from output Q of element 3."""
@@ -193,6 +199,43 @@ def test_where_the_elements_of_a_rung_stand_and_what_their_wires_come_from(steps
     assert lie_on_each_other(made) == []
 
 
+NO_NAME = "is an address, for which other tools have no name; declare a variable AT it"
+NO_INSTRUCTION = "is an instruction that other tools do not have"
+NONE = "ladder of PLCopen XML has no"
+
+
+@each_of("steps, messages", [
+    ("LD T5 / ANDNOT P_Off / AND d / OUT D100.03", [f"X0390 LD T5: T5 {NO_NAME}", f"X0390 ANDNOT P_Off: P_Off {NO_NAME}",
+                                                    f"X0390 OUT D100.03: D100.03 {NO_NAME}"]),
+    ("LD P_On / AND> D7 #5 / OUT x", [f"X0390 AND> D7 #5: D7 {NO_NAME}"]),
+    ("LD a / FBCALL CTU u CU:=* PV:=D7 CV=>n / FBCALL CTU u CU:=* PV:=&7 CV=>W5",
+     [f"X0390 FBCALL CTU u CU:=* PV:=D7 CV=>n: D7 {NO_NAME}", f"X0390 FBCALL CTU u CU:=* PV:=&7 CV=>W5: W5 {NO_NAME}"]),
+    ("LD<=DT n m n / OR=$ n m / AND=SL n m / ANDTST n &3 / AND<D n m / AND>F n m / OUT x",
+     [f"X0390 {step}: {name} is a comparison that other tools do not have" for step, name in (
+         ("LD<=DT n m n", "<=DT"), ("OR=$ n m", "=$"), ("ANDTST n &3", "TST"))]),
+    ("LD a / MOV n m / LD b / MOV m n / TIM 5 #7", [f"X0390 MOV n m: MOV {NO_INSTRUCTION}",
+                                                    f"X0390 TIM 5 #7: TIM {NO_INSTRUCTION}"]),
+    ("LD a / BPRG 1 / BEND", [f"X0301 BPRG 1: {NONE} block program (BPRG)"]),
+    ("@LDNOT a / OUT x", [f"X0301 @LDNOT a: {NONE} contact that is negated and has an edge"]),
+    ("LD a / OR P_On / OUT x", [f"X0301 OR P_On: {NONE} wire that bridges contacts"]),
+    ("LD a / OUT TR0 / AND b / LD TR0 / AND c / ANDLD / OUT x",
+     [f"X0301 ANDLD: {NONE} AND of two places from which something else hangs"]),
+    ("LD a / LD b / LD c / LD X / OR d / ORLD / ANDLD / KEEP x", [f"X0301 KEEP x: {NONE} KEEP whose reset asks for its own bit"]),
+    ("LD a / OUT TR0 / AND b / LD TR0 / KEEP x", [f"X0301 KEEP x: {NONE} KEEP whose reset asks for its own bit"]),
+    ("LD a / OUT TR0 / AND b / LD TR0 / AND c / CNT 5 #10",
+     [f"X0301 CNT 5 #10: {NONE} CNT of which two inputs begin at a branch point", f"X0390 CNT 5 #10: CNT {NO_INSTRUCTION}"]),
+    ("LD a / DOWN / OUT x", [f"X0301 DOWN: {NONE} DOWN"]),
+    ("LD ,IR0 / OUT x", ["X0301 LD ,IR0: an address that is worked out cannot stand here"]),
+], ids=lambda row: row[0])  # fmt: skip
+def test_what_is_said_of_rungs_that_other_tools_do_not_have(steps: str, messages: list[str]) -> None:
+    assert said(exported(rungs(steps))) == messages
+
+
+def test_a_comparison_that_the_standard_has_no_function_for_is_drawn_under_its_own_name() -> None:
+    made = exported(rungs("LD<=DT n m n / AND<>SL n m / ANDTST n &3 / OUT x"))
+    assert [one.get("typeName") for one in root(made).walk() if one.name == "block"] == ["<=DT", "NE", "AND", "TST", "AND"]
+
+
 def declared(made: Exported) -> list[str]:
     """The variables of the program as `name` and `name : type`, where the type is a derived one."""
     return [" : ".join(filter(None, [one.get("name"), *(kind.get("name") for kind in one.walk() if kind.name == "derived")]))
@@ -227,3 +270,37 @@ def test_a_method_has_no_instance_that_rungs_of_its_block_name() -> None:
     block = f"FUNCTION_BLOCK Main\n{HEAD}METHOD m\n{call}END_METHOD\n{call}END_FUNCTION_BLOCK\n"
     assert [each.message for each in export_xml([Source("Main.st", block)]).errors] == [
         "Main: the rungs of METHOD m need memory of their own"]
+
+
+@each_of("body, boxes", [
+    ("LADDER\nLD a\nOUT x\nEND\nEND_LADDER", 0), ("LADDER\nLD a\nOUT x\nEND\nLD a\nOUT y\nEND_LADDER", 1),
+    ("LADDER\nLD a\nOUT x\nEND\nEND_LADDER\ny := a;", 1), ("y := a;\nLADDER\nLD a\nOUT x\nEND\nEND_LADDER", 0),
+])  # fmt: skip
+def test_an_end_is_left_out_where_nothing_stands_behind_it(body: str, boxes: int) -> None:
+    assert [one.get("typeName") for one in root(exported(body)).walk() if one.name == "block"] == ["END"] * boxes
+
+
+def test_symbols_of_a_table_are_declared_or_stand_for_their_timers() -> None:
+    table = ('Start,0.00,BOOL,,,,"";\nWait,T0007,TIMER,,,,"";\nCount,C0012,COUNTER,,,,"";\nRows,D200,INT[4],,,,"";\n'
+             'One,,UINT[1],,,,"";\nMore,,CHANNEL,,,,"";\na,D3,BOOL,,,,"";\n')
+    steps = "RUNG 1 first\n// second\n' third\nLD Start\nANDNOT wait\nAND= More Wait\nMOV Count Rows"
+    made = exported(f"LADDER\n{table}{steps}\nEND_LADDER")
+    places = [_words(one.get("name"), *(part.name for part in one.walk() if part.name.isupper()),
+                     *(f"{part.get('lower')}..{part.get('upper')}" for part in one.walk() if part.name == "dimension"),
+                     *(part.text.strip() for part in one.walk() if part.name == "text"))
+              for one in root(made).walk() if one.name == "variable" and one.get("name")]
+    assert places[-4:] == ["Start BOOL CIO 0.00", "Rows INT 0..3 D200", "One UINT 0..0", "More WORD"]
+    assert drawn(made) == [
+        "1 first / second / third", "2 rail 3", "3 contact Start 0 0 <2", "4 contact not T7 1 0 <3", "5 More", "6 T7",
+        "7 EQ 3 1 IN1 <5 IN2 <6 OUT", "8 AND 4 0 IN1 <4 IN2 <7.OUT OUT", "9 C12", "10 Rows",
+        "11 MOV 6 0 EN <8.OUT OP1 <9 OP2 <10 ENO"]
+    assert said(made) == [f"X0390 {marked}: the address {place} is kept as data of this program; other tools place the variable"
+                          for marked, place in (("Start", "CIO 0.00"), ("Rows", "D200"))] + [
+        f"X0390 ANDNOT wait: T7 {NO_NAME}", f"X0390 MOV Count Rows: MOV {NO_INSTRUCTION}"]
+
+
+def test_a_timer_of_each_instance_has_no_name_in_other_tools() -> None:
+    made = exported('LADDER\nOwn,,TIMER,,,,"";\nRUNG 1\nLD a\nOUT x\nEND_LADDER')
+    assert [(each.message, each.hint) for each in made.diagnostics] == [
+        ("Main: Own is a timer of each instance, for which other tools have no name",
+         "give it a number, as in Own,T0005,TIMER,,,,")]

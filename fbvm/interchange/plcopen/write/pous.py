@@ -159,7 +159,7 @@ def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str],
     for statement in body:
         if isinstance(statement, Ladder):
             statements.end_network()
-            rungs.ladder(statement)
+            rungs.ladder(statement, statement is body[-1])
         else:
             statements.write(statement)
     return element("LD", *drawing.elements), rungs.declared

@@ -29,7 +29,8 @@ EDGES = {"@": {"edge": "rising"}, "%": {"edge": "falling"}}
 ALWAYS = "P_ON"
 COMPARISONS = {"=": "EQ", "<>": "NE", "<": "LT", "<=": "LE", ">": "GT", ">=": "GE"}
 """Signs of comparisons, and the functions of the standard for them."""
-_NAME = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*|\[\d+\])*")
+_NUMERIC = re.compile(r"(?:SL?|[LFD])\Z")
+"""What stands behind the sign of a comparison that compares numbers."""
 
 
 @dataclass(eq=False)
@@ -42,10 +43,11 @@ class Contact:
 
 @dataclass(eq=False)
 class Test:
-    """A comparison that is still to be drawn."""
+    """A comparison that is still to be drawn, as a block of this name with these values."""
 
+    kind: str
+    values: list[str]
     mnemonic: str
-    operands: tuple[str, ...]
 
 
 @dataclass(eq=False)
@@ -79,8 +81,9 @@ class RungWriter:
         self.numbered = dict(types.numbered)
         """Symbols that mean timers and counters, and their numbers."""
 
-    def ladder(self, ladder: Ladder) -> None:
-        """Draw LADDER .. END_LADDER.  Raises NotExportable."""
+    def ladder(self, ladder: Ladder, is_last: bool) -> None:
+        """Draw LADDER .. END_LADDER.  An END at its end is left out if the LADDER `is_last` in its body: it keeps nothing from
+        being executed then.  Raises NotExportable."""
         for symbol in self._symbols(ladder):
             if timer := number(symbol):
                 self.numbered[symbol.name.upper()] = timer
@@ -96,7 +99,7 @@ class RungWriter:
             notes = [text.lstrip("'/ ").rstrip() for _, text in rung.notes]
             if comment := "\n".join(filter(None, [rung.comment, *notes])):
                 self.drawing.comment(comment)
-            if rung.steps and not (rung is ladder.rungs[-1] and rung.steps[0].mnemonic == "END"):
+            if rung.steps and not (is_last and rung is ladder.rungs[-1] and rung.steps[0].mnemonic == "END"):
                 self._rung(rung)
 
     def _symbols(self, ladder: Ladder) -> Iterator[Symbol]:
@@ -137,17 +140,16 @@ class RungWriter:
 
     def _step(self, step: Step) -> None:
         row = instruction_set().rows[step.mnemonic]
-        prefix = step.prefix.replace("!", "")
         if row.ends_condition:
             raise self._not_exportable(f"block program ({step.mnemonic})")
         if join := re.fullmatch(r"(LD|AND|OR)(NOT)?", step.mnemonic):
             self._join(join[1], bool(join[2]), step)
         elif row.kind == "?":
             how = next(how for how in JOINS if step.mnemonic.startswith(how))
-            self._joined(how, [Test(step.mnemonic.removeprefix(how), step.operands)])
+            self._joined(how, [self._test(step.mnemonic.removeprefix(how), step.operands)])
         elif step.mnemonic in ("ANDLD", "ORLD"):
             self._block(step.mnemonic)
-        elif step.mnemonic in COILS and not (prefix and step.mnemonic not in ("SET", "RSET")):
+        elif step.mnemonic in COILS:
             self._coil(step)
         elif step.mnemonic in _OTHERS:
             _OTHERS[step.mnemonic](self)
@@ -194,14 +196,20 @@ class RungWriter:
             marks["negated"] = "true"
         return [Contact(self._symbol(name), marks)]
 
+    def _test(self, mnemonic: str, operands: tuple[str, ...]) -> Test:
+        kind = COMPARISONS.get(_NUMERIC.sub("", mnemonic), mnemonic)
+        if kind == mnemonic:
+            self.foreign(self.step, f"{mnemonic} is a comparison that other tools do not have")
+        return Test(kind, [self._operand(text) for text in operands], mnemonic)
+
     def _symbol(self, name: str) -> str:
         """The variable of a contact or coil; an address is noted as one that other tools cannot name."""
         name = self.numbered.get(name.upper(), name)
         try:
-            meant = Operands().expression(name, "b", self.step.start, self.step.end)
+            is_variable = _is_variable(name)
         except OperandError as wrong:
             raise NotExportable(self.step, wrong.args[0], "") from None
-        if not isinstance(meant, tree.NameRef | tree.Member | tree.Index) or name.upper() in SYMBOLS:
+        if not is_variable:
             self.foreign(self.step, f"{name} is an address, for which other tools have no name; declare a variable AT it")
         return name
 
@@ -273,9 +281,8 @@ class RungWriter:
 
     def _tested(self, part: Test, ends: Ends, column: int, row: int) -> Ends:
         """Draw a comparison as a block of the standard, and an AND with the condition before it."""
-        kind = COMPARISONS.get(re.sub(r"[A-Z]+$", "", part.mnemonic), part.mnemonic)
-        values = [(f"IN{at}", self._operand(text)) for at, text in enumerate(part.operands, 1)]
-        made = self.drawing.block(kind, "", [*values], [("OUT", "")], column + 1, row + 1, part.mnemonic)
+        inputs: list[tuple[str, Ends | str]] = [(f"IN{at}", value) for at, value in enumerate(part.values, 1)]
+        made = self.drawing.block(part.kind, "", inputs, [("OUT", "")], column + 1, row + 1, part.mnemonic)
         if ends[0].id == self.start.id:
             return (made["OUT"],)
         both: list[tuple[str, Ends | str]] = [("IN1", ends), ("IN2", (made["OUT"],))]
@@ -396,10 +403,21 @@ class RungWriter:
             return f"16#{text[1:]}"
         if re.fullmatch(r"[+-][\d.]+", text):
             return text.lstrip("+")
-        if text[0] in "'\"" or "#" in text or text.upper() in ("TRUE", "FALSE") or _NAME.fullmatch(text):
+        if text[0] in "'\"" or "#" in text or text.upper() in ("TRUE", "FALSE"):
             return text
-        self.foreign(self.step, f"{text} is an address, for which other tools have no name; declare a variable AT it")
+        try:
+            is_variable = _is_variable(text)
+        except OperandError:
+            is_variable = False
+        if not is_variable:
+            self.foreign(self.step, f"{text} is an address, for which other tools have no name; declare a variable AT it")
         return text
+
+
+def _is_variable(text: str) -> bool:
+    """Whether an operand names a variable: D100 is an address, also where a variable is called so.  Raises OperandError."""
+    meant = Operands().expression(text, "b", 0, 0)
+    return isinstance(meant, tree.NameRef | tree.Member | tree.Index) and text.upper() not in SYMBOLS
 
 
 def _contacts(series: Series) -> list[Contact]:
