@@ -7,7 +7,7 @@ from rows import each_of
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.markup import Element, parse_markup
 from fbvm.interchange.plcopen.write.exporting import Exported, export_xml
-from fbvm.interchange.plcopen.write.layout import AXIS, COLUMN, PIN, ROW, SYMBOL_HEIGHT
+from fbvm.interchange.plcopen.write.layout import AXIS, COLUMN, GAP, PIN, ROW, SYMBOL_HEIGHT
 
 HEAD = "VAR a, b, c, d, x, y : BOOL; n, m : INT; t : TON; END_VAR\n"
 
@@ -37,7 +37,7 @@ def drawn(made: Exported) -> list[str]:
 
 def _with_tops(ladder: Element) -> list[tuple[Element, int]]:
     """The elements of a drawing, each with the y at which its network begins."""
-    found, top = [], 0
+    found, top = [], GAP
     for child in ladder.children:
         if child.name == "leftPowerRail":
             top = _at(child)[1]
@@ -66,10 +66,10 @@ def _element(placed: tuple[Element, int]) -> str:
     if element.name != "block":
         marks = [element.get("negated").replace("true", "not").replace("false", ""), element.get("edge"), element.get("storage")]
         row = (y + SYMBOL_HEIGHT // 2 - AXIS - top) / ROW
-        return _words(number, element.name, *marks, element.text.strip(), f"{column:g} {row:g}") + _wires(element)
+        return _words(number, element.name, *marks, element.text.strip(), f"{column:g} {row:.3g}") + _wires(element)
     pins = [f"{pin.get('formalParameter')}{_wires(pin)}" for pin in element.walk() if pin.name == "variable"]
     row = (y + PIN - AXIS - top) / ROW
-    return _words(number, element.get("typeName"), element.get("instanceName"), f"{column:g} {row:g}", *pins)
+    return _words(number, element.get("typeName"), element.get("instanceName"), f"{column:g} {row:.3g}", *pins)
 
 
 def _words(*words: str) -> str:

@@ -15,7 +15,7 @@ from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import walk
 
-FUNCTIONS = {sign: name for name, sign in SIGNS.items()}
+FUNCTIONS = {**{sign: name for name, sign in SIGNS.items()}, "**": "EXPT"}
 """By operator, the function that is drawn for it."""
 COLUMN = 3
 """Where blocks stand, so that their values fit in front of them."""
@@ -104,7 +104,7 @@ class StatementWriter:
     def _function(self, name: str, operands: list[tuple[str, tree.Expr]]) -> Ends:
         inputs = [(pin, self._value(operand)) for pin, operand in operands]
         ends = self.drawing.block(name, "", inputs, [("OUT", "")], COLUMN, 0)
-        self.drawing.skip(1)
+        self.drawing.skip(max(len(operands) // 2, 1))
         return (ends["OUT"],)
 
     def _block_of(self, part: tree.Node) -> Element | None:
@@ -133,14 +133,13 @@ class StatementWriter:
         inputs: list[tuple[str, Ends | str]] = []
         outputs: list[tuple[str, str]] = []
         for argument in call.arguments:
-            if argument.name is None or argument.negated or not isinstance(call.callee, tree.NameRef):
+            if argument.name is None or argument.negated:
                 raise self._not_exportable(tree.CallStatement(call.start, call.end, call))
             if argument.kind == "=>":
                 outputs.append((argument.name.text, self.types.text(argument.value) if argument.value else ""))
             elif argument.value is not None:
                 inputs.append((argument.name.text, self._value(argument.value)))
-        assert isinstance(call.callee, tree.NameRef)
-        name = call.callee.text
+        name = call.callee.text if isinstance(call.callee, tree.NameRef) else ""
         kind = self.types.instances.get(name.upper())
         if kind is None:
             raise self._not_exportable(tree.CallStatement(call.start, call.end, call))
