@@ -311,6 +311,28 @@ def test_a_function_that_is_not_enabled_gives_what_its_tool_gives(order: str, ex
     assert states(made, "x y n", ["", "a=1", "a=0"]) == expected
 
 
+SPLIT = """<pou name="Split" pouType="function"><interface><returnType><INT/></returnType><inputVars><variable name="v"><type>
+<INT/></type></variable></inputVars><outputVars><variable name="rest"><type><INT/></type></variable></outputVars></interface>
+<body><ST><xhtml:p>Split := v / 10; rest := v MOD 10;</xhtml:p></ST></body></pou>"""
+
+
+@each_of("order", ["network", "document"])
+def test_what_takes_an_output_of_a_function_keeps_its_value_while_the_function_is_not_enabled(order: str) -> None:
+    drawn = (value(2, "a") + value(3, "48") + block(5, "Split", "EN=2 v=3", "ENO,Split,rest") + result(6, "5.Split", "n")
+             + result(7, "5.rest", "m"))
+    declared = variable("a") + variable("n", "INT", "7") + variable("m", "INT", "9")
+    assert states(import_xml(document(pou(drawn, declared), SPLIT), order=order), "n m", ["", "a=1", "a=0"]) == [
+        "7 9", "4 8", "4 8"]
+
+
+@each_of("enable", ["EN", "en"])
+def test_what_takes_an_output_of_a_block_keeps_its_value_while_the_block_is_not_enabled(enable: str) -> None:
+    drawn = value(2, "a") + value(3, "b") + block(4, "CTU", f"{enable}=2 CU=3", f"{enable}O,Q,CV", "s") + result(5, "4.CV", "n") \
+        + contact(6, "4.Q", "b") + coil(7, "6", "x")  # so that no call gives n its value
+    declared = variable("a") + variable("b") + variable("x") + variable("n", "INT", "7") + variable("s", "CTU")
+    assert states(import_xml(document(pou(drawn, declared))), "n", ["b=1", "a=1", "a=0"]) == ["7", "1", "1"]
+
+
 def test_what_came_back_through_a_loop_is_kept_for_who_reads_it_behind_the_loop() -> None:
     body = (value(1, "n") + value(2, "INT#3") + block(3, "ADD", "IN1=1 IN2=4", "OUT", marks='executionOrderId="1"')
             + result(5, "4", "m") + result(6, "3", "k") + block(4, "SUB", "IN1=2 IN2=4", "OUT"))

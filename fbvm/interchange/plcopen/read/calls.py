@@ -64,7 +64,7 @@ class Calls:
         root = context.scope.root(item.instance)
         in_outs = self._in_outs(item, arguments)
         writes = {root, SHARED, *map(context.scope.root, in_outs)}
-        enabled = any(text.startswith("EN :=") for text in arguments)
+        enabled = any(text.upper().startswith("EN :=") for text in arguments)
         if enabled:
             for sink, wire in self._next_sinks(item):
                 arguments.append(f"{wire.pin} => {sink.text}")
@@ -311,8 +311,7 @@ class Calls:
         if condition is not None:
             enabled = context.scope.new(f"Enable_{item.id}", "BOOL", context.apart)
             context.write(f"{enabled} := {condition.text};", frozenset((enabled.upper(),)))
-            if wire is not None:
-                self.guards[item, wire.pin] = variable(enabled)
+            self.guards |= {(item, pin.name): variable(enabled) for pin in item.outputs if pin.name.upper() != "ENO"}
             call = f"IF {enabled} THEN {call} END_IF;"
         context.write(call, writes)
         if eno:
