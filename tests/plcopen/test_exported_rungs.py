@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source
@@ -192,11 +193,33 @@ def rungs(steps: str) -> str:
      "<4.OUT <7.OUT <8; 10 end 4 7 <9"),
     ("LD a / LD b / OUT TR0 / AND c / ORLD / OUT x",
      "1 rail 3; 2 contact b 0 0 <1; 3 contact a 0 1 <1; 4 contact c 1 2 <2; 5 coil x 2 1 <3 <4; 6 end 3 3 <5"),
+    ("LD a / OR b / AND c / OR d / OUT x",
+     "1 rail 3; 2 contact a 0 0 <1; 3 contact b 0 1 <1; 4 contact c 1 0 <2 <3; 5 contact d 0 2 <1; 6 coil x 2 0 <4 <5; 7 end "
+     "3 3 <6"),
+    ("LD a / OR b / LD c / OR d / ORLD / OUT x",
+     "1 rail 4; 2 contact a 0 0 <1; 3 contact b 0 1 <1; 4 contact c 0 2 <1; 5 contact d 0 3 <1; 6 coil x 1 0 <2 <3 <4 <5; 7 "
+     "end 2 4 <6"),
+    ("LD a / LD b / OR c / ANDLD / AND d / OR x / OUT y",
+     "1 rail 3; 2 contact a 0 0 <1; 3 contact b 1 0 <2; 4 contact c 1 1 <2; 5 contact d 2 0 <3 <4; 6 contact x 0 2 <1; 7 "
+     "coil y 3 0 <5 <6; 8 end 4 3 <7"),
+    ("LD a / OUT TR0 / AND b / AND c / AND d / OUT TR1 / LD TR0 / OUT x",
+     "1 rail 2; 2 contact a 0 0 <1; 3 contact b 1 0 <2; 4 contact c 2 0 <3; 5 contact d 3 0 <4; 6 coil x 1 1 <2; 7 end 5 2 "
+     "<6"),
+    ("LD a / OUT TR0 / AND b / AND c / AND d / OUT TR1 / LD TR0 / MOV n m",
+     "1 rail 3; 2 contact a 0 0 <1; 3 contact b 1 0 <2; 4 contact c 2 0 <3; 5 contact d 3 0 <4; 6 n; 7 m; 8 MOV 2 1 EN <2 "
+     "OP1 <6 OP2 <7 ENO"),
 ], ids=lambda row: row[0])  # fmt: skip
 def test_where_the_elements_of_a_rung_stand_and_what_their_wires_come_from(steps: str, drawing: str) -> None:
     made = exported(rungs(steps))
     assert "; ".join(drawn(made)) == drawing
     assert lie_on_each_other(made) == []
+
+
+@pytest.mark.slow
+def test_as_many_contacts_as_a_rung_has_stand_side_by_side() -> None:
+    made = exported(rungs(" / ".join(["LD a", *["OR b"] * 999, "OUT x"])))
+    assert drawn(made)[1000:] == ["1001 contact b 0 999 <1", "1002 coil x 1 0" + "".join(f" <{at}" for at in range(2, 1002)),
+                                  "1003 end 2 1000 <1002"]
 
 
 NO_NAME = "is an address, for which other tools have no name; declare a variable AT it"

@@ -244,7 +244,7 @@ class RungWriter:
 
     def _drawn(self, power: Power) -> Ends:
         """Draw the elements of a condition that are not drawn yet; returns the outputs from which it comes."""
-        if power.ends is None and power.column == 0:
+        if power.ends is None:
             power.row = max(power.row, self.rows)
         ends = (self._rail_end(power.row),) if power.ends is None else power.ends
         ends, power.column, used = self._series(power.series, ends, power.column, power.row)
@@ -298,7 +298,6 @@ class RungWriter:
         ends = self._drawn(power)
         row = power.row
         power.row = self.rows = max(self.rows, row + 1)
-        self.columns = max(self.columns, power.column + 1)
         return ends, power.column, row
 
     def _coil(self, step: Step) -> None:
