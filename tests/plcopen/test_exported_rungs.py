@@ -217,9 +217,9 @@ def test_where_the_elements_of_a_rung_stand_and_what_their_wires_come_from(steps
 
 @pytest.mark.slow
 def test_as_many_contacts_as_a_rung_has_stand_side_by_side() -> None:
-    made = exported(rungs(" / ".join(["LD a", *["OR b"] * 999, "OUT x"])))
-    assert drawn(made)[1000:] == ["1001 contact b 0 999 <1", "1002 coil x 1 0" + "".join(f" <{at}" for at in range(2, 1002)),
-                                  "1003 end 2 1000 <1002"]
+    made = exported(rungs(" / ".join(["LD a", *["OR b"] * 998, "OUT x"])))
+    assert drawn(made)[999:] == ["1000 contact b 0 998 <1", "1001 coil x 1 0" + "".join(f" <{at}" for at in range(2, 1001)),
+                                  "1002 end 2 999 <1001"]
 
 
 NO_NAME = "is an address, for which other tools have no name; declare a variable AT it"
