@@ -9,7 +9,7 @@ from drawings import RAIL, block, codes, contact, document, imported, plc, pou, 
 from rows import each_of
 
 from fbvm.interchange.imported import Imported
-from fbvm.interchange.plcopen.read.charts import STEP_ACTIONS
+from fbvm.interchange.plcopen.read.charts import STEP_ACTIONS, with_new_names
 from fbvm.interchange.plcopen.read.importing import import_xml
 
 CODESYS = "http://www.3s-software.com/plcopenxml/"
@@ -142,6 +142,8 @@ def test_actions_with_bodies_qualifiers_and_times() -> None:
     (transition(7, "1", inline("TRUE")), "no step stands below"),
     (transition(7, "1", "") + jump(8, "7", "nowhere"), "no step nowhere"),
     (transition(7, "1", "") + jump(8, "7", "s"), "has no condition"),
+    (transition(7, "1", inline("x")) + node("simultaneousDivergence", 8, "7") + step(9, "e", "8")
+     + transition(10, "9", inline("x")) + jump(11, "10", ""), "there is no step  to jump to"),
     (actions(7, "1", f"{does('x')}|qualifier=\"DL\" duration=\"T#1s\""), "qualifier DL"),
 ])
 def test_a_chart_that_cannot_be_taken_over_is_left_out_with_a_reason(part: str, says: str) -> None:
@@ -297,6 +299,28 @@ def test_a_condition_that_ends_with_a_semicolon(text: str) -> None:
                    value(9, text), declared="a b x")
     assert beside.errors == []
     assert states(beside, "x", ["a=1 b=1", "b=0"]) == ["0", "1"]
+
+
+@each_of("text, condition", [
+    ("a", "a"), (":= a;", "a"), ("leave := a  AND\n b;", "a AND b"), ("a; // ready", "a"), ("a // ready\n AND b", "a AND b"),
+    ("// ready;\n a (* := *) AND /* ; */ b ;", "a AND b"), ("text = 'a  // b' ;;", "text = 'a  // b'"),
+    ("", "TRUE"), (";", "TRUE"),
+])  # fmt: skip
+def test_a_condition_is_one_line_without_comments(text: str, condition: str) -> None:
+    written = f'<inline name="leave"><ST><xhtml:p>{text}</xhtml:p></ST></inline>'
+    made = chart(step(1, "s", first=True), transition(2, "1", written), step(3, "e", "2"), declared="a b")
+    assert f"TRANSITION FROM s TO e := {condition};" in made.files["Main.st"]
+
+
+def test_a_drawn_condition_is_one_line_without_comments() -> None:
+    made = chart(step(1, "s", first=True), transition(2, "1", wires("9")), step(3, "e", "2"), value(9, "a // ready\n = 'b  c'"),
+                 declared=variable("a", "STRING"))
+    assert "TRANSITION FROM s TO e := a = 'b  c';" in made.files["Main.st"]
+
+
+def test_members_of_instances_are_no_flags_of_steps() -> None:
+    assert with_new_names("x := go.X AND Go . T > t AND m.go.X AND logo.X AND go.Xs;", {"GO": "go_2"}) == \
+        "x := go_2.X AND go_2.T > t AND m.go.X AND logo.X AND go.Xs;"
 
 
 FORKED = pou(step(1, "s", "9", first=True) + node("selectionDivergence", 2, "1") + transition(3, "2", inline("go"), at="90,0")

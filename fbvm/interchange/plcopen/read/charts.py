@@ -18,6 +18,7 @@ from fbvm.interchange.plcopen.read.document import Body, Pou, Reading
 from fbvm.interchange.plcopen.read.networks import LARGEST
 from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.interchange.plcopen.read.types import duration
+from fbvm.interchange.plcopen.texts import squeezed
 from fbvm.syntax.tree.sfc import QUALIFIERS
 
 PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
@@ -292,7 +293,7 @@ class Chart:
         """The step that a jump names, or those behind the simultaneous divergence of that name."""
         name = jump.get("targetName").upper()
         for element in self.known.values():
-            if element.get("name").upper() == name:
+            if element.name in ("step", "simultaneousDivergence") and element.get("name").upper() == name != "":
                 return [self._name(element)] if element.name == "step" else self._divided(element)
         raise NotImportable(jump, f"there is no step {jump.get('targetName')} to jump to", "")
 
@@ -333,11 +334,11 @@ class Chart:
     def _bodied(self, name: str, body: Body, negated: bool) -> tuple[str, str, list[str]]:
         """A condition that has a body: an expression, with or without `:=`, or statements that assign to its name."""
         if body.language == "ST":
-            text = body.element.text.strip()
+            text = squeezed(body.element.text)
             match = _ASSIGNED.fullmatch(text)
-            plain = match[2] if match else text.rstrip("; \n")
+            plain = match[2] if match else text.rstrip("; ")
             if ";" not in plain and ":=" not in plain and (not match or not match[1] or match[1].upper() == name.upper()):
-                return name, _turned(" ".join(plain.split()) or "TRUE", negated), []
+                return name, _turned(plain or "TRUE", negated), []
         if body.language in ("LD", "FBD") and (made := self.conditions.named(name, body)):
             return name, _turned(made, negated), []
         lines = self.write(body)
@@ -365,7 +366,7 @@ def _references(element: Element) -> list[str]:
 def with_new_names(line: str, renamed: dict[str, str]) -> str:
     """A line in which the flags of steps are read by the new names of their steps."""
     for old, new in renamed.items():
-        line = re.sub(rf"(?i)\b{re.escape(old)}\s*\.\s*(?=[XT]\b)", f"{new}.", line)
+        line = re.sub(rf"(?i)(?<!\.)\b{re.escape(old)}\s*\.\s*(?=[XT]\b)", f"{new}.", line)
     return line
 
 

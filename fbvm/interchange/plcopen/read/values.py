@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 
 from fbvm.interchange.plcopen.schema import SIGNS
+from fbvm.interchange.plcopen.texts import squeezed
 
 LOOSE, OR, XOR, AND, EQUAL, COMPARE, ADD, MULTIPLY, UNARY, CALL, ATOM = range(11)
 """How tightly an operator binds, the weakest first (IEC 61131-3 table 71); a name or a literal is an atom."""
@@ -55,7 +56,7 @@ def variable(name: str) -> Value:
 
 def written(text: str, reads: frozenset[str]) -> Value:
     """The value of an expression that stands in the document."""
-    text = " ".join(text.split())
+    text = squeezed(text)
     return Value(text, ATOM if _ATOM.fullmatch(text) else LOOSE, reads)
 
 

@@ -10,6 +10,7 @@ from fbvm.base.digits import whole_number
 from fbvm.check.declarations.construction import arguments
 from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.schema import CODESYS, ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
+from fbvm.interchange.plcopen.texts import TEXTS, squeezed
 from fbvm.interchange.plcopen.write.layout import own_data
 from fbvm.syntax import tree
 
@@ -29,9 +30,7 @@ OUTPUTS = {
 """The outputs of the blocks of the standard, and of those that Beremiz and OpenPLC Editor add."""
 LISTS = {word: name for name, word in SECTIONS.items()}
 WORDS = {word: name for name, word in QUALIFIERS.items()}
-_TEXTS = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\"|\(\*.*?\*\)|//[^\n]*"""
-_SIGNS = re.compile(rf"(?s)({_TEXTS})|[()]")
-_BLANKS = re.compile(rf"(?s)({_TEXTS})|\s+")
+_SIGNS = re.compile(rf"(?s)({TEXTS})|[()]")
 _NUMBERED = re.compile(r"([TtCc])(\d+)")
 _REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
 
@@ -75,7 +74,7 @@ class Types:
                 start = text.rindex("(", 0, start)
             else:
                 end = text.index(")", end) + 1
-        return _squeezed(text[start:end])
+        return squeezed(text[start:end])
 
     def note(self, sections: Iterable[tree.VarSection]) -> None:
         """Note the variables of these sections that are declared AT timers and counters."""
@@ -251,11 +250,6 @@ def _brackets(text: str) -> tuple[int, int]:
         elif match[0] == ")":
             closed += 1
     return opened, closed
-
-
-def _squeezed(text: str) -> str:
-    """A text without comments, with one blank for each run of blanks and line ends outside of strings."""
-    return _BLANKS.sub(lambda match: match[1] if match[1] and match[1][0] in "'\"" else " ", text).strip()
 
 
 def documentation(text: str) -> Element:
