@@ -364,7 +364,6 @@ class RungWriter:
             inputs = [(f"C{at}" if at > 1 else "EN", power.ends or ()) for at, power in enumerate(powers, 1)]
         else:
             place = self.rows
-            self.rows += 1
         inputs += [(f"OP{at}", self.numbered.get(text.upper(), text)) for at, text in enumerate(step.operands, 1)]
         self.drawing.block(step.mnemonic, "", inputs, [("ENO", "")], column + 1, place, step.prefix + step.mnemonic)
         self.rows = max(self.rows, place + len(inputs) // 2 + 1)
