@@ -208,6 +208,7 @@ def rungs(steps: str) -> str:
     ("LD a / OUT TR0 / AND b / AND c / AND d / OUT TR1 / LD TR0 / MOV n m",
      "1 rail 3; 2 contact a 0 0 <1; 3 contact b 1 0 <2; 4 contact c 2 0 <3; 5 contact d 3 0 <4; 6 n; 7 m; 8 MOV 2 1 EN <2 "
      "OP1 <6 OP2 <7 ENO"),
+    ("LD a / FBCALL Blk f s:='a:=b' k:=n", "1 rail 2; 2 contact a 0 0 <1; 3 'a:=b'; 4 n; 5 Blk f 2 0 EN <2 s <3 k <4 ENO"),
 ], ids=lambda row: row[0])  # fmt: skip
 def test_where_the_elements_of_a_rung_stand_and_what_their_wires_come_from(steps: str, drawing: str) -> None:
     made = exported(rungs(steps))
