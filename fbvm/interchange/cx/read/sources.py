@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
+from fbvm.base.digits import whole_number
 from fbvm.interchange.cx.markup import Row
 from fbvm.interchange.cx.read.memory import initial_values
 from fbvm.interchange.cx.read.places import Origin
@@ -19,6 +20,8 @@ _USAGES = {"0": "VAR", "1": "VAR_INPUT", "2": "VAR_OUTPUT"}
 _TYPES = {"0": "BOOL", "1": "INT", "2": "UINT", "3": "DINT", "4": "UDINT", "5": "LINT", "6": "ULINT", "7": "WORD", "8": "DWORD",
           "9": "LWORD", "10": "REAL", "11": "LREAL"}  # fmt: skip
 """Numbers in the rows of a function block's variables -> types."""
+_VALUES = {"BOOL": "TRUE|FALSE", **dict.fromkeys(("REAL", "LREAL"), r"[+-]?\d+(\.\d+)?")}
+"""Patterns of initial values; the other types have whole numbers."""
 TIMER, COUNTER = "13", "14"
 _SWITCH = re.compile(r"[!@%]?(?:TKON|TKOF)\b|\S+ TK\d+$", re.I)
 """An instruction that starts or stops a task, or reads the flag of one."""
@@ -79,11 +82,12 @@ class _Sources:
             head = f"{kind} CONSTANT" if symbol.is_constant else kind
             note = f" // {symbol.comment}" if symbol.comment else ""
             try:
-                parts.setdefault(head, []).append(symbol.declared(self._block_of(symbol)) + note)
+                declared = symbol.declared(self._block_of(symbol)) + note
             except SymbolError as error:
                 self.reading.report("X0203", symbol.row.start,
                                     f"{where}: symbol {symbol.name} is not taken over: {error.args[0]}")
                 continue
+            parts.setdefault(head, []).append(declared)
             if symbol.own != symbol.name:
                 self.reading.report("X0190", symbol.row.start, f"{where}: the symbol {symbol.name} is called {symbol.own} here, "
                                     "as its name is no name of Structured Text, or stands twice")
@@ -115,10 +119,11 @@ class _Sources:
 
     def _program(self, program: Program) -> None:
         reading, name = self.reading, self.names[id(program)]
-        reading.where = f"program {program.name}"
         if program.protected:
-            reading.report("X0203", program.value, "the program is protected by a password and is not taken over")
+            reading.report("X0203", program.value,
+                           f"program {program.name}: the program is protected by a password and is not taken over")
             return
+        reading.where = f"program {program.name}"
         sections = []
         for section in program.sections:
             if section.kind in ("", LADDER_SECTION):
@@ -130,7 +135,7 @@ class _Sources:
         rungs = RungLines(reading, symbols, _Definitions(self._definition(program.symbols)))
         is_first = program is self.plc.programs[0]
         body = list(rungs.sections(sections))
-        called = {line.split()[2] for line in body if line.startswith("FBCALL")}
+        called = {line.split()[2] for line in body if line.startswith("FBCALL")} - {symbol.own for symbol in program.symbols}
         outside = [f"{symbol.own} : {self._block_of(symbol)};" for symbol in self.plc.symbols
                    if symbol.type == BLOCK and symbol.own in called]
         lines = [f"// {' '.join(program.comment.split())}"] if program.comment else []
@@ -184,11 +189,11 @@ class _Sources:
 
     def _block(self, block: FunctionBlock) -> None:
         reading, name = self.reading, self.names[id(block)]
-        reading.where = f"function block {block.name}"
         if block.protected or block.kind not in ("", "FBLadder"):
             why = "it is protected by a password" if block.protected else f"its body is no ladder ({block.kind})"
-            reading.report("X0203", block.value, f"the function block is not taken over: {why}")
+            reading.report("X0203", block.value, f"function block {block.name}: the function block is not taken over: {why}")
             return
+        reading.where = f"function block {block.name}"
         parts: dict[str, list[str]] = {}
         rows = []
         for variable in block.variables:
@@ -227,13 +232,22 @@ class _Sources:
         kind = _TYPES[variable.type]
         spec = f"ARRAY [0..{variable.count - 1}] OF {kind}" if variable.count else kind
         place = f" AT {location(variable.address, kind)}" if variable.address else ""
-        initial = f" := {variable.initial}" if re.fullmatch(r"[+-]?\d+(\.\d+)?|TRUE|FALSE", variable.initial) \
-            and not variable.count and not (variable.usage != "0" and place) else ""
-        if kind == "BOOL" and initial[4:].isdecimal():
-            initial = f" := {'TRUE' if int(initial[4:]) else 'FALSE'}"
+        initial = "" if variable.count or variable.usage != "0" and place else self._initial(variable, kind)
         head = _USAGES[variable.usage] + (" RETAIN" if variable.retain and variable.usage == "0" else "")
         parts.setdefault(head, []).append(f"{spelling(variable.name)}{place} : {spec}{initial};{note}")
         return []
+
+
+    def _initial(self, variable: BlockVariable, kind: str) -> str:
+        """The initial value of a variable of a type, behind its `:=`; "" for none."""
+        text = variable.initial
+        if kind == "BOOL" and text.isdecimal():
+            text = "TRUE" if whole_number(text) else "FALSE"
+        if text and not re.fullmatch(_VALUES.get(kind, r"[+-]?\d+"), text):
+            self.reading.report("X0190", variable.row.start,
+                                f"the initial value {text} of {variable.name} is not taken over: it is no {kind}")
+            return ""
+        return f" := {text}" if text else ""
 
 
 def _rows_by_name(symbols: Iterable[Symbol]) -> dict[str, Row]:
