@@ -354,7 +354,7 @@ def test_the_generator_of_beremiz_goes_along_the_wires_of_a_convergence_as_they_
 @each_of(("first", "seen"), [
     ("", FIRST_RIGHT), (jump(10, "8", "s"), FIRST_LEFT), (jump(10, "7", "s"), FIRST_RIGHT),
     (transition(8, "6", inline("back")), FIRST_LEFT), (step(6, "left", "5"), FIRST_LEFT),
-    (node("selectionDivergence", 2, "1"), FIRST_RIGHT)])
+    (node("selectionDivergence", 2, "1"), FIRST_RIGHT), (node("selectionConvergence", 13, "8 7"), FIRST_RIGHT)])
 def test_the_generator_of_beremiz_begins_with_what_is_written_first(first: str, seen: str) -> None:
     parts = [step(1, "s", first=True), node("selectionDivergence", 2, "1"), transition(3, "2", inline("go")),
              step(4, "right", "3"), transition(5, "2", inline("go")), step(6, "left", "5"), transition(7, "4", inline("back")),

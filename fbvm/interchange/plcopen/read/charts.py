@@ -92,7 +92,7 @@ class Chart:
         found: dict[str, Element] = {}
         while todo:
             name = todo.pop()
-            if name not in found and name in by_name:
+            if name not in found:
                 found[name] = by_name[name]
                 todo += reversed([target for arrow in arrows if name in arrow.sources for target in arrow.targets])
         return [*found.values(), *(step for step in steps if self._name(step) not in found)]
