@@ -19,8 +19,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from fbvm.base.digits import whole_number
+
 _COUNT = re.compile(r"(\w+) ?: ?(\d+);?")
 _LINE = re.compile(r"[^\r\n]*")
+MOST_DEEP = 150
+"""How many boxes, rows and branches may stand in one another."""
 UNKNOWN_OPERAND = "???"
 """What the editor writes where an operand is still missing."""
 
@@ -79,6 +83,7 @@ class _Reader:
         self.lines: Iterator[tuple[int, str]] = ((found.start(), found[0].strip()) for found in _LINE.finditer(text, start, end)
                                                  if found[0].strip())
         self.at, self.word = start, ""
+        self.deep = 0
         self._next()
 
     def _next(self) -> str:
@@ -97,7 +102,7 @@ class _Reader:
         if found is None or found[1] != word:
             raise self._strange()
         self._next()
-        return int(found[2])
+        return min(whole_number(found[2]), len(self.text))
 
     def _strange(self) -> Unreadable:
         return Unreadable(self.at, f"`{self.word}` stands in it" if self.word else "it ends too early")
@@ -162,6 +167,14 @@ class _Reader:
     # --- values ---
 
     def _value(self) -> Value:
+        self.deep += 1
+        if self.deep > MOST_DEEP:
+            raise Unreadable(self.at, f"a network is deeper than {MOST_DEEP}")
+        made = self._node()
+        self.deep -= 1
+        return made
+
+    def _node(self) -> Value:
         at, kind = self.at, self.word.removeprefix("_").lower()
         if self.word == "_EMPTY":
             self._next()

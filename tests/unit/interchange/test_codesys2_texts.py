@@ -7,6 +7,7 @@ from codesys2_files import assigned, box, contact, export, instance, operand, ro
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.interchange.codesys2.diagrams import MOST_DEEP
 from fbvm.interchange.codesys2.exports import as_source
 from fbvm.interchange.codesys2.importing import import_codesys2, read_export
 from fbvm.interchange.codesys2.objects import _name_before, _named
@@ -95,6 +96,7 @@ REFUSED = {
     "`_OUTPUTS` stands in it": assigned(operand("a"), "p").replace("_OUTPUTS:1", "_OUTPUTS"),
     "`n` stands in it": assigned(operand("a"), "p") + " n",
     "it ends too early": assigned(operand("a")).replace("_OUTPUTS:0", ""),
+    "`END_OF` stands in it": assigned(operand("a")).replace("_OUTPUTS:0", "_OUTPUTS:" + "9" * 5000) + " END_OF",
     "`_MAYBE` stands in it": assigned(box("ABS", operand("n"), sign="_MAYBE"), "m"),
 }  # fmt: skip
 
@@ -103,6 +105,17 @@ REFUSED = {
 def test_a_network_without_a_meaning_is_refused(said: str) -> None:
     _, found = as_source(Source("a.exp", export(REFUSED[said])))
     assert [said in each.message for each in found] == [True], [each.message for each in found]
+
+
+@each_of("kind", ["NOT", "AND", "OR"])
+def test_boxes_and_branches_that_stand_too_deep_in_one_another_are_refused(kind: str) -> None:
+    def said(depth: int) -> list[str]:
+        made = contact("a")
+        for _ in range(depth - 1):
+            made = box("NOT", made) if kind == "NOT" else row(kind, made)
+        return [each.message.rpartition(": ")[2] for each in as_source(Source("a.exp", export(rung(made, "p"))))[1]]
+
+    assert (said(MOST_DEEP), said(MOST_DEEP + 1), said(5000)) == ([], *[[f"a network is deeper than {MOST_DEEP}"]] * 2)
 
 
 def test_an_action_has_no_variable_for_the_power_of_its_boxes() -> None:
@@ -150,6 +163,13 @@ def text(*numbers: int) -> str:
 ])  # fmt: skip
 def test_markers_go_on_as_those_that_were_there(before: tuple[int, ...], made: tuple[int, ...], after: tuple[int, ...]) -> None:
     assert renumbered(text(*made), text(*before)) == text(*after)
+
+
+def test_the_number_of_a_marker_has_any_length() -> None:
+    numbers = "9" * 5000
+    saved = (f"Name:=$?St$Bk?_#[{numbers}]some text$?St$Bk?_#[{numbers}]\nBEGIN_LIST_$#[{numbers}]\nEND_LIST_$#[{numbers}];\n"
+             f"END_LIST_$#[1{numbers}];")
+    assert renumbered(saved, saved) == saved
 
 
 def test_a_list_has_its_number_at_both_ends() -> None:

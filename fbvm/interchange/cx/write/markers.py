@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from fbvm.base.digits import whole_number
+
 _ANY = re.compile(r"\$\?St\$Bk\?_#\[(\d+)\]|BEGIN_LIST_\$#\[(\d+)\]|END_LIST_\$#\[(\d+)\]")
 
 
@@ -44,10 +46,10 @@ def _pairs(text: str) -> list[tuple[list[tuple[int, int]], int]]:
             if second >= 0:
                 spans.append((second + found.start(1) - found.start(), second + found.end(1) - found.start()))
                 at = second + len(found[0])
-            made.append((spans, int(found[1])))
+            made.append((spans, whole_number(found[1])))
         elif found[2]:
-            lists[int(found[2])] = [found.span(2)]
-            made.append((lists[int(found[2])], int(found[2])))
-        elif int(found[3]) in lists:
-            lists[int(found[3])].append(found.span(3))
+            lists[whole_number(found[2])] = [found.span(2)]
+            made.append((lists[whole_number(found[2])], whole_number(found[2])))
+        elif whole_number(found[3]) in lists:
+            lists[whole_number(found[3])].append(found.span(3))
     return made
