@@ -30,6 +30,8 @@ STEP_ACTIONS = {"a6b08bd8-b696-47e3-9cbf-7408b61c9ff8": ENTRY, "700a583f-b4d4-43
                 "a2621e18-7de3-4ea6-ae6d-89e9e0b7befd": EXIT}
 """Attributes of CODESYS's data at a step (`sfc/element`) that name actions; read off published projects, whose actions are
 called accordingly."""
+_FLAG = re.compile(r"(?i)(?<![\w.])([^\W\d]\w*)\s*\.\s*(?=[XT]\b)")
+"""A flag of a step, up to its X or T."""
 _ASSIGNED = re.compile(r"(?s)\s*([^\W\d]\w*)?\s*:=\s*(.*?);?\s*\Z")
 
 
@@ -365,9 +367,7 @@ def _references(element: Element) -> list[str]:
 
 def with_new_names(line: str, renamed: dict[str, str]) -> str:
     """A line in which the flags of steps are read by the new names of their steps."""
-    for old, new in renamed.items():
-        line = re.sub(rf"(?i)(?<!\.)\b{re.escape(old)}\s*\.\s*(?=[XT]\b)", f"{new}.", line)
-    return line
+    return _FLAG.sub(lambda found: f"{renamed[name]}." if (name := found[1].upper()) in renamed else found[0], line)
 
 
 def _place(element: Element) -> tuple[float, float]:
