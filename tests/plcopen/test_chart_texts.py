@@ -49,6 +49,8 @@ PARALLEL = (T, node("simultaneousDivergence", 5, "2").replace("localId", 'name="
      "INITIAL_STEP s: STEP e: TRANSITION (PRIORITY := 2) FROM e TO s := a; TRANSITION (PRIORITY := 1) FROM e TO e := a; "
      "TRANSITION FROM e TO s := a; TRANSITION FROM e TO s := a; TRANSITION FROM s TO e := a;"),
     ((S, *PARALLEL), "INITIAL_STEP s: STEP e: STEP f: TRANSITION FROM (e, f) TO (e, f) := b; TRANSITION FROM s TO (e, f) := a;"),
+    ((S, T, node("selectionConvergence", 5, "2 5"), step(3, "e", "5")),
+     "INITIAL_STEP s: STEP e: TRANSITION FROM s TO e := a;"),
     ((S, conditioned(LIST), E), "INITIAL_STEP s: STEP e: TRANSITION go FROM s TO e: LD a AND b"),
     ((S, conditioned(LIST, True), E), "INITIAL_STEP s: STEP e: TRANSITION go FROM s TO e: LD a AND b NOT"),
     ((S, conditioned(inline("IF a THEN T2 := b; END_IF;"), True), E),
@@ -83,6 +85,8 @@ def said(made: Imported) -> list[str]:
     ((S, transition(2, "1", '<inline name=""/>'), E), "X0203 inline: : the condition is empty"),
     ((S, transition(2, "9", inline("a")), E), "X0203 transition: , transition 2: no step stands above transition 2"),
     ((S, T), "X0203 transition: , transition 2: no step stands below transition 2"),
+    ((S, T, transition(4, "2", inline("b")), step(3, "e", "4")),
+     "X0203 transition: , transition 2: no step stands below transition 2"),
     ((S, T, jump(5, "2", "q")), "X0203 jumpStep: , jumpStep 5: there is no step q to jump to"),
 ], ids=lambda row: row[1])  # fmt: skip
 def test_a_chart_that_is_left_out_is_named_and_stands_as_a_comment(parts: tuple[str, ...], message: str) -> None:
