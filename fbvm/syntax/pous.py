@@ -312,14 +312,25 @@ class SourceBuilder(SfcElements):
                        tuple(each for each in actions if isinstance(each, Action)))
 
     def _refuse_outside(self, end: int) -> None:
-        """Report the charts of actions that stand outside of POUs, up to `end`."""
+        """Report what stands in actions outside of POUs, up to `end`, and needs variables that only the POU could declare."""
         for action in [each for each in self.charted if each.start < end]:
             self._refuse_chart(self.charted.pop(action)[0])
+        for ladder in (each for each in self.ladders if each.start < end):
+            self.report("S0110", ladder.start, ladder.end, "a LADDER stands in its POU, not behind it", _INSIDE)
+        for made in (each for each in self.lists if each.start < end and each.temporaries):
+            self.report("S0114", made.start, made.end, "this instruction list stands in its POU, not behind it", _INSIDE)
+        for jumps in (each for each in self.jump_sections if each.start < end):
+            self.report("S0101", jumps.start, jumps.end, "statements with jumps stand in their POU, not behind it", _INSIDE)
+        self.ladders = [each for each in self.ladders if each.start >= end]
+        self.lists = [each for each in self.lists if each.start >= end]
+        self.jump_sections = [each for each in self.jump_sections if each.start >= end]
+        self.rungs = _rungs(self.ladders)
 
     def _refuse_chart(self, part: Part) -> None:
         self.report("S0111", part.start, part.end, "a chart stands in its POU, not behind it", "")
 
 
+_INSIDE = "put the ACTION in front of the END of its POU"
 _ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
 
 
