@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import fold
 from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.st.declarations import Settings
 from fbvm.syntax.st.lexer import Token
@@ -33,6 +35,7 @@ from fbvm.syntax.tree import (
 )
 from fbvm.syntax.tree.il import InstructionList
 from fbvm.syntax.tree.ladder import Ladder
+from fbvm.syntax.tree.node import Node
 from fbvm.syntax.tree.sfc import Step, Transition
 
 
@@ -75,8 +78,16 @@ Inherited = list[tuple[str, NamedType] | Using]
 class SourceBuilder(SfcElements):
     """The functions of the rules of POUs; with those that it inherits, the functions of all rules of the grammar."""
 
+    def __init__(self, source: Source) -> None:
+        super().__init__(source)
+        self.in_front: Pou | None = None
+        """The POU whose actions may stand here, behind it; None within a POU."""
+        self.elsewhere: list[Action | Actions] = []
+        """Actions behind that POU which name another one."""
+
     def source_text(self, declarations: list[Declaration]) -> SourceText:
         self._usings_in_front(declarations)
+        self._take_from_behind()
         self._refuse_outside(len(self.source.text))
         return SourceText(0, len(self.source.text), tuple(declarations))
 
@@ -84,6 +95,7 @@ class SourceBuilder(SfcElements):
 
     def namespace(self, word: Token, modifiers: list[Token], name: NamedType, declarations: list[Declaration],
                   end: Token) -> Namespace:
+        self._take_from_behind()
         words = tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers)
         for each in words:
             if each.text != "INTERNAL":
@@ -137,6 +149,7 @@ class SourceBuilder(SfcElements):
                         "give them two kinds, such as ANY_NUM and ANY_INT")
 
     def pou_head(self, modifiers: list[Token], token: Token, generics: None, inheritance: Inherited) -> Head:
+        self._take_from_behind()
         words = tuple(Name(each.start, each.end, each.text.upper()) for each in modifiers)
         named = [each for each in inheritance if not isinstance(each, Using)]
         return Head(self.declared(token), words, tuple(each for word, each in named if word == "EXTENDS"),
@@ -159,18 +172,44 @@ class SourceBuilder(SfcElements):
         body = self.block([each for each in items if not isinstance(each, Members)])
         declared = [each for each in sections if isinstance(each, VarSection)]
         actions = [each for each in elements if isinstance(each, Action)]
-        self._add_ladders(word, actions, declared)
-        declared += self._sections_of_lists()
-        self.numbered = dict(self.numbered_everywhere)
+        self._add_ladders(self.ladders, [], word.type == "PROGRAM", actions, declared)
+        declared += _sections_of(self.lists)
         body = self.without_jumps(body)
-        declared += self._sections_of_jumps()
+        declared += self.jump_sections
         if self.charted or any(isinstance(each, Step | Transition) for each in elements):
             body, actions = self._charts(word, body, elements, actions, declared)
         self.generic_types = {}
         kind = "FUNCTION_BLOCK" if word.type == "FUNCTION_BLOCK" else word.text.upper()
-        return Pou(word.start, end.end, kind, head.name, result, tuple(declared), body, refused,
-                   tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods),
-                   head.with_usings(usings))
+        self.in_front = Pou(word.start, end.end, kind, head.name, result, tuple(declared), body, refused,
+                            tuple(actions), accesses, head.modifiers, head.bases, head.interfaces, tuple(methods),
+                            head.with_usings(usings))
+        return self.in_front
+
+    def _take_from_behind(self) -> None:
+        """Give the POU in front what its actions behind it need: another POU begins here, or the text ends.  Until here
+        rungs, lists and jumps are counted on from those within the POU, so that their variables have other names."""
+        pou, self.in_front = self.in_front, None
+        if pou is None:
+            return
+
+        def is_own(made: Node) -> bool:
+            return made.start > pou.end and not any(each.start < made.start < each.end for each in self.elsewhere)
+
+        def is_other(made: Node) -> bool:
+            return made.start > pou.end and not is_own(made)
+
+        sections, actions = list(pou.sections), list(pou.actions)
+        within = [each for each in self.ladders if each.start < pou.end]
+        self._add_ladders(list(filter(is_own, self.ladders)), within, pou.kind == "PROGRAM", actions, sections)
+        sections += [*_sections_of(filter(is_own, self.lists)), *filter(is_own, self.jump_sections)]
+        pou.sections, pou.actions = tuple(sections), tuple(actions)
+        self.ladders = list(filter(is_other, self.ladders))
+        self.lists = list(filter(is_other, self.lists))
+        self.jump_sections = list(filter(is_other, self.jump_sections))
+        self._refuse_outside(len(self.source.text))
+        self.elsewhere.clear()
+        self.blocks.clear()
+        self.numbered = dict(self.numbered_everywhere)
 
     def interface(self, word: Token, head: Head, members: list[Members], end: Token) -> Pou:
         methods = tuple(method for each in members for method in each.methods)
@@ -232,6 +271,7 @@ class SourceBuilder(SfcElements):
         self.labels = {each: name for each, name in labels.items() if each.start >= start}
         self.charted, self.jump_sections = {}, []
         yield
+        self.in_front = None
         self.ladders = [each for each in ladders if each.start < start]
         self.lists = [each for each in lists if each.start < start]
         self.targets = {each: name for each, name in targets.items() if each.start < start}
@@ -239,24 +279,18 @@ class SourceBuilder(SfcElements):
         self.rungs = _rungs(self.ladders)
         self.blocks, self.numbered, self.charted, self.jump_sections = blocks, numbered, charted, jump_sections
 
-    def _add_ladders(self, word: Token, actions: list[Action], declared: list[VarSection]) -> None:
-        """Add to `actions` the subroutines of the POU's LADDERs, and to `declared` what their rungs need."""
-        if not self.ladders:
+    def _add_ladders(self, ladders: list[Ladder], others: list[Ladder], is_program: bool, actions: list[Action],
+                     declared: list[VarSection]) -> None:
+        """Add to `actions` the subroutines of LADDERs of a POU, and to `declared` what their rungs need.  `others` are LADDERs
+        of the POU for which that was done."""
+        if not ladders:
             return
         from fbvm.syntax.ladder.sections import hidden_sections, turn_condition_flags_off
 
-        actions += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
-        if word.type == "PROGRAM":
-            turn_condition_flags_off(self.ladders)
-        declared += hidden_sections(self.ladders, declared, self.report)
-        self.ladders.clear()
-        self.rungs = 0
-
-    def _sections_of_jumps(self) -> list[VarSection]:
-        """The hidden sections with the variables of the jumps in the POU's body, its actions and its transitions."""
-        made = [*self.jump_sections]
-        self.jump_sections.clear()
-        return made
+        actions += [subroutine for ladder in ladders for subroutine in ladder.subroutines]
+        if is_program:
+            turn_condition_flags_off(ladders, others)
+        declared += hidden_sections(ladders, declared, self.report)
 
     def _charts(self, word: Token, body: Block, elements: Iterable[Element], actions: list[Action],
                 declared: list[VarSection]) -> tuple[Block, list[Action]]:
@@ -267,14 +301,6 @@ class SourceBuilder(SfcElements):
         body = charts.body(word, body, [each for each in elements if not isinstance(each, Members)])
         declared += charts.sections
         return body, charts.actions
-
-    def _sections_of_lists(self) -> list[VarSection]:
-        """The hidden sections with the temporaries of the POU's instruction lists."""
-        lists = (each for each in self.lists if each.temporaries)
-        made = [VarSection(each.start, each.end, "VAR_TEMP", (), each.temporaries, True) for each in lists]
-        self.lists.clear()
-        self.blocks.clear()
-        return made
 
     def instruction_list(self, token: Token) -> InstructionList:
         """A body in the instruction list, which has a front end of its own."""
@@ -298,7 +324,9 @@ class SourceBuilder(SfcElements):
     def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None, items: Items,
                end: Token) -> Action:
         body = self.without_jumps(self.block(items), word.start)
-        return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
+        made = Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
+        self._note_owner(made)
+        return made
 
     def action_chart(self, word: Token, token: Token, colon: Token, items: Items, parts: list[Part], end: Token) -> Action:
         made = self.action(word, None, None, token, colon, items, end)
@@ -308,19 +336,25 @@ class SourceBuilder(SfcElements):
     def actions_of(self, word: Token, owner: Token | None, actions: list[Element], end: Token) -> Actions:
         for part in (each for each in actions if isinstance(each, Step | Transition)):
             self._refuse_chart(part)
-        return Actions(word.start, end.end, self.name(owner) if owner else None,
+        made = Actions(word.start, end.end, self.name(owner) if owner else None,
                        tuple(each for each in actions if isinstance(each, Action)))
+        self._note_owner(made)
+        return made
+
+    def _note_owner(self, made: Action | Actions) -> None:
+        if self.in_front is not None and made.owner is not None and fold(made.owner.text) != fold(self.in_front.name.text):
+            self.elsewhere.append(made)
 
     def _refuse_outside(self, end: int) -> None:
-        """Report what stands in actions outside of POUs, up to `end`, and needs variables that only the POU could declare."""
+        """Report what stands in actions outside of POUs, up to `end`, and needs variables of a POU that is not in front."""
         for action in [each for each in self.charted if each.start < end]:
             self._refuse_chart(self.charted.pop(action)[0])
         for ladder in (each for each in self.ladders if each.start < end):
-            self.report("S0110", ladder.start, ladder.end, "a LADDER stands in its POU, not behind it", _INSIDE)
+            self.report("S0110", ladder.start, ladder.end, "a LADDER stands in its POU, or directly behind it", _BEHIND)
         for made in (each for each in self.lists if each.start < end and each.temporaries):
-            self.report("S0114", made.start, made.end, "this instruction list stands in its POU, not behind it", _INSIDE)
+            self.report("S0114", made.start, made.end, "this instruction list stands in its POU, or directly behind it", _BEHIND)
         for jumps in (each for each in self.jump_sections if each.start < end):
-            self.report("S0101", jumps.start, jumps.end, "statements with jumps stand in their POU, not behind it", _INSIDE)
+            self.report("S0101", jumps.start, jumps.end, "statements with jumps stand in their POU, or directly behind it", _BEHIND)
         self.ladders = [each for each in self.ladders if each.start >= end]
         self.lists = [each for each in self.lists if each.start >= end]
         self.jump_sections = [each for each in self.jump_sections if each.start >= end]
@@ -330,11 +364,16 @@ class SourceBuilder(SfcElements):
         self.report("S0111", part.start, part.end, "a chart stands in its POU, not behind it", "")
 
 
-_INSIDE = "put the ACTION in front of the END of its POU"
+_BEHIND = "put the ACTION into its POU, or behind it before another POU begins"
 _ACCESS = ("PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL")
 
 
 _IN_NAMESPACE = (Pou, TypeDecl, Namespace, Action, Actions)
+
+
+def _sections_of(lists: Iterable[InstructionList]) -> list[VarSection]:
+    """The hidden sections with the temporaries of instruction lists."""
+    return [VarSection(each.start, each.end, "VAR_TEMP", (), each.temporaries, True) for each in lists if each.temporaries]
 
 
 def _rungs(ladders: Sequence[Ladder]) -> int:

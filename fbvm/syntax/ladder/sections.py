@@ -10,11 +10,12 @@ from fbvm.syntax.tree import Call, CallStatement, NamedType, NameRef, VarDecl, V
 from fbvm.syntax.tree.ladder import Ladder
 
 
-def turn_condition_flags_off(ladders: Sequence[Ladder]) -> None:
-    """Put a call of CX_Begin in front of the first of a PROGRAM's LADDERs if any of their rungs reads or writes a condition
-    flag, as ER or CY."""
-    if any(_uses_condition_flags(ladder) for ladder in ladders):
-        first, at = ladders[0], ladders[0].start
+def turn_condition_flags_off(ladders: Sequence[Ladder], others: Sequence[Ladder] = ()) -> None:
+    """Put a call of CX_Begin in front of the first of a PROGRAM's LADDERs if any rung reads or writes a condition flag, as ER
+    or CY.  `others` are LADDERs in front of these, for which that was done."""
+    if any(map(_uses_condition_flags, ladders)) and not any(map(_uses_condition_flags, others)):
+        first = (*others, *ladders)[0]
+        at = first.start
         first.body = (CallStatement(at, at, Call(at, at, NameRef(at, at, "CX_Begin"), ())), *first.body)
 
 
@@ -30,11 +31,14 @@ def hidden_sections(ladders: Sequence[Ladder], sections: Iterable[VarSection], r
     and `sections` do not declare, VAR_TEMP for what lives during one execution.  Reports an instance that `sections`
     declare with another type than FBCALL."""
     start, end = ladders[0].start, ladders[-1].end
+    sections = list(sections)
+    declared = {name.text for section in sections for variable in section.variables for name in variable.names}
     instances = _undeclared([instance for ladder in ladders for instance in ladder.instances], sections, report)
     kept = {variable.names[0].text: variable for ladder in ladders for variable in ladder.variables}
     temporaries = {variable.names[0].text: variable for ladder in ladders for variable in ladder.temporaries}
     return [VarSection(start, end, kind, (), tuple(variables), True)
-            for kind, variables in (("VAR", [*kept.values(), *instances]), ("VAR_TEMP", temporaries.values())) if variables]
+            for kind, found in (("VAR", [*kept.values(), *instances]), ("VAR_TEMP", [*temporaries.values()]))
+            if (variables := [each for each in found if each.names[0].text not in declared])]
 
 
 def _undeclared(instances: Iterable[VarDecl], sections: Iterable[VarSection], report: Callable[..., None]) -> list[VarDecl]:
