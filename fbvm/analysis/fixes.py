@@ -23,8 +23,8 @@ MOST = 8
 """Changes that are tried for one diagnostic."""
 _NEAR = re.compile(r"did you mean ([^?;]+)\?")
 _EXPECTED = re.compile(r"`?([A-Z_]+|[^\sA-Za-z`]+)`? expected")
-_WRITE = re.compile(r"\bwrite (?:which: )?`?(.+?)`?(?:,? or take .*|; the same in .*)?\Z")
-_IS = re.compile(r"`([^`]+)` (?:compares|assigns|is one sign)\b(?!,)")
+_WRITE = re.compile(r"\bwrite (?:which: )?`?(.+?)`?(?:,? or take .*|; the same in .*| for the .*)?\Z")
+_IS = re.compile(r"`([^`]+)` (?:(?:compares|assigns)\b(?!,)|is one sign\b)")
 _CALL = re.compile(r"(\w+)\(\.\.\.\)")
 
 
@@ -88,9 +88,16 @@ def _candidates(program: Program, name: str, diagnostic: Diagnostic) -> Iterator
         for meant in dict.fromkeys((said[1], *re.split(r",? or (?:write )?", said[1]), said[1].partition(",")[0])):
             new = f"{call[1]}({written})" if (call := _CALL.fullmatch(meant)) else meant.strip("`")
             if new and new != written:
-                yield Fix(f"Write {new}", diagnostic, ((*here, new),))
+                yield Fix(f"Write {new}", diagnostic, ((*here, _apart(text, *here, new)),))
     if diagnostic.hint.startswith(("remove it", "leave it out")):
         yield from _removals(program, name, diagnostic)
+
+
+def _apart(text: str, start: int, end: int, new: str) -> str:
+    """What is written in place of a piece of a text, with a space where letters would meet: `a||b` becomes `a OR b`."""
+    before = " " if re.match(r"\w\w", text[start - 1:start] + new[:1]) else ""
+    behind = " " if re.match(r"\w\w", new[-1:] + text[end:end + 1]) else ""
+    return before + new + behind
 
 
 def _removals(program: Program, name: str, diagnostic: Diagnostic) -> Iterator[Fix]:
@@ -153,7 +160,9 @@ def _declared(program: Program, name: str, diagnostic: Diagnostic) -> list[Fix]:
     for kind in TYPES:
         if section is not None:
             at = part.base + section.end - len("END_VAR")
-            edit = at, at, f"    {written} : {kind};\n" if text[:at].endswith("\n") else f"{written} : {kind}; "
+            line = text.rfind("\n", 0, at) + 1
+            edit = (at, at, f"{written} : {kind}; ") if text[line:at].strip() else \
+                (line, line, f"{text[line:at]}    {written} : {kind};\n")
         else:
             behind = max((each.end for each in pou.sections if not each.hidden), default=(pou.result or pou.name).end)
             edit = part.base + behind, part.base + behind, f"\nVAR\n    {written} : {kind};\nEND_VAR"
