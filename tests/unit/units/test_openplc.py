@@ -144,6 +144,45 @@ def test_clients_come_and_go() -> None:
     assert unit.reset(rig.plc.memory) == [Close(0, True)] and unit.wake_ns == 0
 
 
+def test_words_have_changed_where_one_of_the_requests_of_a_refresh_wrote_them() -> None:
+    rig = Rig()
+    write, refused, read = modbus.write_register(7, 1), modbus.write_register(8192, 1), modbus.read(3, 7, 1)
+    for pdus, changed in (((write,), True), ((write, read), True), ((write, refused), True), ((read, write), True),
+                          ((refused,), False), ((read,), False), ((), False)):
+        rig.refresh(Received(0, b"".join(Adu(1, 1, pdu).to_bytes() for pdu in pdus)))
+        assert rig.unit.changed_words is changed, pdus
+    rig.ask(write)
+    rig.refresh()
+    assert not rig.unit.changed_words
+    only = Rig(OpenPlc(read_only=True))
+    only.ask(write)
+    assert not only.unit.changed_words
+
+
+def test_what_comes_behind_the_end_of_a_connection_is_not_answered() -> None:
+    rig, frame = Rig(), Adu(1, 1, modbus.write_register(7, 1)).to_bytes()
+    assert rig.refresh(PeerClosed(0), Received(0, frame)) == [Close(0)]
+    assert rig.refresh(Received(0, frame), Failed(0, "send", "EPIPE")) == [] and rig.plc.read("Main.out") == -2
+    assert rig.unit.reset(rig.plc.memory) == [Close(channel, True) for channel in range(1, 8)], "it closes already"
+    rig.refresh(*(Closed(channel) for channel in range(8)), Opened(3, 502, CLIENT))
+    assert [type(each) for each in rig.refresh(Received(3, frame + b"\0\1\0\0\xff\xff"))] == [Send, Close]
+    assert rig.plc.read("Main.out") == 1
+
+
+def test_a_copy_has_the_port_the_clients_and_the_failures_of_the_unit_and_goes_its_own_way() -> None:
+    rig = Rig(OpenPlc("192.168.250.26", port=503, clients=3, read_only=True))
+    rig.refresh(Received(0, Adu(1, 1, modbus.read(3, 7, 1)).to_bytes()[:5]), Failed(1, "open", "EADDRINUSE"),
+                Opened(2, 503, CLIENT), PeerClosed(2))
+    twin = deepcopy(rig.unit)
+    assert (twin.configuration, twin.state) == (rig.unit.configuration, rig.unit.state)
+    assert twin.front(rig.plc.memory) == rig.unit.front(rig.plc.memory)
+    rest = Adu(1, 1, modbus.read(3, 7, 1)).to_bytes()[5:]
+    for unit in (twin, rig.unit):
+        rig.unit = unit
+        assert [type(each) for each in rig.refresh(Received(0, rest), Closed(2))] == [Send, Grant, Listen]
+        assert rig.refresh() == []
+
+
 def test_a_client_of_a_network_in_memory_is_answered() -> None:
     network, plc = LoopNetwork(), Plc(Rig().plc.image)
     plc.attach(OpenPlc(port=1502), network)
