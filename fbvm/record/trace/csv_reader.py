@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, TextIO, TypeAlias
 
 from fbvm.base.areas import SLOTS_OFFSET, AddressError, parse_address
 from fbvm.base.digits import whole_number
-from fbvm.base.types import BOOL, LINT, LREAL, TIME, ULINT, Field, StructType, Type, array, fold, string
+from fbvm.base.types import BOOL, LINT, LREAL, TIME, ULINT, Field, StringType, StructType, Type, array, fold, string
 from fbvm.check.symbols.size_limits import MAX_SIZE
 from fbvm.code.image import Image, Layout
 from fbvm.machine.plc import Plc
@@ -44,7 +44,9 @@ class Column:
 
 
 def read_csv(file: TextIO, out: BinaryIO) -> int:
-    """Writes a trace with the scans of a CSV table to `out`; returns the number of scans.  Raises CsvError."""
+    """Writes a trace with the scans of a CSV table to `out`; returns the number of scans.  Raises CsvError.
+
+    Scans follow one another, as in every trace.  An empty cell is the empty text, and leaves other values as they are."""
     table = csv.reader(file)
     rows, line = [], 1
     try:
@@ -64,9 +66,12 @@ def read_csv(file: TextIO, out: BinaryIO) -> int:
     writer = TraceWriter(plc, out, selected=[column.name for column in columns])
     for number, row in rows:
         try:
-            plc.scans = _scan(row[0])
+            scan = _scan(row[0])
+            if number != rows[0][0] and scan != plc.scans:
+                raise ValueError(f"scan {scan} stands where scan {plc.scans} belongs")
+            plc.scans = scan
             for column, cell in zip(columns, row[2:], strict=True):
-                if cell:
+                if cell or isinstance(column.type, StringType):
                     plc.write(column.name, column.read(cell))
             plc.scan(_nanoseconds(row[1]))
         except (ValueError, TypeError, ArithmeticError) as error:
@@ -76,9 +81,9 @@ def read_csv(file: TextIO, out: BinaryIO) -> int:
 
 
 def _scan(text: str) -> int:
-    if not _INTEGER.fullmatch(text):
+    if not _INTEGER.fullmatch(text) or not 0 <= (number := whole_number(text)) < LINT.high:
         raise ValueError(f"{text!r} is no number of a scan")
-    return whole_number(text)
+    return number
 
 
 def _nanoseconds(text: str) -> int:
@@ -111,7 +116,7 @@ def _kind(heading: str, cells: Sequence[str]) -> tuple[Type, Callable[[str], Any
     if all(cell in ("TRUE", "FALSE") for cell in cells):
         return BOOL, lambda cell: cell == "TRUE"
     if all(_INTEGER.fullmatch(cell) for cell in cells):
-        return (ULINT if any(whole_number(cell) > LINT.high for cell in cells) else LINT), int
+        return (ULINT if any(whole_number(cell) > LINT.high for cell in cells) else LINT), whole_number
     if all(_NUMBER.fullmatch(cell) or cell in ("nan", "inf", "-inf") for cell in cells):
         return LREAL, float
     return string(min(LONGEST_TEXT, max(map(len, cells), default=1))), str

@@ -95,6 +95,17 @@ def test_a_table_from_elsewhere_becomes_a_trace() -> None:
     assert (trace.at(4).read("D5"), trace.at(4).read("Speed"), trace.at(3).now_ns) == (9, 2.0, 500_000)
 
 
+def test_an_empty_cell_is_the_empty_text_and_for_others_the_value_that_they_have() -> None:
+    trace = as_trace("scan,time_ms,s,n,t [ms],r,b\n0,0,,,,,\n1,1,on,7,5,0.5,TRUE\n2,2,,,,,\n")
+    seen = [[trace.at(scan).read(name) for name in ("s", "n", "t", "r", "b")] for scan in trace.scans]
+    assert seen == [["", 0, 0, 0.0, False], ["on", 7, 5_000_000, 0.5, True], ["", 7, 5_000_000, 0.5, True]]
+
+
+def test_a_text_that_becomes_empty_goes_out_and_in() -> None:
+    text = "scan,time_ms,s\n3,0,\n4,10,on\n5,20,\n6,30,off\n"
+    assert rows(waveforms(as_trace(text), ["s"])) == text
+
+
 def test_names_are_those_of_the_language_and_empty_lines_no_scans() -> None:
     trace = as_trace("\nscan,time_ms,Tank.Level,TANK.full,tank.Pumps[1].on,Tank.pumps[2].On\n\n3,1,7,TRUE,FALSE,TRUE\n\n")
     assert trace.at(3).read("Tank") == {"Level": 7, "full": True, "Pumps": [{"on": False}, {"on": True}]}
@@ -126,6 +137,11 @@ def test_a_column_has_the_narrowest_type_that_holds_its_cells(cells: list[str], 
     ("scan,time_ms,a[1].b[1],a[90000].b[90000]\n", "line 1: a has 90000 elements, and no"),
     ("scan,time_ms,a[]\n", "line 1: 'a\\[\\]' is neither"),
     ("scan,time_ms,a\nx,2,3\n", "line 2: 'x' is no number of a scan"),
+    ("scan,time_ms,a\n-1,2,3\n", "line 2: '-1' is no number of a scan"),
+    ("scan,time_ms,a\n9223372036854775807,2,3\n", "line 2: '9223372036854775807' is no number of a scan"),
+    ("scan,time_ms,a\n5,1,3\n\n8,2,3\n", "line 4: scan 8 stands where scan 6 belongs"),
+    ("scan,time_ms,a\n0,1,3\n0,2,3\n", "line 3: scan 0 stands where scan 1 belongs"),
+    ("scan,time_ms,a\n5,1,3\n6,2,3\n4,3,3\n", "line 4: scan 4 stands where scan 7 belongs"),
     ("scan,time_ms,a\n1,x,3\n", "line 2: 'x' is no number of milliseconds"),
     ("scan,time_ms,a\n1,nan,3\n", "line 2: 'nan' is no number of milliseconds"),
     ("scan,time_ms,a\n1,1e999999,3\n", "line 2: 1e999999 ms are more than 64 bits of nanoseconds hold"),
@@ -136,6 +152,7 @@ def test_a_column_has_the_narrowest_type_that_holds_its_cells(cells: list[str], 
     ('scan,time_ms,"a[1, 2]","A[1,2]"\n', r"line 1: A\[1,2\] stands there twice"),
     ("scan,time_ms,a [ms],a\n", "line 1: a stands there twice"),
     ("scan,time_ms,a\n1,5,3\n2,4,3\n", "line 3: time runs forward only"),
+    (f"scan,time_ms,a\n1,5,{'9' * 5000}\n", "line 2: a: 10{40} is out of range of ULINT"),
     ("scan,time_ms,D5\n1,5,99999\n", "line 2: D5: 99999 is out of range"),
 ])  # fmt: skip
 def test_what_is_no_such_table(text: str, said: str) -> None:
