@@ -12,7 +12,7 @@ from fbvm.analysis.calls import open_call, pins
 from fbvm.analysis.hover import all_located
 from fbvm.analysis.names import key_of
 from fbvm.analysis.program import Program
-from fbvm.analysis.scopes import Member, Scope, is_of_rungs, scope_at
+from fbvm.analysis.scopes import Member, Scope, scope_at
 from fbvm.base.areas import AREAS, FLAG_AREAS, SHARED_AREAS, SIZED_AREAS, Address, with_sizes_apart
 from fbvm.base.types import ELEMENTARY, EnumType, fold
 from fbvm.check import block_pages
@@ -143,7 +143,7 @@ def _pins(program: Program, name: str, offset: int) -> Iterator[Item]:
 
 def _named(program: Program, scope: Scope, text: str) -> Iterator[Item]:
     yield from _variables(scope)
-    yield from _actions(scope)
+    yield from (Item(each.name, "action", "ACTION", f"{each.name}();", rank=3) for each in scope.actions())
     yield from (_member(each, rank=3) for each in scope.methods())
     project = scope.checker.project
     for pou in list(project.pous.values()):
@@ -161,12 +161,6 @@ def _named(program: Program, scope: Scope, text: str) -> Iterator[Item]:
     yield from (Item(word, "keyword", insert=snippet, rank=7) for word, snippet in {**STATEMENTS, **SECTIONS, **METHODS}.items())
     yield from (Item(word, "keyword", rank=7) for word in OPERATORS)
     yield from (replace(item, rank=8) for item in _blocks(program, scope) if item.kind == "function")
-
-
-def _actions(scope: Scope) -> Iterator[Item]:
-    if scope.pou is not None:
-        yield from (Item(each.tree.name.text, "action", "ACTION", f"{each.tree.name.text}();", rank=3)
-                    for name, each in scope.pou.owner.actions.items() if not is_of_rungs(name))
 
 
 def _variables(scope: Scope) -> Iterator[Item]:

@@ -67,7 +67,7 @@ class Scope:
         return [each for each in [*own, *shared] if not each.role and each.kind != "PROGRAM"]
 
     def kind(self, path: str) -> Type | None:
-        """The type of what a path names; of the name of a type or a program, that type."""
+        """The type of what a path names; of the name of an enumeration or a program, that type."""
         kind: Type | None = None
         for number, step in enumerate(found[1].strip() for found in _STEP.finditer(path)):
             if number == 0:
@@ -97,9 +97,12 @@ class Scope:
         variable = self.variable(name)
         if variable is not None:
             return variable.type
+        own = method_of(self.block, fold(name)) if self.block is not None else None
+        if own is not None and own.result is not None:
+            return own.result.type
         project = self.checker.project
         entry = project.type_entry(name, self.source)
-        if entry is not None and entry.resolved is not None:
+        if entry is not None and entry.resolved is not None and isinstance(entry.resolved[0], EnumType):
             return entry.resolved[0]
         pou = project.pous.get(("", fold(name)))
         return pou.type if pou is not None and pou.kind == "PROGRAM" else None
@@ -137,9 +140,7 @@ class Scope:
             readable = (*READABLE, "VAR") if block.kind == "PROGRAM" or self.checker.project.dialect.locals_are_read else READABLE
             pins = [Member(field.name, "pin", str(field.type)) for field in kind.fields.values()
                     if field.kind in readable and " " not in field.name]
-            actions = [Member(action.tree.name.text, "action", "", key_of_pou(action)) for name, action in block.actions.items()
-                       if not is_of_rungs(name)]
-            return pins + actions + self.methods(block)
+            return pins + self.actions(block) + self.methods(block)
         if isinstance(kind, StructType):
             return [Member(field.name, "field", str(field.type)) for field in kind.fields.values()]
         return [*self._listed_in(path.strip()), *self._declared_in(path)] if kind is None else []
@@ -167,14 +168,20 @@ class Scope:
                  if (entry := project.type_entry(folded, self.source)) is not None]
         return [*pous, *types, *inner]
 
+    def actions(self, block: Pou | None = None) -> list[Member]:
+        """The actions of a block and of those that it extends; by default of the one around the place."""
+        found = {name: action for each in reversed(_and_bases(block or self.block)) for name, action in each.actions.items()}
+        return [Member(action.tree.name.text, "action", "", key_of_pou(action)) for name, action in found.items()
+                if not is_of_rungs(name)]
+
     def methods(self, block: Pou | None = None) -> list[Member]:
         """The methods and properties of a block that may be named here, each once; by default of the one around the place."""
         block = block or self.block
-        inside = block in _and_bases(self.block)
+        hidden = {"PRIVATE"} if block in _and_bases(self.block) else {"PRIVATE", "PROTECTED"}
         found: dict[str, Member] = {}
         for each in reversed(_and_bases(block)):
             for method in each.methods.values():
-                if inside or not method.modifiers & {"PRIVATE", "PROTECTED"}:
+                if each is self.block or not method.modifiers & hidden:
                     kind, name = method.result.type if method.result is not None else "", method.tree.name.text
                     if fold(name) not in found or kind:
                         shown = "method" if method.kind == "METHOD" else "property"
