@@ -50,9 +50,7 @@ def hover_of_word(program: Program, text: str, offset: int) -> Hover | None:
     for key in (("global", "", fold(word)), ("pou", "", fold(word)), ("type", "", fold(word))) if not known else ():
         declared = find(checker, key)
         known = describe.markdown(declared) if declared is not None else known
-    if not known:
-        row = instructions.find(word)
-        known = f"```\n{instructions.page(row)}\n```" if row is not None else block_pages.page(word) or ""
+    known = known or _page(word)
     return Hover(found.start(), found.end(), known) if known else None
 
 
@@ -113,6 +111,11 @@ def _instruction(program: Program, name: str, offset: int) -> Hover | None:
     word = next((found for found in _WORD.finditer(part.source.text) if found.start() <= at <= found.end()), None)
     if not inside or word is None:
         return None
-    row = instructions.find(word[0])
-    text = f"```\n{instructions.page(row)}\n```" if row is not None else block_pages.page(word[0])
+    text = _page(word[0])
     return Hover(part.base + word.start(), part.base + word.end(), text) if text else None
+
+
+def _page(word: str) -> str:
+    """The page of an instruction or of a block; "" for other words, and for digits: a number is not meant as a function code."""
+    row = instructions.find(word) if not word.isdecimal() else None
+    return f"```\n{instructions.page(row)}\n```" if row is not None else block_pages.page(word) or ""
