@@ -14,7 +14,9 @@ from fbvm.check.symbols.facts import Pou, Variable
 
 _MOST = 4000
 """Characters in front of a place in which the call is searched."""
-_SKIPPED = re.compile(r"//[^\n]*|\(\*.*?\*\)|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"", re.S)
+_SKIPPED = re.compile(r"//[^\n]*(?=\n)|\(\*.*?\*\)|/\*.*?\*/|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"", re.S)
+OPEN_COMMENT = re.compile(r"//|\(\*|/\*")
+"""Where a comment begins that has no end; for texts from `without_comments`."""
 _NAMED = re.compile(r"\s*([A-Za-z_]\w*)\s*(?::=|=>)")
 
 
@@ -52,13 +54,20 @@ def pins(pou: Pou) -> list[Variable]:
     return [each for each in pou.order if each.kind in describe.PINS and " " not in each.name]
 
 
+def without_comments(text: str) -> str:
+    """A text with spaces in place of comments and texts that have an end in it; lines stay lines."""
+    return _SKIPPED.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+
+
 def open_call(program: Program, name: str, offset: int) -> OpenCall | None:
     """The innermost call whose bracket is open at a place of a file."""
     scope = scope_at(program, name, offset)
     if scope is None:
         return None
     text = scope.part.source.text[:offset - scope.part.base]
-    text = _SKIPPED.sub(lambda found: " " * len(found[0]), text[-_MOST:])
+    text = without_comments(text[-_MOST:])
+    if OPEN_COMMENT.search(text) is not None:
+        return None
     depth, ends = 0, [len(text)]
     for at in range(len(text) - 1, -1, -1):
         sign = text[at]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from fbvm.analysis import describe
-from fbvm.analysis.calls import open_call, pins
+from fbvm.analysis.calls import OPEN_COMMENT, open_call, pins, without_comments
 from fbvm.analysis.hover import all_located
 from fbvm.analysis.names import key_of
 from fbvm.analysis.program import Program
@@ -49,6 +49,7 @@ _NO_TYPES, _ONLY_TYPES = ("field", "function"), ("block", "type")
 """Kinds of members that are no types of variables, and those that nothing but a declaration names."""
 _ADDRESS = re.compile(r"%\w*\Z")
 _WORD = re.compile(r"[@%!\w]*\Z")
+_QUOTE = re.compile(r"['\"]")
 
 
 @dataclass(frozen=True)
@@ -71,9 +72,9 @@ def complete(program: Program, name: str, offset: int) -> list[Item]:
     scope = scope_at(program, name, offset)
     if scope is None:
         return []
-    text = scope.part.source.text[:offset - scope.part.base]
+    text = without_comments(scope.part.source.text[:offset - scope.part.base])
     line = text[text.rfind("\n") + 1:]
-    if _in_comment(line):
+    if _in_comment(text, line):
         return []
     if path := _PATH.search(line):
         unfit = _NO_TYPES if _in_section(text) and _OF_TYPE.search(line[:path.start()]) else _ONLY_TYPES
@@ -105,8 +106,9 @@ def documentation(page: str) -> str:
     return block_pages.page(page) or ""
 
 
-def _in_comment(line: str) -> bool:
-    return "//" in line or line.rfind("(*") > line.rfind("*)")
+def _in_comment(text: str, line: str) -> bool:
+    """True in a comment or a text, which has no end in front of the place."""
+    return OPEN_COMMENT.search(text) is not None or _QUOTE.search(line) is not None and not _in_ladder(text)
 
 
 def _in_ladder(text: str) -> bool:

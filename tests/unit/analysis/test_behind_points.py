@@ -7,6 +7,7 @@ from functools import cache
 from editing import MARK, at_mark
 from rows import each_of
 
+from fbvm.analysis.calls import signature
 from fbvm.analysis.completion import Item, complete
 
 PLANT = """\
@@ -165,3 +166,24 @@ END_NAMESPACE
         text = text.replace(f"{{{each}}}", MARK if each == place else "")
     program, offset = at_mark(text)
     assert {item.label for item in complete(program, "pump.st", offset) if item.kind == "variable"} - {"A", "C", "M"} == named
+
+
+@each_of("written, names", [
+    ("s := 'a//b'; t.", TANK), ("s := 'a(*b'; t.", TANK), ("s := 'it$'s'; t.", TANK), ("(* a *) t.", TANK), ("// a\nt.", TANK),
+    ("(* a\n // *) t.", TANK), ("/* a */ t.", TANK), ("s := \"'\"; t.", TANK), ("(* VAR\nVAR *)\nt.", TANK),
+    ("// t.", ""), ("n := 1; // a t.", ""), ("(* t.", ""), ("(* a\n t.", ""), ("/* a\n t.", ""), ("s := 't.", ""),
+    ("s := \"t.", ""), ("(* a *) // t.", ""), ("// (* a\n// t.", ""),
+])
+def test_in_comments_and_texts_nothing_is_offered(written: str, names: str) -> None:
+    assert ", ".join(f"{item.label} {item.detail}" for item in offered("main", written)) == names
+
+
+@each_of("written, label", [
+    ("d(", "Drive"), ("// d(", ""), ("(* d(", ""), ("(*\n d(", ""), ("d(// f[0](\n", "Drive"), ("d((* f( *)", "Drive"),
+    ("s := '//'; d(", "Drive"), ("d(s := '(*', ", "Drive"), ("/* d(", ""),
+])
+def test_in_a_comment_no_call_is_open(written: str, label: str) -> None:
+    text = PLANT.replace("{main}", written + MARK).replace("{drive}", "").replace("{inside}", "")
+    program, offset = at_mark(text, "codesys")
+    found = signature(program, "pump.st", offset)
+    assert (found.label.partition("(")[0] if found is not None else "") == label
