@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from fbvm.base.digits import whole_number
+
 
 def host_of(high: int, low: int) -> str:
     """The dotted address of two words.
@@ -15,6 +17,9 @@ def host_of(high: int, low: int) -> str:
 
 @lru_cache(1024)
 def words_of(host: str) -> tuple[int, int]:
-    """The two words of a dotted address."""
-    a, b, c, d = (int(part) for part in host.split("."))
+    """The two words of a dotted address.  Raises ValueError for a text that is none."""
+    parts = host.split(".")
+    if len(parts) != 4 or not all(part.isdecimal() and whole_number(part) < 256 for part in parts):
+        raise ValueError(f'{host!r} is no IPv4 address; write "192.168.250.1"')
+    a, b, c, d = map(int, parts)
     return a << 8 | b, c << 8 | d

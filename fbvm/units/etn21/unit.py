@@ -75,9 +75,7 @@ class Etn21:
             raise ValueError(f"timing {timing!r} is neither 'exact' nor 'real'")
         if odd_filler is not None and odd_filler not in range(256):
             raise ValueError(f"odd_filler {odd_filler} is no byte")
-        parts = address.split(".")
-        if len(parts) != 4 or not all(part.isdecimal() and int(part) < 256 for part in parts):
-            raise ValueError(f'{address!r} is no IPv4 address; write "192.168.250.1"')
+        words_of(address)
         self.layout = Layout.of(unit_number)
         self.name = f"ETN21 {unit_number}"
         self.address = address
