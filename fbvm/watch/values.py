@@ -235,14 +235,19 @@ def literal(text: str) -> tuple[Value, Type | None]:
         if mark and fold(prefix) in literals.ELEMENTARY:
             _, value, name = literals.typed(fold(prefix), rest)
             shown = ELEMENTARY.get(name or "")
-            return (nearest_real(float(value)) if shown is REAL else value), shown
+            return (nearest_real(float(value)) if shown is REAL else _joined(value)), shown
         if len(text) >= 2 and text[0] == text[-1] and text[0] in "'\"":
-            return literals.text_literal(text)[1], None
+            return _joined(literals.text_literal(text)[1]), None
     except (literals.Malformed, literals.OutOfRange) as error:
         raise ValueError(str(error.args[0])) from None
     except IndexError:
         raise ValueError(f"{text!r} ends within an escape") from None
     raise NoLiteral(f"{text!r} is no literal")
+
+
+def _joined(value: Value) -> Value:
+    """The same value, of a text with one character for two units of a WSTRING that make one, as `places.read` gives it."""
+    return packed(value).decode("utf-16-le", "surrogatepass") if isinstance(value, str) else value
 
 
 _PARTS = re.compile(r"'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"|.", re.S)

@@ -14,12 +14,12 @@ COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "
 SWITCH = EnumType("Switch", 2, 2, t.INT, {"OFF": 0, "ON": 1}, {0: "Off", 1: "On"})
 KINDS = {"tenth": t.REAL, "long": t.LREAL, "when": t.DT, "day": t.DATE,
          "done": t.BOOL, "n": t.INT, "r": t.REAL, "wait": t.TIME, "text": t.string(), "c": COLOUR, "s": SWITCH,
-         "list": t.array(((0, 2),), t.INT)}
+         "list": t.array(((0, 2),), t.INT), "wide": t.string(9, wide=True)}
 SYMBOLS = {name.upper(): Field(name, kind, 180224 + 16 * at) for at, (name, kind) in enumerate(KINDS.items())}
 VALUES: dict[str, Value] = {
     "tenth": nearest_real(0.1), "long": 0.1, "when": 86_400_000_000_000, "day": 0, "W0": 0, "D10": 0, "W0.00": True,
     "done": True, "n": -7, "r": 0.5, "wait": 1_500_000_000, "text": "ok", "c": 5, "s": 1, "list[1]": 3, "D200": 513,
-    "CIO 1509.15": True, "E0_5": 9, "n.0": True,
+    "CIO 1509.15": True, "E0_5": 9, "n.0": True, "wide": "\u20ac\U0001f600",
 }  # fmt: skip
 
 
@@ -92,6 +92,7 @@ def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
     "when + 1d = DT#1970-01-03-00:00:00", "when + 1d > when", "DT#1970-01-02-00:00:00 - 1s < when", "day + 1d = D#1970-01-02",
     "day < D#2024-01-31", "2 * wait = 3s", "wait + 500ms = 2s", "wait * 2 = 3s",
     "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'", "wait * 1.5 = 2s250ms", "wait / 2.5 = 600ms", "wait * r = 750ms",
+    'wide = "\u20ac\U0001f600"', 'wide = "$20AC$D83D$DE00"', 'wide = WSTRING#"\u20ac\U0001f600"', 'wide <> "\u20ac"',
     "3ns * 0.5 = 2ns", "1ns * 0.5 = 0ns", "-3ns / 2.0 = -2ns", "wait / 2 = 750ms", "3ns / 2 = 1ns",
 ])
 def test_literals_are_those_of_a_program(text: str) -> None:

@@ -77,6 +77,7 @@ def test_times_are_shown_as_a_program_writes_them(time_ns: int, text: str) -> No
     ("TRUE", True), ("false", False), ("12", 12), ("-1_000", -1000), ("16#FF", 255), ("0xff", 255), ("2#101", 5),
     ("8#17", 15), ("-16#f_f", -255), ("+7_", 7),
     ("INT#5", 5), ("''", ""), ("WORD#16#10", 16), ("1.5", 1.5), ("-2e3", -2000.0), ("'a b'", "a b"), ("T#1s", 1_000_000_000),
+    ('"\U0001f600$D83D$DE00"', "\U0001f600" * 2), ('WSTRING#"\U0001f600"', "\U0001f600"),
     ("1s", 1_000_000_000),
 ])  # fmt: skip
 def test_literals(text: str, value: object) -> None:
