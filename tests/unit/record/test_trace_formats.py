@@ -31,8 +31,10 @@ def rows(made: Waveforms) -> str:
 
 def as_trace(text: str) -> Trace:
     out = io.BytesIO()
-    read_csv(io.StringIO(text, newline=""), out)
-    return Trace(io.BytesIO(out.getvalue()))
+    count = read_csv(io.StringIO(text, newline=""), out)
+    trace = Trace(io.BytesIO(out.getvalue()))
+    assert count == len(trace.scans)
+    return trace
 
 
 NAMES = ["Main.Pump", "Main.Delay.ET", "Main.Starts.CV", "Main.Mode", "Main.Text", "Main.Both[2].b", "D200", "CIO 0.00"]
