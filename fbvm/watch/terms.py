@@ -183,7 +183,7 @@ def _computed(text: str, sign: str, left: Term, right: Term, sort: str, kind: Ty
 
 def _rounded(term: Term, other: Term) -> Term:
     """An untyped number beside a REAL is a REAL."""
-    if term.type or term.constant is None or other.type is None or base(other.type) is not REAL:
+    if term.type or term.constant is None or term.sort != "number" or other.type is None or base(other.type) is not REAL:
         return term
     try:
         value = nearest_real(float(cast(float, term.constant)))

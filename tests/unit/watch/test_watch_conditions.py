@@ -38,7 +38,7 @@ def holds(text: str) -> bool:
     "c = 5", "list[1] = 3", "n / 2 = -3", "n MOD 2 = -1", "D200 - 13 = 5 * 10 * 10",
     "(1 + 2) * 3 = 9", "1 + 2 * 3 = 7", "TRUE OR FALSE AND FALSE", "NOT done OR n < 0", "done = TRUE", "done XOR FALSE",
     "-n = 7", "+n = -7", "n.0", "%D200 <= 513", "done = 1", "done = 2 - 1", "INT#5 > 4", "n < 1e3",
-    "7 / 2.0 = 3.5", "0 MOD 5 = 0", "7.0 / 2 = 3.5",
+    "tenth + D200 MOD n < 99", "D200 MOD n > r", "7 / 2.0 = 3.5", "0 MOD 5 = 0", "7.0 / 2 = 3.5",
 ])  # fmt: skip
 def test_holds(text: str) -> None:
     assert holds(text)
@@ -133,6 +133,9 @@ def test_literals_are_those_of_a_program(text: str) -> None:
     ("day > 2024", "day is DATE and takes a date such as D#2024-01-31, not 2024"),
     ("day = DT#2024-01-01-00:00:00", "day is DATE and takes a date such as"),
     ("-text = 'a'", "- needs a number"),
+    ("'a' = REAL#1.5", "= compares a text with REAL in"), ("REAL#1.5 < 'a'", "< compares REAL with a text in"),
+    ("TRUE = r + 1", "= compares BOOL with REAL in"), ("2s > r * 2", "> compares a time with REAL in"),
+    ("r + 'a' = 1", "+ needs numbers in"), ("2s < REAL#1.5", "< compares a time with REAL in"),
     ("INT#99999 = n", "out of the range of INT"),
 ])  # fmt: skip
 def test_what_could_never_hold_is_refused(text: str, message: str) -> None:
