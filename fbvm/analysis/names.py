@@ -201,8 +201,8 @@ class _Names:
             return key_of(variable) if variable is not None else unknown
         if field is None and whole.block and (method := method_of(self.checker.block_of(whole), fold(name))) is not None:
             return key_of_pou(method)
-        if field is None and whole.block and fold(name) in self.checker.block_of(whole).actions:
-            return key_of_pou(self.checker.block_of(whole).actions[fold(name)])
+        if field is None and whole.block and (action := self.checker.block_of(whole).action(fold(name))) is not None:
+            return key_of_pou(action)
         return self.in_type(whole.name, fold(field.name)) if field is not None else None
 
     def in_type(self, name: str, member: str) -> Key | None:
@@ -249,8 +249,8 @@ class _Names:
             return self.in_type(kind.name, name)
         if block is not None and (method := method_of(block, name)) is not None:
             return key_of_pou(method)
-        if self.pou is not None and name in self.pou.owner.actions:
-            return key_of_pou(self.pou.owner.actions[name])
+        if self.pou is not None and (action := (block or self.pou.owner).action(name)) is not None:
+            return key_of_pou(action)
         if (pou := project.pou(node.text, self.source)) is not None:
             return key_of_pou(pou)
         if (entry := project.type_entry(node.text, self.source)) is not None:

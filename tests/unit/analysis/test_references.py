@@ -172,3 +172,39 @@ def test_the_member_of_an_enumeration_behind_its_type_has_a_declaration() -> Non
     declared = declared_at(program, "pump.st", offset)
     assert declared is not None and declared.key == ("member", "", "MODE", "FILLING")
     assert len(references(program, declared.key)) == 2
+
+
+ACTIONS = """\
+FUNCTION_BLOCK Base
+VAR n : INT; END_VAR
+    Act();
+METHOD Go
+    Act(); THIS^.Act();
+END_METHOD
+ACTION Act:
+    n := 1;
+END_ACTION
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Fast EXTENDS Base
+    Act();
+METHOD Also
+    Act(); SUPER^.Act();
+END_METHOD
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR f : ARRAY [0..1] OF Fast; b : Base; END_VAR
+    f[0].Act(); b.Act(); b.Go(); f[1].Also();
+END_PROGRAM
+"""
+
+
+@each_of("before, word", [("ACTION Act", "Act"), ("THIS^.Act", "Act"), ("Act(); THIS", "Act"), ("Act(); SUPER", "Act"),
+                          ("SUPER^.Act", "Act"), ("f[0].Act", "Act"), ("b.Act", "Act"), ("EXTENDS Base\n    Act", "Act")])
+def test_an_action_is_found_where_it_is_called_in_methods_and_in_blocks_that_extend_its_block(before: str, word: str) -> None:
+    check_declaration(ACTIONS, before, word, 7, 9, "codesys")
+
+
+def test_an_action_is_renamed_wherever_it_is_called() -> None:
+    program, offset = at_word(ACTIONS, "ACTION Act", "Act", "codesys")
+    assert program.diagnostics("pump.st") == []
+    assert applied(rename(program, "pump.st", offset, "Run"), "Run") == {"pump.st": ACTIONS.replace("Act", "Run")}
