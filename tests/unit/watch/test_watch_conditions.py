@@ -176,5 +176,5 @@ def test_what_is_no_condition_says_why(text: str, message: str) -> None:
 
 
 def test_arithmetic_behind_a_null_reference_holds_for_nothing() -> None:
-    for text in ("n + 1 < 99", "1 + n < 99", "n = n", "done AND done"):
+    for text in ("n + 1 < 99", "1 + n < 99", "n = n", "done AND done", "n <> 1", "1 <> n", "n - 1 <> 5"):
         assert not parse_condition(text, resolve).holds(lambda place: None), text
