@@ -111,6 +111,7 @@ def planned(files: Sequence[Path], program: str | None, libraries: Sequence[Path
     from fbvm.campaign.plan_file import with_about
     from fbvm.campaign.planning import Unfit, images_of, plan_of, program_project
 
+    where = None
     try:
         written, where = written_plan(files, options)
         folder = where.parent if where else Path()

@@ -71,3 +71,9 @@ def test_what_cannot_be_swept_is_said(arguments: list[str], status: int, said: s
     Path("bad.st").write_text("PROGRAM\n", encoding="utf-8")
     result = sweep(*arguments)
     assert result.exit_code == status and said in " ".join(result.stderr.split())
+
+
+def test_what_to_vary_that_is_no_axis_is_refused_in_words() -> None:
+    for text in ("x", "="):
+        result = sweep("gain.st", "--vary", text, "--for", "50ms")
+        assert (result.exit_code, f"{text!r} is not NAME=VALUE,VALUE or NAME=FIRST..LAST" in result.stderr) == (2, True), text
