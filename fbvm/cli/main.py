@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import importlib
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -153,7 +154,10 @@ class _Verbs(click.Group):
 
             near = suggestion(name, GROUP_OF)
             ctx.fail(f"There is no command {name!r}" + (f"; run the file by `fbvm run {name}`" if Path(name).exists() else near))
-        return super().resolve_command(ctx, args)
+        found, command, rest = super().resolve_command(ctx, args)
+        if command is not None and not ctx.resilient_parsing:
+            _refuse_empty(click.Context(command, ctx, found, **command.context_settings), rest)
+        return found, command, rest
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(GROUP_OF)
@@ -169,6 +173,21 @@ class _Verbs(click.Group):
         for heading, verbs in VERB_GROUPS.values():
             with formatter.section(heading):
                 formatter.write_dl(list(verbs.items()))
+
+
+def _refuse_empty(verb: click.Context, arguments: Sequence[str]) -> None:
+    """Raises BadParameter for a value that is empty, such as that of a shell's variable that is not set: no verb would see that
+    something was asked for.  The arguments of other programs are theirs."""
+    values, _, _ = verb.command.make_parser(verb).parse_args(list(arguments))
+    for parameter in verb.command.params:
+        given = values.get(parameter.name or "")
+        texts = given if isinstance(given, list | tuple) else [given]
+        if parameter.type is not click.UNPROCESSED and any(_is_empty(text) for text in texts):
+            raise click.BadParameter("it is empty", verb, parameter)
+
+
+def _is_empty(given: object) -> bool:
+    return not given.strip() if isinstance(given, str) else isinstance(given, tuple) and any(map(_is_empty, given))
 
 
 def _lacking(error: Exception) -> str:

@@ -153,7 +153,10 @@ def _endpoint(text: str) -> tuple[str, int]:
 
 
 def _shown(context: Context, parameter: Parameter, given: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(name for text in given for name in split_names(text))
+    names = [split_names(text) for text in given]
+    if not all(names):
+        raise BadParameter("no name stands between the commas")
+    return tuple(name for listed in names for name in listed)
 
 
 show_option = option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST,...", callback=_shown,

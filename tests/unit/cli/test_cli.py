@@ -434,11 +434,13 @@ END_CONFIGURATION
     assert fbvm("run", "tasks.st", "--scans", "1").stderr == ""
 
 
-@pytest.mark.parametrize("option", [["--chart", ""], ["--chart", "Main.n", "--chart", " , "]])
-def test_a_chart_of_nothing_is_refused(counter: str, option: list[str]) -> None:
+@pytest.mark.parametrize(("option", "said"), [
+    (["--chart", ""], "Invalid value for '--chart': it is empty"),
+    (["--chart", "Main.n", "--chart", " , "], "--chart names nothing to draw")])
+def test_a_chart_of_nothing_is_refused(counter: str, option: list[str], said: str) -> None:
     result = run("--scans", "1", *option)
     assert result.exit_code == 2
-    assert "--chart names nothing to draw" in result.stderr
+    assert said in result.stderr
 
 
 @pytest.mark.parametrize(("setting", "shown", "text"), [

@@ -28,6 +28,20 @@ from fbvm.wire.link import Peer
 # --- texts --------------------------------------------------------------------------------------------------------------
 
 
+@each_of("arguments, said", [
+    (("run", "--show", ""), "'--show': it is empty"), (("run", "--show=,"), "'--show': no name stands between the commas"),
+    (("run", "--show", "Main.n", "--show", " "), "'--show': it is empty"), (("run", "--ladder", ""), "'--ladder': it is empty"),
+    (("run", "--sfc="), "'--sfc': it is empty"), (("run", "--trace", ""), "'--trace': it is empty"),
+    (("sweep", "--until", ""), "'--until': it is empty"), (("prove", "a.st", "--within", "a", "", "b"), "'--within': it is empty"),
+    (("learn", "--folder", ""), "'--folder': it is empty"), (("import", "a.xml", "-o", " "), "'-o' / '--output': it is empty"),
+    (("check", ""), "it is empty"), (("new", ""), "'NAME': it is empty"), (("map", "D0", ""), "it is empty"),
+    (("run", "--nothing="), "No such option"),
+])
+def test_a_value_that_is_empty_is_refused_and_not_passed_over(arguments: tuple[str, ...], said: str) -> None:
+    result = CliRunner().invoke(main, arguments)
+    assert (result.exit_code, said in result.stderr) == (2, True), result.output
+
+
 @each_of("function, text, made", [
     ("time_ns", "5ms", 5_000_000), ("time_ns", 0, 0), ("time_ns", "0s", "0s is not a time that can pass"),
     ("time_ns", "soon", "soon"), ("moment_ns", "0s", 0), ("moment_ns", "-1ms", "-1ms is not a time that can pass"),
