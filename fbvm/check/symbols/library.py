@@ -232,7 +232,7 @@ class Libraries:
         for below in shelves:
             for library in sorted(below, key=lambda library: library.name not in preferred):
                 if not library.by_dialect or library.name in preferred:
-                    self._libraries.setdefault(library.name, library)
+                    self._put(library)
         self._files = {name for below in shelves[:len(own)] for library in below for name in library.files}
         self._block_names: list[str] | None = None
         self.mailboxes: dict[str, Mailbox] = {}
@@ -241,6 +241,14 @@ class Libraries:
             if library.mailbox and self.mailboxes.setdefault(library.mailbox.name, library.mailbox) != library.mailbox:
                 described = library.folder / "library.toml"
                 raise LibraryError(described, f"{library.mailbox.name} is another library's mailbox, too")
+
+    def _put(self, library: Library) -> None:
+        """Knows a library by its name: one of the user's own hides a shipped one, and beside another own one of that name it has the
+        name of its folder."""
+        other = self._libraries.get(library.name, library)
+        if not library.shipped and other.folder != library.folder:
+            library.name = library.folder.as_posix()
+        self._libraries.setdefault(library.name, library)
 
     def has_file(self, name: str) -> bool:
         """True if a library may have a file for a folded name."""

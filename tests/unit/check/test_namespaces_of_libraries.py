@@ -92,3 +92,18 @@ def test_after_many_comparisons_there_are_no_more_hints(monkeypatch: pytest.Monk
     monkeypatch.setattr(symbol_table, "COMPARISONS", 0)
     assert (both, [each.hint for each in compile_text(text).errors]) == (["did you mean lamp?"] * 2, ["", ""])
     assert compared == 50_000
+
+
+def test_two_folders_of_one_name_are_two_libraries(tmp_path: Path) -> None:
+    for vendor, block, step in (("acme", "Up", 3), ("apex", "Down", -2)):
+        folder = tmp_path / vendor / "blocks"
+        folder.mkdir(parents=True)
+        (folder / f"{block}.st").write_text(
+            f"FUNCTION_BLOCK {block} VAR_OUTPUT q : INT; END_VAR q := q + {step}; END_FUNCTION_BLOCK")
+    text = "PROGRAM Main VAR u : Up; d : Down; END_VAR u(); d(); END_PROGRAM"
+    for own in ([tmp_path / "acme", tmp_path / "apex"], [tmp_path / "acme" / "blocks", tmp_path / "apex" / "blocks"]):
+        compiled = compile_text(text, libraries=own)
+        assert compiled.image is not None, [message.render() for message in compiled.errors]
+        plc = Plc(compiled.image)
+        plc.scan()
+        assert (plc.read("Main.u.q"), plc.read("Main.d.q")) == (3, -2)
