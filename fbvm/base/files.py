@@ -38,6 +38,13 @@ def reason(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
+def resolved(path: Path) -> Path:
+    """The absolute path without links; of links that lead to one another the path as it is written, which nobody can open.
+
+    `Path.resolve` raises RuntimeError for these up to Python 3.12."""
+    return Path(os.path.realpath(path))
+
+
 def open_file(path: Path | str) -> BinaryIO:
     """Opens a regular file for reading, or a link to one.  Raises OSError, which is Unreadable for a pipe, a device or a socket;
     never waits for another process."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fbvm.base.files import resolved
 from fbvm.run.project_reader import Key, Keys, Kind, Reading, text, texts_by_name
 
 Range = tuple[float, float]
@@ -80,7 +81,7 @@ def check_pictures(reading: Reading, table: Mapping[str, Any], folder: Path, *, 
     """Reports pictures outside of the project, and bindings that show nothing or name no PLC of the project."""
     for number, row in enumerate(table["picture"]):
         where = ("picture", number)
-        if not allow_outside and not (folder / row["file"]).resolve().is_relative_to(folder.resolve()):
+        if not allow_outside and not resolved(folder / row["file"]).is_relative_to(resolved(folder)):
             reading.report("P0103", (*where, "file"), f"picture {number + 1}: {row['file']} is outside of the project",
                            "paths stay inside the folder of the project file; --allow-outside takes others, too")
         for at, bind in enumerate(row["bind"]):

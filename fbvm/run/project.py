@@ -29,7 +29,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import DIALECTS
-from fbvm.base.files import SETTINGS_BYTES
+from fbvm.base.files import SETTINGS_BYTES, resolved
 from fbvm.base.host import foreign_path
 from fbvm.code.image import LARGEST_HEAP
 from fbvm.engine.choice.tiers import CHOICES
@@ -335,11 +335,11 @@ def _counted(host: str, number: int) -> str:
 
 def _check_inside(reading: Reading, plcs: Mapping[str, Any], folder: Path) -> None:
     """Reports sources and libraries that lie outside of the project's folder, also by a link."""
-    root = folder.resolve()
+    root = resolved(folder)
     for name, row in plcs.items():
         for key in ("sources", "libraries"):
             for written in row[key]:
-                found = (folder / written).resolve()
+                found = resolved(folder / written)
                 is_device = found.exists() and not found.is_file() and not found.is_dir()  # which the reader refuses
                 if not found.is_relative_to(root) and not is_device:
                     reading.report("P0103", ("plc", name, key), f"plc.{name}.{key}: {written} is outside of the project",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.base.files import write_file
+from fbvm.base.files import resolved, write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.networks import mailbox_names
@@ -132,7 +132,7 @@ def _class(learners: Path, out: Path) -> None:
     from fbvm.testing.course.class_report import report, summary
     from fbvm.testing.course.lessons import check_class, lessons
 
-    if out.resolve().is_relative_to(learners.resolve()):
+    if resolved(out).is_relative_to(resolved(learners)):
         raise click.UsageError(f"{named(out)} lies among the learners of {named(learners)}; choose another --report")
     with writing(out):
         results = check_class(learners, out)

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.data import data_folder
-from fbvm.base.files import is_part, write_file
+from fbvm.base.files import is_part, resolved, write_file
 from fbvm.base.host import portable
 from fbvm.cli.shared.files import in_the_way, writing
 from fbvm.cli.shared.terminal import say
@@ -36,7 +36,7 @@ def command(name: str) -> None:
 
     `fbvm test` in it passes at once."""
     target = Path(name)
-    title = target.resolve().name
+    title = resolved(target).name
     if not re.fullmatch(r"[\w][\w .-]*", title):
         raise click.UsageError(f"{name!r} cannot be the name of a project; use letters, digits, - and _")
     if portable(title) != title:

@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic
-from fbvm.base.files import read_file
+from fbvm.base.files import read_file, resolved
 from fbvm.base.types import fold
 
 CODES = ("S0201", "S0204", "S0401")
@@ -37,9 +37,9 @@ def with_neighbours(diagnostics: list[Diagnostic], paths: Sequence[Path | str]) 
 
 def _beside(paths: Sequence[Path | str]) -> Iterator[Path]:
     """The other sources in the folders of some files."""
-    given = {Path(path).resolve() for path in paths}
+    given = {resolved(Path(path)) for path in paths}
     for folder in dict.fromkeys(Path(path).parent for path in paths):
-        yield from (path for path in sorted(folder.glob("*.st")) if path.resolve() not in given)
+        yield from (path for path in sorted(folder.glob("*.st")) if resolved(path) not in given)
 
 
 def _hinted(diagnostic: Diagnostic, known: dict[str, Path]) -> Diagnostic:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.files import SOURCE_BYTES, read_file
+from fbvm.base.files import SOURCE_BYTES, read_file, resolved
 from fbvm.interchange.codesys2 import is_binary, is_export
 from fbvm.interchange.cx.markup import is_project
 from fbvm.interchange.dialect_signs import FAMILIES
@@ -157,12 +157,12 @@ def with_used(found: Mapping[Path, Imported | None]) -> dict[Path, Imported | No
     A project that cannot be read is left out: what names something of it says that it is not known."""
     known = dict(found)
     waiting = [used for made in found.values() if made is not None for used in made.uses]
-    named = {path.resolve() for path in known} if waiting else set()
+    named = {resolved(path) for path in known} if waiting else set()
     while waiting:
         path = waiting.pop(0)
-        if path.resolve() in named:
+        if resolved(path) in named:
             continue
-        named.add(path.resolve())
+        named.add(resolved(path))
         try:
             made = within(path)
         except OSError:

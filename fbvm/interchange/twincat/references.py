@@ -16,7 +16,7 @@ from itertools import islice
 from pathlib import Path, PurePath
 
 from fbvm.base.diagnostics import Diagnostic
-from fbvm.base.files import SOURCE_BYTES, read_file
+from fbvm.base.files import SOURCE_BYTES, read_file, resolved
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import Element, parse_markup
 from fbvm.interchange.twincat import PROJECT_SUFFIX, SYSTEM_SUFFIX
@@ -63,7 +63,7 @@ def used_projects(path: Path, root: Element) -> list[Path]:
     solution = _solution(path) if wanted else None
     if solution is None:
         return []
-    others = [other for other in _projects_below(solution) if other.resolve() != path.resolve()]
+    others = [other for other in _projects_below(solution) if resolved(other) != resolved(path)]
     return [other for other in others if _titles_of(other) & wanted]
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path, PureWindowsPath
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.files import SOURCE_BYTES, read_file, reason
+from fbvm.base.files import SOURCE_BYTES, read_file, reason, resolved
 from fbvm.interchange.imported import Imported
 from fbvm.interchange.markup import Element, parse_markup
 from fbvm.interchange.twincat import PROJECT_SUFFIX
@@ -60,8 +60,8 @@ def _not_used(found: list[Path]) -> list[Path]:
         made = [read_project(path) for path in found]
     except OSError:
         return []
-    used = {path.resolve() for each in made for path in each.uses}
-    return [path for path in found if path.resolve() not in used]
+    used = {resolved(path) for each in made for path in each.uses}
+    return [path for path in found if resolved(path) not in used]
 
 
 def _refused(xml: Source, element: Element, message: str, hint: str = "") -> Imported:
@@ -94,7 +94,7 @@ def _project(system: Path, xml: Source, element: Element) -> Path | Diagnostic:
     path = folder.joinpath(*inner.parts)
     if not written or inner.suffix.lower() != PROJECT_SUFFIX:
         return _diagnostic(xml, element, "the PLC project has no PrjFilePath with a .plcproj")
-    if inner.anchor or not path.resolve().is_relative_to(system.parent.resolve()):
+    if inner.anchor or not resolved(path).is_relative_to(resolved(system.parent)):
         return _diagnostic(xml, element, f"{written} lies outside of the system's folder", "name the .plcproj itself")
     return path
 

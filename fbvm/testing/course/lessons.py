@@ -17,7 +17,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from fbvm.base.data import data_folder
-from fbvm.base.files import write_file
+from fbvm.base.files import resolved, write_file
 from fbvm.testing.course.predictions import ANSWER, LARGEST_BYTES, WrongAnswer, asked, first_wrong, keep_first_wrong
 from fbvm.testing.lesson import FILE as ANSWERS
 from fbvm.testing.pages import FOLDER
@@ -214,7 +214,7 @@ def check_class(folder: Path, out: Path) -> dict[str, dict[str, Result]]:
     """Checks all lessons of all learners with the lessons' own tests; traces and pages of failures stay in `out`."""
     results: dict[str, dict[str, Result]] = {}
     works = learners(folder)
-    out = out.resolve()
+    out = resolved(out)
     listing = out / "results.xml"
     for old in (out / FOLDER, out / "traces"):
         shutil.rmtree(old, ignore_errors=True)

@@ -83,6 +83,22 @@ def test_what_is_no_file_in_a_project_or_a_library(fbvm: Fbvm, what: str) -> Non
     assert "it is no file" in fbvm("check", "counter.st", "--library", "own").output
 
 
+@needs_devices
+def test_links_that_lead_to_one_another_are_refused_wherever_a_path_is_written(fbvm: Fbvm) -> None:
+    os.symlink("loop.st", "loop.st")
+    Path("wrong.st").write_text("PROGRAM Main VAR o : Other; END_VAR o(); END_PROGRAM\n", encoding="utf-8")
+    result = fbvm("check", "wrong.st")  # which looks for a declaration in the files beside
+    assert (result.exit_code, "there is no type or block Other" in result.output) == (3, True)
+    for row, said in (('sources = ["loop.st"]', "loop.st cannot be read: "), ('sources = ["loop.st/a.st"]', "there is no file"),
+                      ('sources = ["counter.st"]\nlibraries = ["loop.st"]', "there is no folder loop.st"),
+                      ('sources = ["counter.st"]\n[[picture]]\nfile = "loop.st"\nbind = []', "there is no file loop.st")):
+        Path("fbvm.toml").write_text(f"[plc.One]\n{row}\n", encoding="utf-8")
+        result = fbvm("check", "fbvm.toml")
+        assert (result.exit_code, said in result.output) == (3, True), result.output
+    for name in ("loop.st", "loop.st/project"):
+        assert "cannot be written" in fbvm("new", name).output
+
+
 @pytest.mark.slow
 def test_a_file_that_is_too_large(fbvm: Fbvm) -> None:
     with Path("large.st").open("wb") as file:
