@@ -33,6 +33,9 @@ class Protocol(LanguageServerProtocol):
             raise JsonRpcInvalidRequest("a message is an object with the key jsonrpc")
         if not isinstance(getattr(message, "id", None), int | str | None):
             raise JsonRpcInvalidRequest("the id of a message is an integer or a text")
+        if self._shutdown and hasattr(message, "id") and hasattr(message, "method"):
+            self._send_response(message.id, error=JsonRpcInvalidRequest("the server has been shut down").to_response_error())
+            return
         super().handle_message(message)
 
 

@@ -42,3 +42,15 @@ def test_a_message_that_is_none_is_named_in_a_line_and_the_server_goes_on() -> N
     assert [(answer["id"], answer.get("error", {}).get("code")) for answer in answers if "id" in answer] == [
         (1, None), (7, -32602), (2, None)]
     assert len([answer for answer in answers if answer.get("method") == "window/showMessage"]) == len(CASES) - 1
+
+
+def test_a_request_behind_a_shutdown_is_answered_with_an_error() -> None:
+    begun = request(1, "initialize", {"capabilities": {}, "processId": None, "rootUri": None})
+    end = b"".join([request(2, "shutdown", None), request(3, "shutdown", None), request(4, "textDocument/hover", {
+        "textDocument": {"uri": "file:///a.st"}, "position": {"line": 0, "character": 0}}),
+        framed(b'{"jsonrpc":"2.0","method":"exit"}')])
+    done = subprocess.run([sys.executable, "-m", "fbvm", "lsp"], input=begun + end, capture_output=True, timeout=60)
+    answers = [json.loads(part.partition("\r\n\r\n")[2]) for part in done.stdout.decode().split("Content-Length: ")[1:]]
+    assert [(answer["id"], answer.get("error", {}).get("code")) for answer in answers if "id" in answer] == [
+        (1, None), (2, None), (3, -32600), (4, -32600)]
+    assert (done.returncode, done.stderr) == (0, b"")
