@@ -65,6 +65,16 @@ class Checked:
                         messages[number] = replace(message, related=(new, at + (longer if at >= same else 0), said))
 
 
+@dataclass
+class _WholeProgram:
+    """What the texts of one revision tell together."""
+
+    revision: int
+    follow_on: FollowOnErrors = field(default_factory=FollowOnErrors)
+    places: dict[int, tuple[File, Part]] = field(default_factory=dict)
+    """By the `id` of a part's source."""
+
+
 class Program:
     """Files that are compiled together, as their editor has them.
 
@@ -90,6 +100,7 @@ class Program:
         """Counts changes of texts and of what is known about them."""
         self._outdated: list[SymbolTable] = []
         """What earlier checks knew, to be freed."""
+        self._known: _WholeProgram | None = None
         self._uses: dict[Part, list[Use]] = {}
         """Names by part.  Keys outlive a check that changes nothing that others see."""
 
@@ -272,8 +283,8 @@ class Program:
 
     def place(self, source: Source) -> tuple[File, int] | None:
         """The file of a part's text and where that begins in it; None for the text of a library."""
-        whole = source.whole
-        return next(((file, part.base) for file in self.files.values() for part in file.parts if part.source is whole), None)
+        found = self._whole_program().places.get(id(source.whole))
+        return (found[0], found[1].base) if found is not None else None
 
     # --- diagnostics ------------------------------------------------------------------------------------------------
 
@@ -285,7 +296,7 @@ class Program:
             wrong += [_moved(each, file, part.base) for each in part.mistakes]
             shifted = tuple(tree.Pragma(p.start + part.base, p.end + part.base, p.text) for p in part.syntax.pragmas)
             wrong += suppressions.add(file.source, tree.SourceText(0, 0, (), shifted), self.dialect)
-        follow_on = self._follow_on()
+        follow_on = self._whole_program().follow_on
         checked = self.checked
         for part in file.parts if checked is not None else ():
             assert checked is not None
@@ -293,12 +304,16 @@ class Program:
             wrong += [self._related(_moved(each, file, part.base)) for each in [*checked.collected.get(part.source, ()), *kept]]
         return gathered(sorted(suppressions.apply(wrong, ANY), key=Diagnostic.order))
 
-    def _follow_on(self) -> FollowOnErrors:
-        follow_on = FollowOnErrors()
-        for part in self.parts():
-            if part.mistakes:
-                follow_on.add(part.source, part.syntax, errors(part.mistakes))
-        return follow_on
+    def _whole_program(self) -> _WholeProgram:
+        """What all files tell together, which is asked for each of them."""
+        if self._known is None or self._known.revision != self.revision:
+            self._known = known = _WholeProgram(self.revision)
+            for file in self.files.values():
+                for part in file.parts:
+                    known.places[id(part.source)] = file, part
+                    if part.mistakes:
+                        known.follow_on.add(part.source, part.syntax, errors(part.mistakes))
+        return self._known
 
     def _related(self, message: Diagnostic) -> Diagnostic:
         """The message with the place of its second part in the whole text of a file."""

@@ -124,11 +124,13 @@ def _without_name(message: Diagnostic, new: str, old: str) -> str:
 
 def applied(places: list[Place], new: str) -> dict[str, str]:
     """The texts of files, by their names, with `new` at all places."""
-    texts: dict[str, str] = {}
-    for place in sorted(places, key=lambda place: place.start, reverse=True):
-        text = texts.get(place.file.name, place.file.text)
-        texts[place.file.name] = text[:place.start] + new + text[place.end:]
-    return texts
+    pieces: dict[str, list[str]] = {}
+    ends: dict[str, tuple[str, int]] = {}
+    for place in sorted(places, key=lambda place: place.start):
+        name, (text, end) = place.file.name, ends.get(place.file.name, (place.file.text, 0))
+        pieces.setdefault(name, []).extend((text[end:place.start], new))
+        ends[name] = text, place.end
+    return {name: "".join(made) + text[end:] for name, made in pieces.items() for text, end in (ends[name],)}
 
 
 def callers(program: Program, key: Key) -> Iterator[tuple[Key, Place]]:

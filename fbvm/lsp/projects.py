@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 from urllib.request import url2pathname
@@ -66,6 +67,11 @@ class Project:
     task: object | None = None
     """The check that is under way."""
 
+    @cached_property
+    def members(self) -> frozenset[Path]:
+        """`paths` as a set, once these are settled: after each key every file of a program is looked for in it."""
+        return frozenset(self.paths)
+
 
 def path_of(uri: str) -> Path:
     """The file of a URI; drive letters of Windows are in lower case."""
@@ -110,7 +116,7 @@ class Projects:
 
     def of(self, path: Path) -> list[Project]:
         """The programs that a file belongs to."""
-        return [each for each in self.all if path in each.paths]
+        return [each for each in self.all if path in each.members]
 
     def open(self, path: Path) -> list[Project]:
         """The programs that a file belongs to, which are begun if there are none yet."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from editing import at_mark, at_word, check_declaration
+from growth import assert_linear
 from lang_corpus import programs
 from rows import each_of
 
 from fbvm.analysis.declarations import find
 from fbvm.analysis.program import Program
-from fbvm.analysis.references import Refusal, applied, called, callers, declared_at, references, rename, use_at
+from fbvm.analysis.references import Place, Refusal, applied, called, callers, declared_at, references, rename, use_at
 
 PLANT = """\
 TYPE
@@ -208,3 +211,30 @@ def test_an_action_is_renamed_wherever_it_is_called() -> None:
     program, offset = at_word(ACTIONS, "ACTION Act", "Act", "codesys")
     assert program.diagnostics("pump.st") == []
     assert applied(rename(program, "pump.st", offset, "Run"), "Run") == {"pump.st": ACTIONS.replace("Act", "Run")}
+
+
+@pytest.mark.slow
+def test_the_time_of_mistakes_grows_with_the_files_of_a_program() -> None:
+    def prepared(files: int) -> Callable[[], object]:
+        made = Program()
+        for number in range(files):
+            made.replace(f"F{number}.st", f"FUNCTION F{number} : INT\nF{number} := 1\nEND_FUNCTION\n")
+        made.check_all()
+
+        def work() -> None:
+            made.revision += 1  # as after a key
+            assert all(made.diagnostics(name) for name in made.files)
+        return work
+
+    assert_linear(prepared, 400)
+
+
+@pytest.mark.slow
+def test_the_time_of_a_new_name_grows_with_the_places_in_a_file() -> None:
+    def prepared(lines: int) -> Callable[[], object]:
+        made = Program()
+        made.replace("a.st", "a := a;\n" * lines)
+        places = [Place(made.files["a.st"], at, at + 1) for line in range(lines) for at in (8 * line, 8 * line + 5)]
+        return lambda: applied(places, "bb")["a.st"].index("bb := bb;\n" * lines)
+
+    assert_linear(prepared, 10_000)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from cx_text import Cxt
+from growth import assert_linear
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
@@ -220,3 +222,19 @@ def test_what_cannot_be_read_is_no_part_of_a_program(tmp_path: Path, monkeypatch
     monkeypatch.setattr(foreign, "within", within)
     found = foreign.gathered([folder / "gone.plcproj", folder / "main.st"])
     assert (found.paths, found.held, found.said, found.containers) == ([folder / "main.st"], {}, {}, {})
+
+
+@pytest.mark.slow
+def test_the_time_to_find_the_program_of_each_file_grows_with_the_files(tmp_path: Path) -> None:
+    def prepared(files: int) -> Callable[[], object]:
+        projects, folder = Projects(lambda path: None), tmp_path / str(files)
+        listed = ", ".join(f'"F{number}.st"' for number in range(files))
+        folder_of = {"fbvm.toml": f"[plc.one]\nsources = [{listed}]\n", **{f"F{number}.st": "" for number in range(files)}}
+        folder.mkdir()
+        for name, text in folder_of.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        [made] = projects.open(folder / "F0.st")
+        assert len(made.paths) == files
+        return lambda: [projects.of(path) for path in made.paths]
+
+    assert_linear(prepared, 300)
