@@ -349,12 +349,13 @@ class SourceBuilder(SfcElements):
         """Report what stands in actions outside of POUs, up to `end`, and needs variables of a POU that is not in front."""
         for action in [each for each in self.charted if each.start < end]:
             self._refuse_chart(self.charted.pop(action)[0])
-        for ladder in (each for each in self.ladders if each.start < end):
-            self.report("S0110", ladder.start, ladder.end, "a LADDER stands in its POU, or directly behind it", _BEHIND)
-        for made in (each for each in self.lists if each.start < end and each.temporaries):
-            self.report("S0114", made.start, made.end, "this instruction list stands in its POU, or directly behind it", _BEHIND)
-        for jumps in (each for each in self.jump_sections if each.start < end):
-            self.report("S0101", jumps.start, jumps.end, "statements with jumps stand in their POU, or directly behind it", _BEHIND)
+        wrong: list[tuple[str, str, Sequence[Node]]] = [
+            ("S0110", "a LADDER stands in its", self.ladders),
+            ("S0114", "this instruction list stands in its", [each for each in self.lists if each.temporaries]),
+            ("S0101", "statements with jumps stand in their", self.jump_sections)]  # fmt: skip
+        for code, what, found in wrong:
+            for each in (each for each in found if each.start < end):
+                self.report(code, each.start, each.end, f"{what} POU, or directly behind it", _BEHIND)
         self.ladders = [each for each in self.ladders if each.start >= end]
         self.lists = [each for each in self.lists if each.start >= end]
         self.jump_sections = [each for each in self.jump_sections if each.start >= end]
