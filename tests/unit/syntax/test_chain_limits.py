@@ -86,9 +86,10 @@ def test_a_long_current_result_of_a_list_is_kept_in_a_temporary() -> None:
                     "Binary + $CR1 int:2")
 
 
-def test_a_pin_of_a_block_in_a_rung_may_be_a_text() -> None:
-    text = "PROGRAM p\nLADDER\nLD a\nFBCALL Shown s IN:='one' T:=\"two\" Q=>b\nEND_LADDER\nEND_PROGRAM\n"
-    tree, errors = parse(Source("x", text))
+def test_a_pin_of_a_block_in_a_rung_may_be_a_text_a_truth_value_or_a_literal_with_its_type() -> None:
+    pins = "IN:='one' T:=\"two\" On:=TRUE Off:=False N:=INT#5 Q=>b"
+    tree, errors = parse(Source("x", f"PROGRAM p\nLADDER\nLD a\nFBCALL Shown s {pins}\nEND_LADDER\nEND_PROGRAM\n"))
     assert not errors
-    assert [" ".join(line.split()[2:]) for line in dump(tree).split("\n") if "Argument" in line][1:3] == [
-        "name=IN value=string:'one'", "name=T value=wstring:'two'"]
+    assert [" ".join(line.split()[2:]) for line in dump(tree).split("\n") if "Argument" in line][1:6] == [
+        "name=IN value=string:'one'", "name=T value=wstring:'two'", "name=On value=bool:True", "name=Off value=bool:False",
+        "name=N value=INT#int:5"]

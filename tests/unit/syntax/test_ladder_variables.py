@@ -53,3 +53,15 @@ def test_a_method_between_rungs_of_its_block_takes_none_of_their_names() -> None
         ACTION Act:{LADDER}END_ACTION END_FUNCTION_BLOCK""")
     assert found["Block"] == "$1.0:was $2.1:was $3.0:was $4.1:was $1.1:on $2.2:on $3.1:on $4.2:on"
     assert len(found["One"].split()) == 4
+
+
+def test_rungs_behind_a_pou_are_numbered_on_from_its_own() -> None:
+    found = pous(f"""
+        PROGRAM First {VARIABLES}{LADDER}END_PROGRAM
+        ACTION First.One:{LADDER}END_ACTION
+        ACTIONS First ACTION Two:{LADDER}END_ACTION END_ACTIONS
+        PROGRAM Second {VARIABLES}{LADDER}END_PROGRAM
+        ACTION Act:{LADDER}END_ACTION""")
+    own, behind = "$1.0:was $2.1:was $1.1:on $2.2:on", "$3.0:was $4.1:was"
+    assert found == {"First": f"{own} {behind} $5.0:was $6.1:was $3.1:on $4.2:on $5.1:on $6.2:on",
+                     "Second": f"{own} {behind} $3.1:on $4.2:on"}
