@@ -32,7 +32,8 @@ class Connection:
         self._guard = guard
         self._protocol = ServerProtocol(max_size=MOST_MESSAGE_BYTES, logger=_SILENT)
         self._out = bytearray()
-        self._parts: list[bytes] = []
+        self._text: bytearray | None = None
+        """Of a text in several frames what has come; bytes, since there is no bound to how many frames are empty."""
         self._request_bytes = 0
         self.is_open = False
         """True between the handshake of a WebSocket and its end."""
@@ -91,10 +92,10 @@ class Connection:
                 yield from self._frame(event)
 
     def _frame(self, frame: Frame) -> Iterator[str]:
-        if frame.opcode in (Opcode.TEXT, Opcode.CONT) and (self._parts or frame.opcode is Opcode.TEXT):
-            self._parts.append(bytes(frame.data))
+        if frame.opcode is Opcode.TEXT or frame.opcode is Opcode.CONT and self._text is not None:
+            self._text = data = (self._text or bytearray()) + frame.data
             if frame.fin:
-                data, self._parts = b"".join(self._parts), []
+                self._text = None
                 try:
                     yield data.decode()
                 except UnicodeDecodeError:

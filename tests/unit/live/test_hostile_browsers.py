@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 
 import pytest
 from browsers import HOST, PORT, TOKEN, Page, answered, connected, frame, request, said
@@ -166,6 +167,23 @@ def test_a_message_in_many_pieces_is_bounded_as_a_whole() -> None:
     for _ in range(8):
         texts += made.receive(frame(piece, opcode=0, fin=False))
     assert texts == [] and made.ends
+
+
+@pytest.mark.slow
+def test_pieces_without_a_character_take_no_memory() -> None:
+    made = connected()
+    made.receive(frame(b'{"do":', fin=False))
+    empty = frame(b"", opcode=0, fin=False) * 1000
+    made.receive(empty)
+    tracemalloc.start()
+    try:
+        for _ in range(10):
+            assert made.receive(empty) == []
+        kept_bytes = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert kept_bytes < 20_000  # 10,000 pieces
+    assert made.receive(frame(b'"ready"}', opcode=0)) == ['{"do":"ready"}']
 
 
 def test_pieces_of_a_message_come_together() -> None:
