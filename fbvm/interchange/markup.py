@@ -23,6 +23,8 @@ MAX_DEPTH = 200
 """Deepest nesting; projects of editors have less than 40."""
 MAX_ELEMENTS = 1_000_000
 _DECLARED = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z][\w.-]*)["']""")
+_UNMARKED = {b"<\0": "utf-16-le", b"\0<": "utf-16-be"}
+"""How a document in UTF-16 begins that has no mark: expat recognises it, so its text has to be the same."""
 _ENCODINGS = re.compile(r"utf-8|utf-16|ascii|iso8859-\d+|cp125\d|cp437|cp850|koi8-[ru]|gbk|gb2312|gb18030|big5|"
                         r"shift_jis|euc_\w+")
 """Encodings that are accepted, by their names in Python."""
@@ -119,9 +121,9 @@ def _too_large(name: str) -> Diagnostic:
 
 
 def _decoded(data: bytes) -> str:
-    mark, encoding = next((known for known in MARKS if data.startswith(known[0])), (b"", ""))
+    mark, encoding = next((known for known in MARKS if data.startswith(known[0])), (b"", _UNMARKED.get(data[:2], "")))
     data = data.removeprefix(mark)
-    if not mark and (found := _DECLARED.match(data[:200])):
+    if not encoding and (found := _DECLARED.match(data[:200])):
         encoding = _known(found[1].decode("ascii"))
     try:
         return data.decode(encoding or "utf-8")

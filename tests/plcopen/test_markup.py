@@ -62,6 +62,7 @@ def test_as_many_elements_are_read_as_are_allowed(monkeypatch: pytest.MonkeyPatc
 @each_of(("data", "message"), [
     ('<?xml version="1.0" encoding="latin-1"?><a>\xe9</a>'.encode("latin-1"), ""),
     ('<?xml version="1.0" encoding="utf-16"?><a>\xe9</a>'.encode("utf-16"), ""), ("<a>\xe9</a>".encode("utf-8-sig"), ""),
+    ("<a>\xe9</a>".encode("utf-16-le"), ""), ('<?xml version="1.0" encoding="utf-16"?><a>\xe9</a>'.encode("utf-16-be"), ""),
     (b'<?xml version="1.0" encoding="rot13"?><a/>', "a.xml is written in rot13, which is not read here"),
     (b'<?xml version="1.0" encoding="nosuch"?><a/>', "a.xml is written in nosuch, which is not read here"),
     ('<?xml version="1.0" encoding="ascii"?><a>\xe9</a>'.encode(), "a.xml says that it is ASCII, and is none at byte 41"),

@@ -32,6 +32,12 @@ def test_a_block_with_all_that_belongs_to_it() -> None:
         "nCount := SEL(nCount < 5, 0, nCount);", "END_ACTION END_FUNCTION_BLOCK"]  # fmt: skip
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_an_object_is_read_in_each_encoding_of_unicode(encoding: str) -> None:
+    made = read_object(COUNTER.encode(encoding), "FB.TcPOU")
+    assert made.source is not None and (made.source.text, made.diagnostics) == (source_of(COUNTER), [])
+
+
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_each_piece_of_code_stands_where_it_stands_in_the_file(newline: str) -> None:
     text = COUNTER.replace("\n", newline).removeprefix("\ufeff")
