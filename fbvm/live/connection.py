@@ -92,8 +92,10 @@ class Connection:
                 yield from self._frame(event)
 
     def _frame(self, frame: Frame) -> Iterator[str]:
-        if frame.opcode is Opcode.TEXT or frame.opcode is Opcode.CONT and self._text is not None:
-            self._text = data = (self._text or bytearray()) + frame.data
+        if frame.opcode is Opcode.TEXT:
+            self._text = bytearray()
+        if frame.opcode in (Opcode.TEXT, Opcode.CONT) and (data := self._text) is not None:
+            data += frame.data
             if frame.fin:
                 self._text = None
                 try:

@@ -243,7 +243,7 @@ class Libraries:
                 raise LibraryError(described, f"{library.mailbox.name} is another library's mailbox, too")
 
     def _put(self, library: Library) -> None:
-        """Knows a library by its name: one of the user's own hides a shipped one, and beside another own one of that name it has the
+        """Knows a library by its name: one of the user's own hides a shipped one; beside another own one of that name it has the
         name of its folder."""
         other = self._libraries.get(library.name, library)
         if not library.shipped and other.folder != library.folder:
