@@ -149,7 +149,8 @@ class _Names:
     def method(self, node: tree.Pou) -> Iterator[Use]:
         """The names in a method or accessor."""
         block, source = self.pou, self.source
-        self.pou = next((each for each in block.methods.values() if each.tree is node), None) if block is not None else None
+        self.pou = next((each for each in block.methods.values() if (each.tree.start, each.tree.end) == (node.start, node.end)),
+                        None) if block is not None else None  # fmt: skip
         self.source = self.pou.source if self.pou is not None else source
         yield from self.walk(node)
         self.pou, self.source = block, source

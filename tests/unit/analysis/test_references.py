@@ -238,3 +238,25 @@ def test_the_time_of_a_new_name_grows_with_the_places_in_a_file() -> None:
         return lambda: applied(places, "bb")["a.st"].index("bb := bb;\n" * lines)
 
     assert_linear(prepared, 10_000)
+
+
+CONSTRUCTED = """\
+FUNCTION_BLOCK FB
+VAR_OUTPUT n : INT; END_VAR
+METHOD FB_init : BOOL
+VAR_INPUT bInitRetains, bInCopyCode : BOOL; x : INT; END_VAR
+    n := n + x;
+END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK H
+METHOD M : INT
+VAR a : ARRAY[0..2] OF FB(x := 4); END_VAR
+    M := a[0].n;
+END_METHOD
+END_FUNCTION_BLOCK
+"""
+
+
+@each_of("before, word, line, count", [("M := a", "M", 9, 2), ("METHOD M", "M", 9, 2), ("a[0]", "a", 10, 2), ("VAR a", "a", 10, 2)])
+def test_a_method_with_instances_that_are_constructed_has_its_names(before: str, word: str, line: int, count: int) -> None:
+    check_declaration(CONSTRUCTED, before, word, line, count, "codesys")
