@@ -257,6 +257,6 @@ END_FUNCTION_BLOCK
 """
 
 
-@each_of("before, word, line, count", [("M := a", "M", 9, 2), ("METHOD M", "M", 9, 2), ("a[0]", "a", 10, 2), ("VAR a", "a", 10, 2)])
+@each_of("before, word, line, count", [("M := a", "M", 9, 2), ("OD M :", "M", 9, 2), ("a[0]", "a", 10, 2), ("VAR a", "a", 10, 2)])
 def test_a_method_with_instances_that_are_constructed_has_its_names(before: str, word: str, line: int, count: int) -> None:
     check_declaration(CONSTRUCTED, before, word, line, count, "codesys")
