@@ -45,6 +45,9 @@ class RungContext:
     `line` is the step at work; every node that a method makes has the extent of that step.  A statement is written with
     `emit`, which puts it under the jumps and interlocks that cover the step."""
 
+    rung: int
+    """Which rung of the POU it is, whatever number was written."""
+    step: int
     line: Line
 
     def __init__(self, builder: Expressions) -> None:
@@ -62,8 +65,6 @@ class RungContext:
         """Interlocks that cover the step, by number; "IL" is that of IL and ILC."""
         self.jumps: dict[str, NameRef] = {}
         """By number of a jump that covers the step, the variable that is TRUE while the jump passes over rungs."""
-        self.rung = 0
-        """Which rung of the POU it is, whatever number was written."""
         self.begin_rung()
 
     def begin_rung(self) -> None:
@@ -78,7 +79,6 @@ class RungContext:
         """Names of the variables that keep conditions which an output has used."""
         self.branches: dict[str, str] = {}
         """TR bits that the rung has written, each with the variable of its last value: a later one has a variable of its own."""
-        self.step = 0
         self._depths: dict[Expr, int] = {}
         """How many operations of conditions stand in one another, by the outermost."""
         self._computed: dict[str, tuple[Statement, Expr]] = {}
