@@ -56,6 +56,12 @@ def test_updates_are_100_ms_apart(page: Page) -> None:
     assert page.session.update(2 * UPDATE_NS) is not None
 
 
+def test_a_page_that_has_gone_gets_no_update(page: Page) -> None:
+    page.done("look", plc="pump", names=["Main.Level"])
+    page.session.end()
+    assert page.session.update(UPDATE_NS) is None
+
+
 def test_a_name_that_does_not_exist_is_said_and_the_others_are_shown(page: Page) -> None:
     found = page.done("look", plc="pump", names=["Main.Levl", "Main.Level", "D10..D12"])
     assert list(found["unknown"]) == ["Main.Levl"]
