@@ -295,7 +295,8 @@ class Chart:
         """The step that a jump names, or those behind the simultaneous divergence of that name."""
         name = jump.get("targetName").upper()
         for element in self.known.values():
-            if element.name in ("step", "simultaneousDivergence") and element.get("name").upper() == name != "":
+            is_target = element.name == "step" or element.name == "simultaneousDivergence" and name
+            if is_target and element.get("name").upper() == name:
                 return [self._name(element)] if element.name == "step" else self._divided(element)
         raise NotImportable(jump, f"there is no step {jump.get('targetName')} to jump to", "")
 
