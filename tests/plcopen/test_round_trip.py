@@ -26,6 +26,7 @@ from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.interchange.plcopen.write.exporting import Exported, export_xml
 from fbvm.machine.plc import Plc
 from fbvm.syntax.text import read
+from fbvm.watch.paths import Place
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -74,6 +75,17 @@ def machine(files: dict[str, str], program: Program) -> Plc:
     return Plc(made.image, program.cycle_ns, budget=BUDGET)
 
 
+MOST_BYTES = 10_000
+"""Values of more bytes, such as the files of TwinCAT's library, are read element by element only where these bytes differ."""
+
+
+def _content(plc: Plc, name: str) -> bytes:
+    """The bytes of a variable."""
+    place = plc.find(name)
+    assert isinstance(place, Place)
+    return bytes(plc.memory.u8[place.offset:place.offset + place.type.size])
+
+
 def compare(program: Program, back: Imported) -> None:
     """Run both, and compare every variable and every word of the areas after each scan."""
     plcs = machine({program.name: program.text}, program), machine(back.files, program)
@@ -84,6 +96,9 @@ def compare(program: Program, back: Imported) -> None:
             plc.scan()
         first, second = plcs
         for name in (symbol for symbol in first.image.symbols if " " not in symbol):  # others are VAR_STAT of methods
+            before, after = (_content(plc, name) for plc in plcs)
+            if len(before) > MOST_BYTES and before == after:
+                continue
             assert same(first.read(name), second.read(name)), f"{program.name}:{program.line}: {name} after scan {scan}"
         for name, area in first.memory.areas.items():
             other = second.memory.areas.get(name)
