@@ -235,6 +235,6 @@ def test_the_time_to_find_the_program_of_each_file_grows_with_the_files(tmp_path
             (folder / name).write_text(text, encoding="utf-8")
         [made] = projects.open(folder / "F0.st")
         assert len(made.paths) == files
-        return lambda: [projects.of(path) for path in made.paths]
+        return lambda: [projects.of(path) for _ in range(30) for path in made.paths]
 
     assert_linear(prepared, 300)
