@@ -303,6 +303,8 @@ CONVEYOR = Path(__file__).parents[2] / "examples" / "conveyor"
 
 def test_a_picture_moves_with_the_machine_and_its_buttons_are_pressed(live: Any, tmp_path: Path) -> None:
     shutil.copytree(CONVEYOR, tmp_path / "machine")
+    program = tmp_path / "machine" / "conveyor.st"
+    program.write_text(program.read_text().replace("STEP   : REAL := 4.0;", "STEP   : REAL := 0.4;"))  # under way for 50 s
     page = (run := live(str(tmp_path / "machine"))).window()
     state(page, "run")
     motor, box = page.locator("#m-motor"), page.locator("#m-box")
@@ -321,6 +323,30 @@ def test_a_picture_moves_with_the_machine_and_its_buttons_are_pressed(live: Any,
     page.locator("#m-new").wait_for()
     page.locator("#wrong", has_text="left out, since it does more than draw: <script>").wait_for()
     assert page.locator("#change").is_hidden()
+    assert run.complaints == []
+
+
+def test_a_button_of_a_picture_stays_held_while_the_page_looks_at_more(live: Any, tmp_path: Path) -> None:
+    shutil.copytree(CONVEYOR, tmp_path / "machine")
+    drawing = tmp_path / "machine" / "conveyor.svg"
+    page = (run := live(str(tmp_path / "machine"))).window()
+    start = watch(page, "Main.Start")
+    page.locator("#m-start").evaluate("element => { element.first = true; }")
+    page.locator("#m-start").focus()
+    page.keyboard.down("Enter")
+    value(start, "TRUE")
+    page.locator("[data-panel=memory]").evaluate("button => button.click()")  # as the mouse does, and the focus stays
+    page.locator("#memory td").first.wait_for()
+    assert page.locator("#m-start").evaluate("element => element.first")
+    value(start, "TRUE")
+    page.keyboard.up("Enter")
+    value(start, "FALSE")
+    page.locator("#m-start").focus()
+    page.keyboard.down("Enter")
+    value(start, "TRUE")
+    drawing.write_text(drawing.read_text().replace("</svg>", "<text id='new' x='9' y='20'>changed</text></svg>"))
+    page.locator("#m-new").wait_for()
+    value(start, "FALSE")
     assert run.complaints == []
 
 

@@ -11,6 +11,7 @@ export class PicturePanel {
     this.values = {};
     this.changes = [];
     this.pressed = []; // what is let go as soon as a scan has seen it: number of the scan, and how
+    this.held = new Set(); // how the buttons that are held are let go
     at("drawing").addEventListener("change", () => {
       remember("picture", at("drawing").value);
       this.build();
@@ -22,19 +23,21 @@ export class PicturePanel {
   update(update, state) {
     if (update.scan !== undefined) this.let(state);
     if (update.forces) for (const row of at("bound").querySelectorAll("tr")) row.children[2].classList.toggle("forced", row.dataset.plc === this.page.plc && row.dataset.name in state.forces);
-    if (update.pictures) {
+    if (update.picture) this.values = update.picture;
+    // All is sent again whenever the page looks at something else; a drawing that stays keeps its focus and what is held.
+    const isOther = update.pictures && JSON.stringify(update.pictures) !== JSON.stringify(this.pictures);
+    if (isOther) {
       this.pictures = update.pictures;
       options(at("drawing"), this.pictures.map((one) => one.title), remembered("picture", ""));
       at("chooser").hidden = this.pictures.length < 2;
-      this.values = update.picture ?? this.values;
       this.build();
     } else if (update.picture) {
-      this.values = update.picture;
       this.show();
     }
   }
 
   build() {
+    for (const end of [...this.held]) end();
     const picture = this.pictures[Math.max(0, at("drawing").selectedIndex)];
     if (!picture) return;
     at("wrong").textContent = picture.problems.join("\n");
@@ -73,15 +76,13 @@ export class PicturePanel {
     const down = click === "press" ? () => write("TRUE") : () => write(click === "toggle" ? (this.values[key] === "TRUE" ? "FALSE" : "TRUE") : click);
     const up = click === "press" ? () => this.release(plc, pressed, () => write("FALSE")) : () => {};
     let pressed = null;
-    let isHeld = false;
     const begin = (event) => {
       event.preventDefault();
-      if (!isHeld) pressed = down();
-      isHeld = true;
+      if (!this.held.has(end)) pressed = down();
+      this.held.add(end);
     };
     const end = () => {
-      if (isHeld) up();
-      isHeld = false;
+      if (this.held.delete(end)) up();
     };
     element.addEventListener("pointerdown", (event) => {
       if (event.isTrusted) element.setPointerCapture(event.pointerId);
