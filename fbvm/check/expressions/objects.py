@@ -104,10 +104,7 @@ def find(scope: Scope, expr: tree.Expr, keys: tuple[str, ...]) -> tuple[list[Pou
     if _has_no_methods(block):
         return None
     found = [block.method(key.format(fold(name.text))) for key in keys]
-    if not any(found):
-        return None
-    scope.project.dependencies.repeatable = False
-    return found, of
+    return (found, of) if any(found) else None
 
 
 def _has_no_methods(block: Pou) -> bool:

@@ -390,6 +390,11 @@ class Context:
         for key, node in recorded.calls:
             pou.calls[self.project.pous[key]] = node
 
+    def check_repeated(self, pou: Pou) -> None:
+        """Check a body after all whose dependencies were repeated only: it has to be lowered with this program."""
+        if self._checked_before is not None and pou.tree in self._checked_before:
+            self.rules.body(self, pou)
+
 
 _LOOK_UP: dict[str, Callable[[Context, str, str, Pou], object]] = {
     "POU": lambda context, name, library, pou: context.project.pou(name, pou.source),

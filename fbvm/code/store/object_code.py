@@ -107,6 +107,7 @@ class ObjectLibrary:
         Object code is made when a block is seen for the second time: to make it takes longer than to lower the block, and most
         processes compile one program only."""
         if any(each.stack_bytes for each in (pou, *pou.calls)):
+            checker.check_repeated(pou)
             return lower_body(program, checker, pou)
         if pou in checker.dependencies and pou.tree not in self.code:
             if pou.tree in self.seen:

@@ -117,8 +117,47 @@ VAR n : INT; t : STRING[9]; END_VAR
     IF CLK THEN n := n / (n + 1) + Holds(); END_IF;
     t := CONCAT(t, 'ab');
 END_FUNCTION_BLOCK
+---
+b/Steps.st
+FUNCTION_BLOCK Steps
+VAR_OUTPUT n : INT; END_VAR
+METHOD PUBLIC Up : INT n := n + 1; Up := n; END_METHOD
+PROPERTY PUBLIC Twice : INT GET Twice := 2 * n; END_GET END_PROPERTY
+END_FUNCTION_BLOCK
+---
+b/Asks.st
+FUNCTION_BLOCK Asks
+VAR s : Steps; n : INT; END_VAR
+    n := s.Up() + s.Twice;
+END_FUNCTION_BLOCK
+---
+b/Stepper.st
+INTERFACE Stepper
+METHOD Step : INT VAR_INPUT n : INT; END_VAR END_METHOD
+END_INTERFACE
+---
+b/library.toml
+globals = ['Whose.st']
+---
+b/Whose.st
+VAR_GLOBAL whose : Stepper; END_VAR
+---
+b/Turn.st
+FUNCTION Turn : INT
+VAR_INPUT n : INT; END_VAR
+    Turn := whose.Step(n := n - 1);
+END_FUNCTION
+---
+b/Around.st
+FUNCTION Around : INT
+VAR_INPUT n : INT; END_VAR
+VAR kept : INT; END_VAR
+    kept := n;
+    IF n > 0 THEN kept := Turn(n) + kept; END_IF;
+    Around := kept;
+END_FUNCTION
 """
-BLOCKS = ("Named", "Coloured", "Static", "Lies", "Direct", "Uses", "Refers", "Sum_In", "Acts", "Wants")
+BLOCKS = ("Named", "Coloured", "Static", "Lies", "Direct", "Uses", "Refers", "Sum_In", "Acts", "Wants", "Asks")
 APART = {"Named", "Coloured", "Sum_Of", "Static", "Lies", "Direct", "Uses"}
 """What has object code, of those that any program here has."""
 AROUND = ("", "VAR_GLOBAL g : ARRAY [1..9] OF LREAL; END_VAR\n", """
@@ -165,7 +204,7 @@ def test_linked_is_lowered_whatever_lies_before(each: tuple[tuple[str, ...], ...
         for text in (*order, *order):
             assert image_of(text) == alone[text], text
         kept = {code.name for code in object_code.library_for(STANDARD).code.values() if code is not None}
-        assert kept >= APART and not kept & {"Refers", "Acts", "Sum_In", "Most_Of", "Holds"}
+        assert kept >= APART and not kept & {"Refers", "Acts", "Sum_In", "Most_Of", "Holds", "Asks"}
 
 
 @pytest.mark.slow
@@ -176,6 +215,21 @@ def test_what_one_program_had_made_known_another_has_too(name: str, monkeypatch:
     for _ in range(3):
         image_of(program(BLOCKS))
     assert image_of(program((name,))) == alone
+
+
+def test_a_library_that_a_users_method_leads_back_into_has_a_frame_for_each_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(object_code, "_libraries", {})
+    straight, back = (f"""
+        FUNCTION_BLOCK Own IMPLEMENTS Stepper
+        METHOD PUBLIC Step : INT VAR_INPUT n : INT; END_VAR Step := {step}; END_METHOD
+        END_FUNCTION_BLOCK
+        PROGRAM Main VAR own : Own; r : INT; END_VAR whose := own; r := Around(3); END_PROGRAM""" for step in ("n", "Around(n)"))
+    alone = image_of(back)
+    monkeypatch.setattr(object_code, "_libraries", {})
+    for _ in range(3):
+        image_of(straight)
+    assert "Around" in {code.name for code in object_code.library_for(STANDARD).code.values() if code is not None}
+    assert image_of(back) == alone
 
 
 def test_libraries_of_the_users_own_and_var_config_are_lowered_with_their_program(
