@@ -313,6 +313,20 @@ def test_files_are_written_beside_and_put_in_place_whole() -> None:
     assert wrong(written_in_place) == {"testing/course/lessons.py": ["write_text"]}, "write_file of base/files.py does it"
 
 
+def resolving(path: Path) -> list[str]:
+    """The paths that a module resolves by itself: `Path.resolve` ends in a RuntimeError at links that lead to one another."""
+    if name_of(path) in ("base/files.py", "base/data.py") or "resolve()" not in text_of(path):
+        return []
+    return [ast.unparse(node) for node in ast.walk(tree(path)) if isinstance(node, ast.Call) and not node.args
+            and isinstance(node.func, ast.Attribute) and node.func.attr == "resolve"]  # fmt: skip
+
+
+def test_links_are_followed_by_one_function() -> None:
+    of_declarations = {"check/checker.py": ["self.var_config.resolve()"],
+                       "check/declarations/interfaces.py": ["_Interface(context, pou).resolve()"]}  # fmt: skip
+    assert wrong(resolving) == of_declarations, "resolved of base/files.py does it"
+
+
 def vendors(path: Path) -> list[str]:
     """The vendors and dialects with whose names a module of the compiler or the engines compares anything."""
     if path.relative_to(PACKAGE).parts[0] not in STAIRS["language"] or not NAMED.search(text_of(path)):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fbvm.base.data import data_folder
+from fbvm.base.files import resolved
 from fbvm.code.image import Site
 from fbvm.machine.counting import Counting
 from fbvm.record.trace.branches import Branch, branches, statements
@@ -147,11 +148,11 @@ def covered_files(subject: Subject) -> set[str]:
 def _path(name: str, subject: Subject) -> str:
     """The file of a source, "" for one that is no file or came with fbvm."""
     if name in subject.sources:
-        return str(Path(name).resolve()) if Path(name).is_file() else ""
+        return str(resolved(Path(name))) if Path(name).is_file() else ""
     if (data_folder("fblib") / name).is_file():
         return ""
     for shelf in subject.libraries:
         for path in (shelf / name, shelf.parent / name):
             if path.is_file() and shelf != LIBRARY:
-                return str(path.resolve())
+                return str(resolved(path))
     return ""

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import click
 
-from fbvm.base.files import write_file
+from fbvm.base.files import resolved, write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.progress import show_progress
@@ -104,13 +104,13 @@ def _known(report: Path) -> Known:
     Raises UsageError for what is no such report."""
     try:
         root = ElementTree.parse(report).getroot()
-        lines = {(Path(each.get("filename", "")).resolve(), int(line.get("number", "0"))): line
+        lines = {(resolved(Path(each.get("filename", ""))), int(line.get("number", "0"))): line
                  for each in root.iter("class") for line in each.iter("line")}  # fmt: skip
     except (OSError, ValueError, ElementTree.ParseError) as error:
         raise click.UsageError(f"{named(report)} is no report of --fbvm-cov-xml: {error}") from None
 
     def line_of(site: Site) -> ElementTree.Element | None:
-        line = lines.get((Path(site.file).resolve(), site.line))
+        line = lines.get((resolved(Path(site.file)), site.line))
         return line if line is not None and line.get("hits", "0") != "0" else None
 
     def known(site: Site, others: list[Site]) -> bool:

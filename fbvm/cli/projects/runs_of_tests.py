@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from fbvm.base.files import resolved
 from fbvm.cli.projects.planned_runs import tests_among, written_plan
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def bench_of_tests(files: Sequence[Path], options: dict[str, Any], change: Chang
         folder = where.parent if where else Path()
         plan = plan_of_tests(change(written, None, options), named or written.about["tests"])
         with writing(folder):
-            return ItemsBench.of(plan, folder.resolve()), folder
+            return ItemsBench.of(plan, resolved(folder)), folder
     except ValueError as error:
         raise click.UsageError(str(error)) from None
 

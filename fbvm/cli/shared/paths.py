@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from fbvm.base.files import resolved
+
 _HEAD_BYTES = 4_000
 _SOURCES = (b"plcopen.org/xml/tc6", b"<tcplcobject", b"<tcsmproject", b"developer/msbuild")
 """What documents in PLCopen XML, objects, systems and projects of TwinCAT have among their first bytes, in lower case: they are
@@ -109,7 +111,7 @@ def _is_of_sources(path: Path) -> bool:
 def _taken(folder: Path) -> list[Path]:
     found = sources_in(folder)
     if not found:
-        raise click.UsageError(f"there is neither an fbvm.toml nor a source (.st) in {folder.resolve()}; give a FILE, or a "
+        raise click.UsageError(f"there is neither an fbvm.toml nor a source (.st) in {resolved(folder)}; give a FILE, or a "
                                "folder with a project or with sources")  # fmt: skip
     return found
 

@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic
+from fbvm.base.files import resolved
 
 if TYPE_CHECKING:
     from fbvm.run.project import Project
@@ -40,7 +41,7 @@ def project_argument(files: tuple[Path, ...]) -> Path | None:
 
     where = files[0] if files else Path()
     if (found := project_file(where)) is None:
-        raise click.UsageError(f"there is no {FILE} in {where.resolve()}; give a FILE, or a folder with a project or "
+        raise click.UsageError(f"there is no {FILE} in {resolved(where)}; give a FILE, or a folder with a project or "
                                "with sources (. is this one)")  # fmt: skip
     return found
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fbvm.base.diagnostics import Source
-from fbvm.base.files import write_file
+from fbvm.base.files import resolved, write_file
 from fbvm.syntax.text import read
 
 SUFFIXES = (".st", ".toml")
@@ -51,7 +51,7 @@ class LibraryTexts:
 
 def library_texts(folders: Sequence[Path]) -> tuple[LibraryTexts, ...]:
     """The texts in some folders of libraries, in their order; none if they are too large, or a name would not do elsewhere."""
-    made = tuple(LibraryTexts(folder.name or folder.resolve().name, tuple(_texts(folder))) for folder in folders)
+    made = tuple(LibraryTexts(folder.name or resolved(folder).name, tuple(_texts(folder))) for folder in folders)
     if sum(len(text) for held in made for _, text in held.files) > MOST_CHARACTERS:
         return ()
     try:

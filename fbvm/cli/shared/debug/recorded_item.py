@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from fbvm.base.files import resolved
 from fbvm.record.recording.recording import PlcRecording
 from fbvm.testing.plugin import RIGS
 from fbvm.testing.rig import Rig
@@ -40,7 +41,7 @@ def record_item(node: str, folder: Path) -> RecordedItem:
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), contextlib.chdir(folder), _without_byte_code():
         code = pytest.main([*OPTIONS, node], [kept])
     for name in set(sys.modules) - known:  # they are imported anew, with what is changed until then
-        if (file := getattr(sys.modules[name], "__file__", None)) and Path(file).resolve().is_relative_to(folder.resolve()):
+        if (file := getattr(sys.modules[name], "__file__", None)) and resolved(Path(file)).is_relative_to(resolved(folder)):
             del sys.modules[name]
     kept.item.output = said.getvalue()
     if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) or kept.count != 1:

@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from fbvm.base.files import resolved
 from fbvm.cli.shared.debug.door import DebugPort
 from fbvm.cli.shared.debug.worlds import DebugSources
 from fbvm.cli.shared.doors import unusable
@@ -199,10 +200,10 @@ class _Page:
         test = None
         if self.built.repeated:
             files, program = self.built.repeated
-            test = partial(pytest_text, files=[Path(file).resolve() for file in files], program=program)
+            test = partial(pytest_text, files=[resolved(Path(file)) for file in files], program=program)
         origin = self._origin
         if isinstance(origin, ProjectOrigin) and not any(live.is_real for live in lives):
-            test = partial(plant_text, file=origin.file.resolve(), plcs={live.name: live for live in lives})
+            test = partial(plant_text, file=resolved(origin.file), plcs={live.name: live for live in lives})
         changes = SourceChanges(origin.files, origin.programs, origin.mistakes, origin.matters) if origin.files else None
         pictures = Pictures(origin.file, origin.pictures, {live.name: live for live in lives}) \
             if isinstance(origin, ProjectOrigin) else None
