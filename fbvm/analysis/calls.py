@@ -11,10 +11,11 @@ from fbvm.analysis.scopes import PATH, Scope, scope_at
 from fbvm.base.types import fold
 from fbvm.check.calls import functions
 from fbvm.check.symbols.facts import Pou, Variable
+from fbvm.syntax.st.comments import BRACKETED, LINE, TEXT
 
 _MOST = 4000
 """Characters in front of a place in which the call is searched."""
-_SKIPPED = re.compile(r"//[^\n]*(?=\n)|\(\*.*?\*\)|/\*.*?\*/|'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\"", re.S)
+_SKIPPED = re.compile(rf"{LINE}(?=\n)|{BRACKETED}|{TEXT}", re.S)
 OPEN_COMMENT = re.compile(r"//|\(\*|/\*")
 """Where a comment begins that has no end; for texts from `without_comments`."""
 _NAMED = re.compile(r"\s*([A-Za-z_]\w*)\s*(?::=|=>)")

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from fbvm.syntax.st.comments import SILENT
+
 
 class ConditionError(ValueError):
     """The text is no condition; the message says why."""
 
 
-_SILENT = re.compile(r"\(\*.*?\*\)|//.*|'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"")
+_SILENT = re.compile(SILENT)
 
 
 def code_of(line: str) -> str:

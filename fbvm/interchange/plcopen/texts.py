@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-TEXTS = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\"|\(\*.*?\*\)|/\*.*?\*/|//[^\n]*"""
-"""A pattern for strings and comments, with DOTALL."""
-_BLANKS = re.compile(rf"(?s)({TEXTS})|\s+")
+from fbvm.syntax.st.comments import SILENT
+
+_BLANKS = re.compile(rf"(?s)({SILENT})|\s+")
 
 
 def squeezed(text: str) -> str:

@@ -1,10 +1,16 @@
-"""Where comments in brackets end."""
+"""What comments and texts look like, and where comments in brackets end."""
 
 from __future__ import annotations
 
 import re
 from functools import lru_cache
 
+LINE = r"//[^\n]*"
+BRACKETED = r"\(\*.*?\*\)|/\*.*?\*/"
+TEXT = r"'(?:\$.|[^'$\n])*'|\"(?:\$.|[^\"$\n])*\""
+"""Patterns for a comment up to the end of its line, for one in brackets that holds no other, and for a text; with DOTALL."""
+SILENT = f"{TEXT}|{BRACKETED}|{LINE}"
+"""A pattern for all in which no name means anything."""
 CLOSERS = {"(": "*)", "/": "*/"}
 _MARKS = {"(": re.compile(r"\(\*|\*\)"), "/": re.compile(r"/\*|\*/")}
 

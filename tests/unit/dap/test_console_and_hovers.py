@@ -28,7 +28,7 @@ VAR list : ARRAY[1..3] OF INT; END_VAR
 n := N; s := 'it$'s b'; // d
 b := own.q = 4 (* r *) OR n > 4 AND s = 'r'; t(IN := b);
 n := n + list[2] + list[n - 4] + own.Twice;
-n := own.Add() + own.Wrong + list[3];
+n := own.Add() + own.Wrong + list[3]; /* b */
 END_PROGRAM
 """
 

@@ -10,9 +10,10 @@ from fbvm.base.digits import whole_number
 from fbvm.check.declarations.construction import arguments
 from fbvm.interchange.markup import Element, element
 from fbvm.interchange.plcopen.schema import CODESYS, ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
-from fbvm.interchange.plcopen.texts import TEXTS, squeezed
+from fbvm.interchange.plcopen.texts import squeezed
 from fbvm.interchange.plcopen.write.layout import own_data
 from fbvm.syntax import tree
+from fbvm.syntax.st.comments import SILENT
 
 LONG = {"DATE_AND_TIME": "DT", "TIME_OF_DAY": "TOD"}
 UNSIGNED = {"USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD"}
@@ -30,7 +31,7 @@ OUTPUTS = {
 """The outputs of the blocks of the standard, and of those that Beremiz and OpenPLC Editor add."""
 LISTS = {word: name for name, word in SECTIONS.items()}
 WORDS = {word: name for name, word in QUALIFIERS.items()}
-_SIGNS = re.compile(rf"(?s)({TEXTS})|[()]")
+_SIGNS = re.compile(rf"(?s)({SILENT})|[()]")
 _NUMBERED = re.compile(r"([TtCc])(\d+)")
 _REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
 
