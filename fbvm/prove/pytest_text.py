@@ -33,11 +33,11 @@ def pytest_text(verdicts: Sequence[Verdict], files: Sequence[Path], options: dic
 def covering_text(covered: Covered, image: Image, files: Sequence[Path], options: dict[str, str]) -> str:
     """The text of a test module with a test for each run that meets goals of coverage.
 
-    What outputs are is what they are today: a test says that this has changed, and a person whether it is right."""
+    `options` are keyword arguments of `compile_files`, its dialect among them.  What outputs are is what they are today: a test
+    says that this has changed, and a person whether it is right."""
     first, *others = (str(file) for file in files)
     subject = f"{first}::{options['program']}" if "program" in options else first
-    given = f", sources={others!r}" if others else ""
-    given += f", dialect={options['dialect']!r}" if "dialect" in options else ""
+    given = (f", sources={others!r}" if others else "") + f", dialect={options['dialect']!r}"
     lines = ['"""Runs that execute what no other test does, found by `fbvm prove --tests`.', "",
              'The outputs are those of the program as it was: look at them once, whether they are right."""']  # fmt: skip
     used: set[str] = set()

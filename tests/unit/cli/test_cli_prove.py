@@ -277,6 +277,8 @@ def test_tests_for_what_no_test_executes(tmp_path: Path, plc: RigMaker) -> None:
     assert json.loads(none.stdout) == {"met": 5, "tests": [], "never": [f"{program}:9"], "missed": []}
     short = proved(str(program), "--tests", str(tests), "--scans", "1")
     assert (short.exit_code, f"{program}:5: no run of 1 scan does it" in short.stdout) == (1, True)
+    assert proved(str(program), "--tests", str(tests), "--scans", "1", "--dialect", "codesys").exit_code == 1
+    assert f"plc({str(program)!r}, 10_000_000, dialect='codesys')" in tests.read_text()
 
 
 ANSWERED = """PROGRAM Main

@@ -118,6 +118,8 @@ def test_a_table_of_a_long_trace_is_of_its_end(fbvm: Fbvm, monkeypatch: pytest.M
     assert (late.exit_code, late.output) == (
         1, "only scans 20 to 59 were looked at; --scans FIRST..LAST looks at others\nnone of these changed\n")
     assert "scan 3 " in fbvm("table", "run.fbtrace", "Main.Start", "--scans", "..").output
+    monkeypatch.setattr("fbvm.cli.recordings.table.MOST_SCANS", 60)
+    assert fbvm("table", "run.fbtrace", "Main.Start").output.startswith("scan 3 ")
 
 
 @pytest.mark.slow

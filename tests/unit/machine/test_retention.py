@@ -38,6 +38,14 @@ def test_retained_variables_are_found_by_name_wherever_they_lie_now() -> None:
     assert kept == {"Main.total", "Main.p.x", "Main.p.y", "Main.a[4]", "Main.a[5]", "Main.counters[2].n"}
 
 
+def test_a_name_that_begins_as_a_retained_one_is_not_retained() -> None:
+    old = plc("PROGRAM Main VAR RETAIN n : INT := 1; END_VAR VAR n2 : INT := 2; END_VAR n := 3; n2 := 4; END_PROGRAM")
+    new = plc("PROGRAM Main VAR RETAIN n, n2 : INT; END_VAR n := n; n2 := n2; END_PROGRAM")
+    old.run(scans=1)
+    assert [place.name for place in start_with_retained(new, old)] == ["Main.n"]
+    assert (new.read("Main.n"), new.read("Main.n2")) == (3, 0)
+
+
 def test_what_is_not_retained_or_does_not_fit_begins_anew() -> None:
     old, new = plc(OLD), plc(NEW)
     old.run(scans=3)
