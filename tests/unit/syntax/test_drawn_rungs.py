@@ -5,6 +5,7 @@ keep it."""
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -134,3 +135,20 @@ def test_how_far_from_its_contact_an_operand_may_stand() -> None:
             rung = f"{above}\n├────────{contact}──────────────────( )──┤\n"
             lines.append(f"{shift} {text}: {read(rung)}")
     check("operands.txt", lines)
+
+
+def nested(depth: int) -> list[tuple[str, str, tuple[str, ...]]]:
+    return [("", "LD", ("a",)), *[("", how, ("b",)) for how in ("OR", "AND") * depth], ("", "OUT", ("c",))]
+
+
+def outputs(count: int) -> list[tuple[str, str, tuple[str, ...]]]:
+    return [("", "LD", ("a",)), *[("", how, ("b",)) for how in ("OUT", "AND") * count], ("", "OUT", ("c",))]
+
+
+@pytest.mark.parametrize(("rung", "most"), [(nested, 24), (outputs, 199)])
+def test_a_rung_that_is_nested_too_deep_for_a_drawing_is_shown_as_its_instructions(
+        rung: Callable[[int], list[tuple[str, str, tuple[str, ...]]]], most: int) -> None:
+    assert rung_text(rung(most))[1].startswith("├")
+    for depth in (most + 1, 2_000):
+        made = rung(depth)
+        assert rung_text(made) == [f"    {mnemonic} {operand}" for _, mnemonic, (operand,) in made]

@@ -7,12 +7,15 @@ from dataclasses import dataclass, field
 
 from fbvm.syntax.ladder.instructions.instruction_set import instruction_set
 
+MOST_NESTED, MOST_POINTS = 24, 200
+"""How many parallel connections one within another, and how many points one behind another, a drawing has at most.  What is
+deeper is as wide as five screens, and takes long to lay out."""
 StepText = tuple[str, str, tuple[str, ...]]
 """Prefix, mnemonic and operands of an instruction."""
 
 
 class Undrawable(Exception):
-    """The steps can be executed and cannot be drawn, as with an OR behind an output."""
+    """The steps can be executed and cannot be drawn, as with an OR behind an output, or are nested too deep for it."""
 
 
 @dataclass(eq=False)
@@ -112,7 +115,23 @@ def diagram(steps: Sequence[StepText]) -> Point:
     except IndexError:
         raise Undrawable from None
     reader.finish()
+    _limit(reader.bar)
     return reader.bar
+
+
+def _limit(bar: Point) -> None:
+    """Raises Undrawable if something is nested too deep."""
+    waiting: list[tuple[Point | Part, int, int]] = [(bar, 0, 0)]
+    while waiting:
+        item, nested, points = waiting.pop()
+        if nested > MOST_NESTED or points > MOST_POINTS:
+            raise Undrawable
+        if isinstance(item, Point):
+            waiting += [(part, nested, points) for part in item.path.parts]
+            waiting += [(out, nested, points + 1) for out in item.outs if not isinstance(out, Coil)]
+        elif not isinstance(item, Contact):
+            within = item.branches if isinstance(item, Parallel) else item.inputs
+            waiting += [(part, nested + isinstance(item, Parallel), points) for path in within for part in path.parts]
 
 
 def _changes_power(path: Series) -> bool:
