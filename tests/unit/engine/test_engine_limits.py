@@ -57,6 +57,11 @@ def test_loops_nest(depth: int) -> None:
     assert rig.slot("i16", 0) == 1
 
 
+def test_loops_nest_behind_others() -> None:
+    rig = execute((*nested_loops(12, (add(0, ONE),), times=1), *nested_loops(21, (add(2, ONE),), times=1)))
+    assert (rig.slot("i16", 0), rig.slot("i16", 2)) == (1, 1)
+
+
 @pytest.mark.slow
 @each_of("depth", [3, 58, 61, 70, 130])
 @each_of(("leave", "counted", "after"), [("exit", 4, 1), ("next", 9, 1), ("return", 4, 0)])
