@@ -140,6 +140,33 @@ END_FUNCTION_BLOCK
         "EXP: (Data size = 21), ACT: (Data size = 31)", "EXP: 0x0000, ACT: 0x00AB"]
 
 
+VALUES = {
+    "BOOL": ("TRUE", "FALSE"), "BYTE": ("0x0A", "0x00"), "WORD": ("0x000A", "0x0000"), "DWORD": ("0x0000000A", "0x00000000"),
+    "LWORD": ("0x000000000000000A", "0x0000000000000000"), "SINT": ("-3", "0"), "INT": ("-3", "0"), "DINT": ("-3", "0"),
+    "LINT": ("-3", "0"), "USINT": ("3", "0"), "UINT": ("3", "0"), "UDINT": ("3", "0"), "ULINT": ("3", "0"), "REAL": ("1.5", "0.0"),
+    "LREAL": ("-1.5", "0.0"), "STRING": ("ab", ""), "TIME": ("T#1s", "T#0s"), "LTIME": ("LT#1s", "LT#0s"),
+    "DATE": ("D#2026-11-29", "D#1970-01-01"), "TIME_OF_DAY": ("TOD#01:02:03", "TOD#00:00:00"),
+    "DATE_AND_TIME": ("DT#2026-11-29-01:02:03", "DT#1970-01-01-00:00:00"),
+}  # fmt: skip
+"""By type what a test tells of a value and of the initial one."""
+
+
+@pytest.mark.slow
+def test_the_values_of_every_type_are_told() -> None:
+    written = {name: text.replace("0x", "16#") if "0x" in text else f"'{text}'" if name == "STRING" else text
+               for name, (text, _) in VALUES.items()}  # fmt: skip
+    declared = " ".join(f"{name}_a : {name} := {written[name]}; {name}_b : {name};" for name in VALUES)
+    compared = " ".join(f"AssertEquals({name}_a, {name}_b, '{name}');" for name in VALUES)
+    made = compile_text(f"""FUNCTION_BLOCK FB_Told_Test EXTENDS TcUnit.FB_TestSuite
+VAR {declared} END_VAR
+TEST('told'); {compared} TEST_FINISHED();
+END_FUNCTION_BLOCK
+""" + PROGRAM.format("a : FB_Told_Test;"), dialect="twincat")
+    assert made.image is not None, [message.render() for message in made.errors]
+    told = [failure.text for failure in run_suites(made.image, ["PRG_TEST.a"]).results["PRG_TEST.a", "told"].failures]
+    assert told == [f"EXP: {value}, ACT: {initial}, MSG: {name}" for name, (value, initial) in VALUES.items()]
+
+
 @pytest.mark.slow
 def test_arrays_are_compared_element_by_element_whatever_their_bounds() -> None:
     made = compile_text("""FUNCTION_BLOCK FB_Arrays_Test EXTENDS TcUnit.FB_TestSuite
