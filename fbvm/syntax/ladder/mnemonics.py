@@ -188,7 +188,11 @@ def instruction(prefix: str, mnemonic: str, start: int, end: int) -> Instruction
 
 
 def _stuck(automaton: Automaton) -> ErrorRecovery:
-    raise Refusal(automaton.before.start, automaton.before.end, "this is no instruction", "")
+    before = automaton.before
+    if before.text.endswith((":=", "=>")):
+        raise Refusal(before.start, before.end, f"the operand behind `{before.text}` is missing",
+                      "write a pin as IN:=Start or Q=>Done")
+    raise Refusal(before.start, before.end, "this is no instruction", "")
 
 
 def _step_number(text: str, at: int, end: int) -> Token | None:

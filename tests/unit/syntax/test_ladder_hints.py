@@ -44,6 +44,12 @@ def test_a_comment_behind_a_comment_is_a_mistake_with_its_place() -> None:
     assert ":4:1: error S0109: this is no instruction" in diagnostic
 
 
+@each_of("pin", ["IN:=", "Q=>"])
+def test_a_pin_without_its_operand_is_named(pin: str) -> None:
+    (message,) = said(f"LADDER\nLD A\nFBCALL TON t {pin}\nEND_LADDER")
+    assert f"error S0109: the operand behind `{pin}` is missing" in message
+
+
 @pytest.mark.slow
 @each_of(("constant", "fits"), [("+32767", True), ("+32768", False), ("-32768", True), ("-32769", False), ("&65535", True),
                                 ("&65536", False), ("#FFFF", True), ("#10000", False)])
