@@ -9,8 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from growth import assert_linear
 
 from fbvm.syntax.ladder.drawing.drawing import rung_text
+from fbvm.syntax.ladder.drawing.reading import remark_of
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.syntax.ladder.mnemonics import read_rungs
 
@@ -152,3 +154,8 @@ def test_a_rung_that_is_nested_too_deep_for_a_drawing_is_shown_as_its_instructio
     for depth in (most + 1, 2_000):
         made = rung(depth)
         assert rung_text(made) == [f"    {mnemonic} {operand}" for _, mnemonic, (operand,) in made]
+
+
+def test_the_comment_behind_a_long_line_is_found_in_time_that_grows_as_the_line() -> None:
+    assert [remark_of(line) for line in ("│ a │  // why", "│ a │// why", "│ http://x │", "│ a │")] == ["// why", "// why", "", ""]
+    assert_linear(lambda many: lambda: remark_of("│" + " " * 500 * many + "│"), 8)

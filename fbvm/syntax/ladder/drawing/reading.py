@@ -16,7 +16,7 @@ from fbvm.syntax.ladder.drawing.steps import Coded, steps
 _BEGINS = re.compile(r"[ \t]*(?:[│┃├┣┝┠║╟|]|\+-)")
 _BARE = re.compile(r"[ \t]*[-─]+[\[\]|┤].*[-─]\(")
 """A row of contacts and a coil whose rail is missing."""
-_REMARK = re.compile(r"(?<=[│┃┤┫┥┨|\s])\s*(//.*)$")
+_REMARK = re.compile(r"(?<=[│┃┤┫┥┨|\s])(//.*)$")
 
 
 @dataclass(frozen=True)
