@@ -94,7 +94,7 @@ ONLY_IN = {
     "selectors": {"net", "base/host.py", "live/sockets.py"},
     "websockets": {"live"},
     "time": {"run", "base/host.py"},
-    "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap", "cli/shared/ending.py"},
+    "threading": {"code/recursion.py", "engine/native/code.py", "engine/native/llvm/worker.py", "dap", "cli/shared/ending.py"},
     "subprocess": {"base/children.py", "engine/apart.py", "engine/native/llvm/worker.py", "cli", "campaign", "testing"},
     "llvmlite": {"engine/native/llvm/compiler.py"},
     "bitwuzla": {"prove/solver.py"},

@@ -6,9 +6,7 @@ when that is not enough, because a change concerns others.  Warnings come from `
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -28,11 +26,10 @@ from fbvm.check.symbols.size_limits import SizeLimits
 from fbvm.check.symbols.symbol_table import SymbolTable
 from fbvm.code.builder.evaluation import evaluate
 from fbvm.code.compiler.follow_on_errors import FollowOnErrors
+from fbvm.code.recursion import room
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import external
 
-FRAMES = 20_000
-"""Python frames that checking may use for the deepest tree that the parser lets through."""
 Pair = tuple[Part | None, Part | None]
 """A part before and after a change; None where there was or is none."""
 
@@ -214,7 +211,7 @@ class Program:
         for old, new in self._changes:
             assert old is not None and new is not None
             self._uses.pop(old, None)
-            with _recursion():
+            with room():
                 self._check_pou(checked, old, new)
         self._changes = []
         self.revision += 1
@@ -275,7 +272,7 @@ class Program:
         """The names in a part and what they mean, with places in the part; nothing before the first check."""
         known = self._uses.get(part)
         if known is None:
-            with _recursion():
+            with room():
                 known = uses(self.checked.checker, part) if self.checked is not None else []
             if self.is_current:
                 self._uses[part] = known
@@ -361,21 +358,10 @@ def _in_head(pou: tree.Pou, at: int) -> bool:
     return at < max((section.end for section in pou.sections), default=pou.name.end)
 
 
-@contextmanager
-def _recursion() -> Iterator[None]:
-    """Allow the recursion that deep trees need; the parser limits how deep they get."""
-    before = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(before, FRAMES))
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)
-
-
 def _deep(steps: Iterator[None]) -> Iterator[None]:
     """The steps, each with the recursion that it needs."""
     while True:
-        with _recursion():
+        with room():
             try:
                 next(steps)
             except StopIteration:

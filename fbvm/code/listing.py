@@ -12,6 +12,7 @@ from fbvm.base.areas import Address as AreaAddress
 from fbvm.base.types import Field, StructType
 from fbvm.code.image import Body, Image, TaskRow
 from fbvm.code.operations import CALLS, FIRST_OBJECT, WHOLE_BYTES, Address, Block, Node
+from fbvm.code.recursion import DEEPEST, with_room
 from fbvm.code.shapes import is_address, is_expression, operand_words
 
 MARGIN = 10
@@ -28,6 +29,10 @@ def listing(image: Image, observations: bool = False) -> str:
     >>> from fbvm import compile_text
     >>> print(listing(compile_text("PROGRAM Main VAR n : INT; END_VAR n := 1; END_PROGRAM").image).splitlines()[-1].strip())
     1:35      store i16 self+8 <- 1"""
+    return with_room(lambda: _listed(image, observations), lambda: DEEPEST)
+
+
+def _listed(image: Image, observations: bool) -> str:
     lines = [*_layout(image), *_tasks(image), *_symbols(image), *_initial(image), *_retained(image), *_objects(image)]
     files: dict[str, set[str]] = {}
     for site in image.sites:

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from fbvm.code.image import Image
 from fbvm.code.operations import Block
+from fbvm.code.recursion import with_room
 
 _T = TypeVar("_T")
 
@@ -18,15 +19,7 @@ def with_recursion_room(image: Image, frames_a_level: int, work: Callable[[], _T
     `work` recurses over the code of `image`, with at most `frames_a_level` Python frames for each level of nested tuples, and
     begins anew at each call.  The limit is raised only after it was met, because hardly any code is too deep and finding
     out how deep code is takes a third of the time of translating it."""
-    try:
-        return work()
-    except RecursionError:
-        before = sys.getrecursionlimit()
-        sys.setrecursionlimit(before + frames_a_level * max(height(body.code) for body in image.bodies))
-        try:
-            return work()
-        finally:
-            sys.setrecursionlimit(before)
+    return with_room(work, lambda: sys.getrecursionlimit() + frames_a_level * max(height(body.code) for body in image.bodies))
 
 
 def height(code: Block) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -29,12 +28,10 @@ from fbvm.code.image import USUAL_HEAP, Image, ProgramRun, TaskRow
 from fbvm.code.layout.instance_paths import InstancePaths
 from fbvm.code.layout.layout import lay_out
 from fbvm.code.lowering.program import Program
+from fbvm.code.recursion import room
 from fbvm.code.store.object_code import ObjectLibrary, library_for
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
-
-_FRAMES = 20_000
-"""Python frames that checking and lowering may use for the deepest tree that the parser lets through."""
 
 
 def run_passes(sources: Sequence[Source], program: str | None, libraries: Sequence[Path], runnable: bool, resource: str | None,
@@ -101,13 +98,12 @@ def deep(sources: Sequence[Source]) -> Iterator[None]:
     Nodes and facts live until the end; to visit them all again and again would take a third of the time.  After a long text
     the image, which lives on, is made old at once, so that the next collection does not visit it.  After short ones, of which
     tests compile thousands, that would cost more than it saves."""
-    before, collects = sys.getrecursionlimit(), gc.isenabled()
-    sys.setrecursionlimit(max(before, _FRAMES))
+    collects = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with room():
+            yield
     finally:
-        sys.setrecursionlimit(before)
         if collects:
             if sum(len(source.text) for source in sources) >= LONG and not gc.get_freeze_count():
                 gc.freeze()

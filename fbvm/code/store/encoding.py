@@ -7,7 +7,6 @@ cache never needs it."""
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
@@ -34,6 +33,7 @@ from fbvm.base.types import (
 )
 from fbvm.code.image import Body, Image, Layout, Objects, ProgramRun, Retained, RungPicture, SfcPicture, Site, TaskRow
 from fbvm.code.operations import Block
+from fbvm.code.recursion import DEEPEST, with_room
 
 
 def encode(image: Image) -> bytes:
@@ -84,10 +84,6 @@ def decode(content: bytes) -> Image:
     return image
 
 
-DEEPEST = 20_000
-"""Python frames that suffice for the deepest code that the parser lets through."""
-
-
 class _StoredBody(Body):
     """A body whose code is parsed when it is asked for."""
 
@@ -99,15 +95,7 @@ class _StoredBody(Body):
 
     @cached_property
     def code(self) -> Block:
-        try:
-            return _code(vars(self)["text"])
-        except RecursionError:
-            before = sys.getrecursionlimit()
-            sys.setrecursionlimit(DEEPEST)
-            try:
-                return _code(vars(self)["text"])
-            finally:
-                sys.setrecursionlimit(before)
+        return with_room(lambda: _code(vars(self)["text"]), lambda: DEEPEST)
 
 
 # --- plain data -----------------------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import linecache
 import marshal
-import sys
 from collections.abc import Callable, Generator, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from enum import Enum
@@ -21,6 +20,7 @@ from fbvm.base.areas import BUDGET, MOST_FRAMES
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image, ProgramRun
 from fbvm.code.operations import RAISED, Address, caught
+from fbvm.code.recursion import keep_room
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.apart import run_apart
 from fbvm.engine.bases import base_ranges, recursive_bodies
@@ -223,7 +223,7 @@ class PythonEngine:
             body = self.image.bodies[number]
             names[function_name(number, body)] = log.reporting(function, body) if log else \
                 reporting(function, body) if program.build is Build.STEPPED else _counting(function, self._system)  # fmt: skip
-        sys.setrecursionlimit(max(sys.getrecursionlimit(), program.frames + FRAMES_TO_SPARE))
+        keep_room(program.frames + FRAMES_TO_SPARE)
         return [names[function_name(number, body)] for number, body in enumerate(self.image.bodies)]
 
     def substitute(self, body: int, function: Callable[[int], None]) -> None:

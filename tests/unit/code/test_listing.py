@@ -204,3 +204,10 @@ def test_the_time_of_a_listing_grows_with_its_bodies() -> None:
         return lambda: listing(made)
 
     assert_linear(prepared, 400)
+
+
+def test_subscripts_within_subscripts_are_listed_as_deep_as_they_may_be() -> None:
+    text = f"PROGRAM Main VAR n : INT; x : ARRAY[0..3] OF INT; END_VAR n := {'x[' * 190}0{']' * 190}; END_PROGRAM"
+    image = compile_text(text).image
+    assert image is not None
+    assert listing(image).count(" R0102 ") == 189
