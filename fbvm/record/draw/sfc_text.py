@@ -49,7 +49,7 @@ def sfc_surface(picture: SfcPicture, width: int = 80, seen: ChartState | None = 
         if drawing.width <= width:
             return drawing.surface()
     while drawing.width > width:
-        steps = drawing.branches_of_the_widest((drawing.width - MUCH * width) // 2)
+        steps = drawing.branches_of_the_widest(width, (drawing.width - MUCH * width) // 2)
         if not steps:
             break
         apart |= steps
@@ -81,21 +81,32 @@ class _Drawing:
                 row += 1
         return surface
 
-    def branches_of_the_widest(self, columns: int) -> frozenset[int]:
+    def branches_of_the_widest(self, width: int, columns: int) -> frozenset[int]:
         """The last steps of the widest network that begin a branch and can be drawn apart: so many as take `columns` less room,
-        at least one.  Where many branches have to go, a drawing for each would take a time that grows with their square."""
-        graph, found = self.graph, set[int]()
+        at least one.  Where many branches have to go, a drawing for each would take a time that grows with their square; for
+        the same reason a branch that will be wider than `width` by itself loses its own branches at once."""
+        graph, found, gone = self.graph, set[int](), set[Node | None]()
         for node in self._inside(max(graph.roots, key=lambda root: self._pieces[root].width)):
+            if graph.above[node] in gone:
+                gone.add(node)
+                continue
             branches = [follower for follower in graph.following[node] if not graph.is_jump(node, follower)]
-            most = len(branches) if node.is_step else len(branches) - 1
+            left = len(branches) if node.is_step else len(branches) - 1
             for branch in reversed(branches) if len(branches) > 1 else ():
                 steps = [step for step in ([branch] if branch.is_step else graph.following[branch])
                          if step.number not in graph.apart and step not in graph.roots]  # fmt: skip
-                found |= {step.number for step in steps[:1]}
-                columns -= self._pieces[branch].width if steps else 0
-                if found and (columns <= 0 or len(steps) > 1 or len(found) == most):
+                if not steps or not left:
+                    continue
+                found.add(steps[0].number)
+                left, wide = left - 1, self._pieces[branch].width
+                if wide <= width:
+                    gone.add(branch)
+                    columns -= wide
+                else:
+                    columns -= max(1, self._pieces[node].width - wide)
+                if columns <= 0 or len(steps) > 1:
                     return frozenset(found)
-            if found:
+            if found and columns <= 0:
                 break
         return frozenset(found)
 
