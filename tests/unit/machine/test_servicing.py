@@ -229,6 +229,15 @@ def test_the_program_sets_the_clock(engine: str) -> None:
         plc.write("W0.00", True)
         plc.run(scans=1)
         assert plc.read("P_ER") and date(plc).endswith("2208 2611 0000"), place
+    for words, shown in ((0, 0x0100, 0x0001), "0000 0100 0001 0006"), ((0x5958, 0x3123, 0x9912), "5958 3123 9912 0004"):
+        plc.restore(before)
+        for number, word in enumerate(words):
+            plc.write(f"D{number}", word)
+        plc.write("W0.00", False)
+        plc.run(scans=1)
+        plc.write("W0.00", True)
+        plc.run(scans=2)
+        assert date(plc) == shown, "the first second, and a year that is 2099"
 
 
 COUNTED = "PROGRAM Main VAR n : UINT; END_VAR n := n + 1; END_PROGRAM"
