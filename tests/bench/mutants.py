@@ -56,7 +56,10 @@ from fbvm.syntax.tree.node import Node, names_of  # noqa: E402
 COPIED = ("fbvm", "fblib", "grammar", "tests", "examples", "docs", "pyproject.toml", "README.md", "ARCHITECTURE.md",
           "CONFORMANCE.md", "CHANGELOG.md", "LICENSE")  # fmt: skip
 TESTS = {
-    "fblib": ("tests/fblib", "tests/unit/units"), "base": ("tests/unit/base", "tests/lang"),
+    "fblib": ("tests/fblib", "tests/unit/units"), "iec": ("tests/lang", "tests/conformance"), "codesys": ("tests/lang",),
+    "matiec": ("tests/lang", "tests/plcopen"), "rusty": ("tests/lang",), "strucpp": ("tests/lang",),
+    "twincat": ("tests/lang", "tests/twincat"), "omron/ladder": ("tests/lang", "tests/unit/machine"),
+    "omron/etn21": ("tests/unit/processor",), "base": ("tests/unit/base", "tests/lang"),
     "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"),
     "wire": ("tests/unit/wire", "tests/unit/net"),
     "check": ("tests/unit/check", "tests/lang", "tests/unit/code"),
@@ -239,7 +242,7 @@ def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
     """The test files for a source file, in the order in which they run: first those of the room's own folder, and of
     each folder those that name the file."""
     room = path.parts[0] if path.parts[0] == "fblib" else path.parts[1].removesuffix(".py")
-    parts = ["/".join(path.parts[1:count]) for count in range(3, len(path.parts) + 1)]
+    parts = ["/".join(path.parts[1:count]) for count in range(2 if room == "fblib" else 3, len(path.parts) + 1)]
     files: list[Path] = []
     of_parts = [name for part in parts for name in TESTS.get(part, ())]
     for name in dict.fromkeys([*TESTS.get(room, (f"tests/unit/{room}",)), *of_parts]):
