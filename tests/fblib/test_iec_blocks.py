@@ -31,22 +31,22 @@ COUNTERS = {
 
 
 @cache
-def image_of(block: str) -> Image:
-    made = compile_text(f"PROGRAM Main VAR b : {block}; END_VAR b(); END_PROGRAM")
+def image_of(block: str, dialect: str = "standard") -> Image:
+    made = compile_text(f"PROGRAM Main VAR b : {block}; END_VAR b(); END_PROGRAM", dialect=dialect)
     assert made.image is not None, [message.message for message in made.diagnostics]
     return made.image
 
 
-def plays(block: str, inputs: str, outputs: str, table: str, *, time_unit: int = MS) -> None:
+def plays(block: str, inputs: str, outputs: str, table: str, *, time_unit: int = MS, dialect: str = "standard") -> None:
     """Plays a table.  Columns: time, the inputs, then the outputs, all as numbers; `-` leaves an input as it was."""
-    plc = Plc(image_of(block))
+    plc = Plc(image_of(block, dialect))
     shown = []
     rows = [row.split() for row in table.strip().splitlines()]
     for row in rows:
         for name, cell in zip(inputs.split(), row[1:], strict=False):
             if cell != "-":
                 value = bool(int(cell)) if isinstance(plc.read(f"Main.b.{name}"), bool) else int(cell)
-                plc.write(f"Main.b.{name}", value * MS if name == "PT" else value)
+                plc.write(f"Main.b.{name}", value * MS if name in ("PT", "SD_T", "SL_T") else value)
         assert plc.scan(int(row[0]) * time_unit) is None
         texts = []
         for name in outputs.split():
@@ -271,6 +271,86 @@ def test_a_running_timer_says_when_it_will_end(kind: str, form: str) -> None:
         start = 7
     assert plc.due_ns == (start + 30) * MS
     plc.scan((start + 30) * MS)
+    assert plc.due_ns > 1000 * MS
+
+
+# --- actions of charts (tables 59, 60) --------------------------------------------------------------------------------
+
+ACTION = "N R S P P1 P0 SD DS SL SD_T SL_T"
+CHARTS = {"standard": "with a final scan", "matiec": "without a final scan"}
+"""A table of an action has Q, then A with a final scan; without one A is Q, or TRUE in a scan of P1 or P0."""
+
+
+def plays_action(dialect: str, table: str) -> None:
+    """Plays a table of the inputs N to SL, Q and A; the delay is 20 ms, the limit 30 ms."""
+    rows = []
+    for row in table.strip().splitlines():
+        at, *inputs, is_on, runs = row.split()
+        if dialect == "matiec":
+            runs = str(int(is_on == "1" or "1" in inputs[4:6]))
+        rows.append(" ".join([at, *inputs, "20", "30", is_on, runs]))
+    plays("SFC_ACTION_CONTROL", ACTION, "Q A", "\n".join(rows), dialect=dialect)
+
+
+@each_of("dialect", CHARTS, ids=CHARTS.values())
+def test_an_action_runs_by_the_qualifiers_of_its_steps(dialect: str) -> None:
+    plays_action(dialect, """
+        0  0 0 0 0 0 0 0 0 0  0 0
+        1  1 0 0 0 0 0 0 0 0  1 1
+        2  0 0 0 0 0 0 0 0 0  0 1
+        3  0 0 0 0 0 0 0 0 0  0 0
+        4  0 0 0 1 0 0 0 0 0  1 1
+        5  1 1 0 1 0 0 0 0 0  0 1
+        6  0 0 0 0 1 0 0 0 0  0 1
+        7  0 0 0 0 0 1 0 0 0  0 1
+        8  0 0 0 0 0 0 0 0 0  0 0
+        9  0 0 1 0 0 0 0 0 0  1 1
+        10 0 0 0 0 0 0 0 0 0  1 1
+        11 0 1 1 0 0 0 0 0 0  0 1
+        12 0 0 0 0 0 0 0 0 0  0 0
+        13 0 0 0 0 0 0 0 1 0  1 1
+        14 0 0 0 0 0 0 0 0 0  1 1
+        15 0 1 0 0 0 0 0 0 0  0 1
+        16 0 0 0 0 0 0 0 0 0  0 0
+    """)  # fmt: skip
+
+
+@each_of("dialect", CHARTS, ids=CHARTS.values())
+def test_an_action_that_is_stored_begins_late_or_ends_early(dialect: str) -> None:
+    plays_action(dialect, """
+        100 0 0 0 0 0 0 1 0 0  0 0
+        110 0 0 0 0 0 0 1 0 0  0 0
+        119 0 0 0 0 0 0 0 0 0  0 0
+        120 0 0 0 0 0 0 0 0 0  1 1
+        130 0 0 0 0 0 0 1 0 0  1 1
+        131 0 1 0 0 0 0 0 0 0  0 1
+        132 0 0 0 0 0 0 0 0 0  0 0
+        200 0 0 0 0 0 0 0 0 1  1 1
+        210 0 0 0 0 0 0 0 0 1  1 1
+        229 0 0 0 0 0 0 0 0 0  1 1
+        230 0 0 0 0 0 0 0 0 0  0 1
+        231 0 0 0 0 0 0 0 0 1  0 0
+        232 0 1 0 0 0 0 0 0 0  0 0
+        233 0 0 0 0 0 0 0 0 1  1 1
+        234 0 1 0 0 0 0 0 0 1  0 1
+        235 0 0 0 0 0 0 0 0 0  0 0
+        240 0 0 0 0 0 0 1 0 0  0 0
+        241 0 1 0 0 0 0 0 0 0  0 0
+        270 0 0 0 0 0 0 0 0 0  0 0
+    """)  # fmt: skip
+
+
+@each_of("dialect", CHARTS, ids=CHARTS.values())
+@each_of(("pin", "after"), [("SD", 20), ("SL", 30)])
+def test_an_action_says_when_it_will_begin_or_end(dialect: str, pin: str, after: int) -> None:
+    plc = Plc(image_of("SFC_ACTION_CONTROL", dialect))
+    for name, value in (("SD_T", 20 * MS), ("SL_T", 30 * MS), (pin, True)):
+        plc.write(f"Main.b.{name}", value)
+    plc.scan(5 * MS)
+    assert plc.due_ns == (5 + after) * MS
+    plc.scan((5 + after - 1) * MS)
+    assert plc.due_ns == (5 + after) * MS
+    plc.scan((5 + after) * MS)
     assert plc.due_ns > 1000 * MS
 
 

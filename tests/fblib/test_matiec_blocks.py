@@ -1,12 +1,16 @@
-"""The additional blocks of matiec beside a straight model of each."""
+"""The blocks of matiec: its counters and timers against tables, the additional ones beside a straight model of each."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from rows import each_of
+from test_iec_blocks import COUNTERS, MS, image_of, plain, plays
 
+from fbvm.base.data import data_folder
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 
@@ -81,3 +85,108 @@ def test_a_message_is_kept_at_each_rise() -> None:
 def test_where_the_blocks_are_is_told() -> None:
     [error] = compile_text("PROGRAM Main VAR b : SEMA; END_VAR END_PROGRAM").errors
     assert (error.code, error.hint) == ("S0204", "it is a block of Beremiz and OpenPLC: --dialect matiec or strucpp brings it")
+
+
+# --- counters, which stop at PV and at 0, and the timer -----------------------------------------------------------------
+
+
+@each_of("suffix", COUNTERS)
+def test_a_counter_up_stops_at_pv(suffix: str) -> None:
+    plays("CTU" + suffix, "CU R PV", "Q CV", """
+        0  0 0 2  0 0
+        1  1 0 2  0 1
+        2  1 0 2  0 1
+        3  0 0 2  0 1
+        4  1 0 2  1 2
+        5  0 0 2  1 2
+        6  1 0 2  1 2
+        7  1 1 2  0 0
+        8  1 0 2  0 0
+        9  0 1 0  1 0
+        10 1 1 2  0 0
+        11 1 0 2  0 0
+    """, dialect="matiec")  # fmt: skip
+
+
+@each_of("suffix", COUNTERS)
+def test_a_counter_down_stops_at_zero(suffix: str) -> None:
+    plays("CTD" + suffix, "CD LD PV", "Q CV", """
+        0  0 0 2  1 0
+        1  1 0 2  1 0
+        2  0 0 2  1 0
+        3  1 1 2  0 2
+        4  1 0 2  0 2
+        5  0 0 2  0 2
+        6  1 0 2  0 1
+        7  0 0 2  0 1
+        8  1 0 2  1 0
+        9  0 0 2  1 0
+        10 1 0 2  1 0
+        11 0 1 0  1 0
+    """, dialect="matiec")  # fmt: skip
+
+
+@each_of("suffix", COUNTERS)
+def test_a_counter_up_and_down_stops_at_pv_and_at_zero(suffix: str) -> None:
+    plays("CTUD" + suffix, "CU CD R LD PV", "QU QD CV", """
+        0  0 0 0 0 2  0 1 0
+        1  0 1 0 0 2  0 1 0
+        2  1 0 0 0 2  0 0 1
+        3  1 0 0 0 2  0 0 1
+        4  0 0 0 0 2  0 0 1
+        5  1 1 0 0 2  0 0 1
+        6  0 0 0 0 2  0 0 1
+        7  1 0 0 0 2  1 0 2
+        8  0 1 0 0 2  0 0 1
+        9  0 1 0 0 2  0 0 1
+        10 1 0 0 0 2  1 0 2
+        11 0 0 0 0 2  1 0 2
+        12 1 0 0 0 2  1 0 2
+        13 1 1 0 0 2  0 0 1
+        14 1 1 1 1 2  0 1 0
+        15 1 1 0 1 2  1 0 2
+        16 0 0 0 0 2  1 0 2
+        17 0 1 0 0 2  0 0 1
+        18 1 1 0 0 2  1 0 2
+        19 0 0 1 0 0  1 1 0
+    """, dialect="matiec")  # fmt: skip
+
+
+@each_of("kind", ["CTU", "CTD", "CTUD"])
+@each_of("suffix", COUNTERS)
+def test_matiecs_counters_of_all_types_are_one_text(kind: str, suffix: str) -> None:
+    folder = data_folder("fblib") / "matiec" / "blocks"
+    text = re.sub(r"\bINT\b", COUNTERS[suffix][0], plain(folder / f"{kind}.st"))
+    assert plain(folder / f"{kind}{suffix}.st") == text.replace(f"FUNCTION_BLOCK {kind}\n", f"FUNCTION_BLOCK {kind}{suffix}\n")
+
+
+@each_of("block", ["TON", "TON_TIME"])
+def test_an_on_delay_is_over_in_the_scan_after_its_rise_at_the_earliest(block: str) -> None:
+    plays(block, "IN PT", "Q ET", """
+        0   0 30  0 0
+        10  1 30  0 0
+        25  1 30  0 15
+        39  1 30  0 29
+        40  1 30  1 30
+        90  1 90  1 30
+        95  0 30  0 0
+        96  1 30  0 0
+        99  1 30  0 3
+        100 0 30  0 0
+        101 1 30  0 0
+        500 1 30  1 30
+    """, dialect="matiec")  # fmt: skip
+    for pt in (0, -5):
+        plays(block, "IN PT", "Q ET", f"0 1 {pt} 0 0 \n 1 1 {pt} 1 0 \n 2 1 {pt} 1 0 \n 3 0 {pt} 0 0", dialect="matiec")
+
+
+@each_of("block", ["TON", "TON_TIME"])
+def test_a_running_on_delay_of_matiec_says_when_it_will_end(block: str) -> None:
+    plc = Plc(image_of(block, "matiec"))
+    plc.write("Main.b.PT", 30 * MS)
+    plc.write("Main.b.IN", True)
+    for at in (5, 20, 34):
+        plc.scan(at * MS)
+        assert plc.due_ns == 35 * MS
+    plc.scan(35 * MS)
+    assert plc.due_ns > 1000 * MS
