@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 
 FIRST, LAST = date(1677, 9, 22), date(2262, 4, 11)
@@ -81,3 +82,91 @@ def test_the_last_moment() -> None:
     assert run(**inputs, s=15).trap is None
     trap = run(**inputs, s=16).trap
     assert trap is not None and trap.code == "R0103"
+
+
+# --- each function at its limits ----------------------------------------------------------------------------------------
+
+PARTS = ("Y", "M", "D", "h", "n", "s", "ms")
+WHOLE = """
+PROGRAM Main
+VAR Y, M, D, h, n, s, ms : LINT; short : DT; long, joined_long : LDT; joined : DT; clock : TOD; long_clock : LTOD; day : DATE;
+    weekday : INT; of_short, of_long, of_parts, of_long_parts : ARRAY[1..7] OF INT; END_VAR
+short := CONCAT_DT(Y, M, D, h, n, s, ms); long := CONCAT_LDT(Y, M, D, h, n, s, ms);
+clock := CONCAT_TOD(h, n, s, ms); long_clock := CONCAT_LTOD(h, n, s, ms);
+day := CONCAT_DATE(Y, M, D); weekday := DAY_OF_WEEK(day);
+joined := CONCAT_DATE_TOD(day, clock); joined_long := CONCAT_DATE_LTOD(day, long_clock + LTIME#1ns);
+SPLIT_DT(short, of_short[1], of_short[2], of_short[3], of_short[4], of_short[5], of_short[6], of_short[7]);
+SPLIT_LDT(long, of_long[1], of_long[2], of_long[3], of_long[4], of_long[5], of_long[6], of_long[7]);
+SPLIT_DATE(day, of_parts[1], of_parts[2], of_parts[3]); SPLIT_TOD(clock, of_parts[4], of_parts[5], of_parts[6], of_parts[7]);
+SPLIT_DATE(day, of_long_parts[1], of_long_parts[2], of_long_parts[3]);
+SPLIT_LTOD(long_clock, of_long_parts[4], of_long_parts[5], of_long_parts[6], of_long_parts[7]);
+END_PROGRAM
+"""
+
+
+@cache
+def image_of(text: str) -> Image:
+    made = compile_text(text)
+    assert made.image is not None, [message.render() for message in made.diagnostics]
+    return made.image
+
+
+@each_of("parts", [
+    (1677, 9, 22, 0, 0, 0, 0), (1677, 12, 31, 23, 59, 59, 999), (1678, 1, 1, 0, 0, 0, 0), (1699, 12, 31, 1, 1, 1, 1),
+    (1700, 2, 28, 23, 0, 59, 0), (1700, 3, 1, 0, 59, 0, 999), (1969, 12, 31, 23, 59, 59, 999), (1970, 1, 1, 0, 0, 0, 0),
+    (1970, 1, 1, 0, 0, 0, 1), (2000, 2, 29, 12, 30, 15, 500), (2000, 3, 1, 0, 0, 1, 0), (2001, 2, 28, 0, 1, 0, 0),
+    (2023, 12, 31, 23, 59, 59, 999), (2024, 2, 29, 1, 0, 0, 0), (2100, 2, 28, 9, 8, 7, 6), (2100, 3, 1, 9, 8, 7, 6),
+    (2262, 4, 11, 23, 47, 15, 999), (2262, 1, 31, 0, 0, 0, 0),
+])  # fmt: skip
+def test_all_functions_of_dates_agree_with_a_calendar(parts: tuple[int, ...]) -> None:
+    machine = Plc(image_of(WHOLE))
+    for name, value in zip(PARTS, parts, strict=True):
+        machine.write(f"Main.{name}", value)
+    machine.scan()
+    assert machine.trap is None
+    moment = datetime(*parts[:6])
+    since = moment - datetime(1970, 1, 1)
+    day = since.days * 86_400 * NS
+    clock = since.seconds * NS + parts[6] * 1_000_000
+    names = ("short", "long", "joined", "joined_long", "clock", "long_clock", "day", "weekday")
+    found = [machine.read(f"Main.{name}") for name in names]
+    assert found == [day + clock, day + clock, day + clock, day + clock + 1, clock, clock, day, moment.isoweekday() % 7]
+    for name in ("of_short", "of_long", "of_parts", "of_long_parts"):
+        assert machine.read(f"Main.{name}") == list(parts), name
+
+
+CALLS = {"CONCAT_DT": (0, 7), "CONCAT_LDT": (0, 7), "CONCAT_DATE": (0, 3), "CONCAT_TOD": (3, 7), "CONCAT_LTOD": (3, 7)}
+"""A function and which of the seven parts it takes."""
+RANGES = [(1677, 2262), (1, 12), (1, 31), (0, 23), (0, 59), (0, 59), (0, 999)]
+
+
+@each_of("function", CALLS)
+def test_each_part_of_a_date_or_time_has_limits(function: str) -> None:
+    first, end = CALLS[function]
+    names, kind = PARTS[first:end], function.removeprefix("CONCAT_")
+    machine = Plc(image_of(f"PROGRAM Main VAR v : {kind}; {', '.join(names)} : LINT; END_VAR "
+                           f"v := {function}({', '.join(names)}); END_PROGRAM"))
+    for name, (low, high) in zip(names, RANGES[first:end], strict=True):
+        for value, good in ((low - 1, False), (low, True), (high, True), (high + 1, False)):
+            machine.cold_start()
+            for other, usual in zip(PARTS, (2000, 1, 1, 1, 1, 1, 1), strict=True):
+                if other in names:
+                    machine.write(f"Main.{other}", usual)
+            if name == "Y" and value == low:
+                machine.write("Main.M", 10)
+            machine.write(f"Main.{name}", value)
+            machine.scan()
+            trap = machine.trap
+            assert (trap is None) == good, (name, value)
+            assert trap is None or (trap.code == "R0103" and f"value {value} outside {low}..{high}" in trap.message)
+
+
+@each_of("function", ["CONCAT_DATE_TOD", "CONCAT_DATE_LTOD"])
+def test_a_date_and_a_time_that_64_bits_cannot_hold_stop_the_program(function: str) -> None:
+    kind = function.rpartition("_")[2]
+    for second, good in ((15, True), (16, False)):
+        machine = Plc(image_of(f"PROGRAM Main VAR v : {'L' * (kind == 'LTOD')}DT; END_VAR "
+                               f"v := {function}(D#2262-04-11, {kind}#23:47:{second}.5); END_PROGRAM"))
+        machine.scan()
+        assert (machine.trap is None) == good
+        assert not good or machine.read("Main.v") == (106_751 * 86_400 + 85_635) * NS + NS // 2
