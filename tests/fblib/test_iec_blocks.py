@@ -96,6 +96,11 @@ def test_edges(block: str, table: str) -> None:
     plays(block, "CLK", "Q", table)
 
 
+def test_the_first_call_of_a_falling_edge_has_none_before_it_in_codesys() -> None:
+    plays("F_TRIG", "CLK", "Q", "0 0 0 \n 1 1 0 \n 2 0 1 \n 3 0 0 \n 4 1 0 \n 5 0 1", dialect="codesys")
+    plays("F_TRIG", "CLK", "Q", "0 1 0 \n 1 0 1 \n 2 0 0", dialect="codesys")
+
+
 # --- counters (table 45) ----------------------------------------------------------------------------------------------
 
 

@@ -82,6 +82,67 @@ def test_a_message_is_kept_at_each_rise() -> None:
     assert (block["Last"], block["Count"]) == ("message 4", 2)
 
 
+@each_of(("level", "kept"), [("", 2), (", LEVEL := LOGLEVEL#CRITICAL", 0), (", LEVEL := LOGLEVEL#DEBUG", 3)])
+def test_a_message_is_kept_with_its_level_which_is_info_unless_told(level: str, kept: int) -> None:
+    blocks = scans("LOGGER", f"TRIG := n >= 2, MSG := 'now'{level}", 3)
+    assert [(block["Last"], block["Last_Level"], block["Count"]) for block in blocks] == [
+        ("", 0, 0), ("now", kept, 1), ("now", kept, 1)]  # fmt: skip
+
+
+def test_a_clock_is_set_at_each_rise_and_shows_the_time_of_the_plc_between() -> None:
+    call = "IN := n = 2 OR n = 3 OR n >= 5, PDT := SEL(n > 3, DT#2024-02-28-23:59:59, DT#2030-01-01-00:00:00)"
+    seen = [(block["Q"], int(block["CDT"])) for block in scans("RTC", call, 6)]
+    first, second, scan = 1_709_164_799 * 10**9, 1_893_456_000 * 10**9, 100_000_000
+    assert seen == [(False, 0), (True, first), (True, first + scan), (False, 3 * scan), (True, second), (True, second + scan)]
+
+
+def test_a_derivative_weighs_four_values_and_begins_anew_without_run() -> None:
+    found, past = [], [0.0, 0.0, 0.0]
+    for n in range(1, 12):
+        value = float(n * n % 7)
+        if n in (1, 6):
+            found.append(0.0)
+            past = [value] * 3
+        else:
+            found.append((3 * (value - past[2]) + past[0] - past[1]) / (10 * 0.5))
+            past = [value, *past[:2]]
+    call = "RUN := n <> 1 AND n <> 6, XIN := INT_TO_REAL(n * n MOD 7), CYCLE := T#500ms"
+    assert [block["XOUT"] for block in scans("DERIVATIVE", call, 11)] == pytest.approx(found)
+
+
+def test_an_integral_stands_without_run_and_is_set_with_or_without_it() -> None:
+    call = "RUN := n <> 3 AND n <> 4, R1 := n = 4 OR n = 6, XIN := -4.0, X0 := INT_TO_REAL(n), CYCLE := T#2s"
+    assert [(block["XOUT"], block["Q"]) for block in scans("INTEGRAL", call, 7)] == [
+        (-8.0, True), (-16.0, True), (-16.0, True), (4.0, False), (-4.0, True), (6.0, False), (-2.0, True)]  # fmt: skip
+
+
+def test_a_ramp_goes_down_too_and_begins_anew() -> None:
+    call = "RUN := n <> 1 AND n <> 5, X0 := 8.0, X1 := -4.0, TR := T#300ms, CYCLE := T#100ms"
+    assert [(block["XOUT"], block["BUSY"]) for block in scans("RAMP", call, 9)] == [
+        (8.0, False), (8.0, True), (4.0, True), (0.0, True), (8.0, False), (8.0, True), (4.0, True), (0.0, True),
+        (-4.0, False)]  # fmt: skip
+
+
+BEREMIZ = ["csv_read_by_int", "csv_read_by_string", "csv_reload", "python_eval", "python_gear", "python_poll"]
+
+
+@each_of("block", BEREMIZ)
+def test_nobody_acknowledges_a_block_of_beremiz(block: str) -> None:
+    plc = Plc(image_of(block, "matiec"))
+    plc.write("Main.b.ACK", True)
+    plc.write("Main.b.RESULT", "before")
+    plc.scan()
+    assert (plc.read("Main.b.ACK"), plc.read("Main.b.RESULT")) == (False, "")
+
+
+def test_a_button_of_beremiz_is_not_pressed_and_a_bool_has_a_word_of_python() -> None:
+    plc = Plc(image_of("Button", "matiec"))
+    plc.write("Main.b.state_out", True)
+    plc.scan()
+    assert plc.read("Main.b.state_out") is False
+    assert [block["CODE"] for block in scans("GetBoolString", "VALUE := n = 2", 3)] == ["False", "True", "False"]
+
+
 def test_where_the_blocks_are_is_told() -> None:
     [error] = compile_text("PROGRAM Main VAR b : SEMA; END_VAR END_PROGRAM").errors
     assert (error.code, error.hint) == ("S0204", "it is a block of Beremiz and OpenPLC: --dialect matiec or strucpp brings it")
