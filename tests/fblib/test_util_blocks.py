@@ -186,7 +186,9 @@ def test_limits_of_a_controller_are_active_beyond_them_only() -> None:
     errors, limits = (5.0, 5.25, -6.0, -6.25), (-11.0, 11.0)
     assert controlled(*(fixed(error, limits=limits) for error in errors)) == [
         (11.0, False), (11.0, True), (-11.0, False), (-11.0, True)]  # fmt: skip
-    assert controlled(fixed(5.0, limits=(5.0, 5.0)), fixed(5.0, limits=(6.0, 5.0))) == [(11.0, False), (11.0, False)]
+    assert controlled(*(fixed(error, limits=ends) for error in (5.0, -9.0) for ends in ((5.0, 5.0), (6.0, 5.0)))) == [
+        (11.0, False), (11.0, False), (-17.0, False), (-17.0, False)]  # fmt: skip
+    assert controlled(fixed(-9.0, limits=limits), fixed(-9.0, limits=limits, reset=True)) == [(-11.0, True), (1.0, False)]
     assert controlled(fixed(9.0, limits=limits), fixed(9.0, limits=limits, manual=True), fixed(9.0, limits=limits),
                       fixed(9.0, limits=limits, reset=True)) == [(11.0, True), (20.0, False), (11.0, True), (1.0, False)]
     pins = "ACTUAL SET_POINT KP TV Y_MANUAL Y_OFFSET Y_MIN Y_MAX MANUAL RESET -> Y LIMITS_ACTIVE"
@@ -230,6 +232,8 @@ def generated(head: str, *times: int) -> list[int]:
 def test_a_generator_has_a_period_of_a_second_or_of_1000_calls() -> None:
     assert generated("BASE := TRUE", 300, 550, 1299, 1300, 5050) == [-1000, -500, 998, -1000, 500]
     assert generated("BASE := FALSE", 300, 550, 550) == [-1000, -998, -996]
+    assert generated("BASE := FALSE", *range(1001))[500:] == [*range(0, 1000, 2), -1000]
+    assert generated("BASE := TRUE, PERIOD := SEL(g.OUT = -500, T#1s, T#0s)", 300, 550, 560, 570) == [-1000, -500, -1000, -460]
     for head in ("BASE := TRUE, PERIOD := T#0s", "BASE := TRUE, PERIOD := T#-1s", "BASE := FALSE, CYCLES := 0",
                  "BASE := FALSE, CYCLES := -1", "BASE := FALSE, CYCLES := 1"):
         assert generated(head, 300, 550, 800) == [-1000, -1000, -1000]
@@ -258,6 +262,10 @@ def test_freq_measure_waits_for_its_periods() -> None:
     assert found[:6] == [(0.0, False)] * 4 + [(8.0, True)] * 2
     assert found[6:] == [(8.0, True), (0.0, False), (4.0, True), (4.0, True)]
     assert outputs("FREQ_MEASURE", pins, *rises(0, 100, periods=0))[2:] == [(10.0, True)] * 2
+    by_default = [call[:2] for call in rises(0, 100, periods=1)]
+    assert outputs("FREQ_MEASURE", "IN -> OUT VALID", *by_default)[2:] == [(10.0, True)] * 2
+    at_once = [(0, level, 1, False) for level in (True, False, True, False)]
+    assert outputs("FREQ_MEASURE", pins, *at_once) == [(0.0, False)] * 4
     for periods, seen in ((10, 10), (11, 10), (9, 9)):
         found = outputs("FREQ_MEASURE", pins, *rises(*range(0, 1200, 100), periods=periods))
         assert [valid for _, valid in found[::2]] == [number >= seen for number in range(12)]
