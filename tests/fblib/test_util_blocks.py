@@ -87,11 +87,19 @@ def test_charcurve_has_two_to_eleven_points(count: int, level: int, out: int, er
 
 def test_charcurve_forgets_an_error() -> None:
     plc = Plc(image_of(CURVE))
-    for count, level, err in ((3, 51, 2), (3, -45, 0), (1, -45, 4), (2, -45, 0)):
+    for count, level, out, err in ((3, 51, 400, 2), (3, -51, 0, 2), (3, -45, 50, 0), (1, 0, 50, 4), (2, -40, 100, 0)):
         plc.write("Main.N", count)
         plc.write("Main.level", level)
         plc.scan()
-        assert plc.read("Main.c.ERR") == err
+        assert (plc.read("Main.c.OUT"), plc.read("Main.c.ERR")) == (out, err)
+
+
+@each_of("first", [-40, -39])
+def test_the_first_two_points_of_charcurve_are_in_order_too(first: int) -> None:
+    plc = Plc(image_of(CURVE.replace("c(IN", f"p[0].X := {first};\nc(IN")))
+    plc.write("Main.N", 3)
+    plc.scan()
+    assert plc.read("Main.c.ERR") == 1
 
 
 @each_of("block", ["RAMP_INT", "RAMP_REAL"])
@@ -138,6 +146,8 @@ def test_the_derivative_weighs_each_of_its_times() -> None:
              (0, 5.0, 3, True), (0, 9.0, 0, False), (0, 9.0, 10, False)]  # fmt: skip
     assert outputs("DERIVATIVE", "IN TM RESET -> OUT", *calls) == pytest.approx(
         [0.0, 0.6, 0.36, 0.512, 0.275, 0.0, 0.0, 16 / 30])  # fmt: skip
+    calls = [(0, value, 10, value == 5.0) for value in (1.0, 2.0, 4.0, 5.0, 6.0)]
+    assert outputs("DERIVATIVE", "IN TM RESET -> OUT", *calls)[3:] == pytest.approx([0.0, 0.1])
 
 
 # --- controllers --------------------------------------------------------------------------------------------------------
