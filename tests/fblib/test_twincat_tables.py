@@ -256,7 +256,7 @@ def test_clocks_tell_the_virtual_time() -> None:
 
 
 @pytest.mark.slow
-def test_clocks_are_set_by_the_rise_of_en_alone() -> None:
+def test_clocks_go_on_from_what_the_rise_of_en_has_set() -> None:
     plc = Plc(image_of("""VAR en : BOOL; given : DT; text, fine : STRING(23); ms, us : DWORD; a : RTC; b : RTC_EX;
     c : RTC_EX2; END_VAR
 a(EN := en, PDT := given); b(EN := en, PDT := given, PMSEK := ms); c(EN := en, PDT := STRING_TO_SYSTEMTIME(text), PMICRO := us);
@@ -268,11 +268,13 @@ fine := SYSTEMTIME_TO_STRING(c.CDT);"""))
     day = set_to[1]
     assert set_to == (True, day, True, day, 990, True, "2000-01-01-00:00:00.990", 700)
     after(plc, names, given=0, text="2001-01-01-00:00:00.000", ms=0, us=0)
-    later = after(plc, names, en=False)
-    assert (later[4], later[6], later[7]) == (10, "2000-01-01-00:00:01.010", 700)
-    assert later[1] == day
-    again = after(plc, names, en=True)
-    assert again == (True, 0, True, 0, 0, True, "2001-01-01-00:00:00.000", 0)
+    later = after(plc, names)
+    assert (later[1], later[3], later[4], later[6], later[7]) == (day, day + second, 10, "2000-01-01-00:00:01.010", 700)
+    for _ in range(97):
+        later = after(plc, names)
+    assert (later[1], later[3], later[4], later[6], later[7]) == (day, day + second, 980, "2000-01-01-00:00:01.980", 700)
+    assert after(plc, names)[1:5] == (day + second, True, day + second, 990)
+    assert after(plc, names)[1:5] == (day + second, True, day + 2 * second, 0)
 
 
 def test_random_numbers_follow_from_the_first_seed() -> None:
