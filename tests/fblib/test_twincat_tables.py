@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from test_twincat_blocks import MS, after, image_of
 
+from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 
 # --- FB_FormatString ----------------------------------------------------------------------------------------------------
@@ -311,3 +312,40 @@ def test_persistent_data_are_written_for_one_call() -> None:
                        "a(START := go); b(START := go);"))  # fmt: skip
     found = [after(plc, "a.BUSY b.BUSY a.ERR b.ERR", go=go) for go in (False, True, True, False, True)]
     assert found == [(busy, busy, False, False) for busy in (False, True, False, False, True)]
+
+
+TASKS = """PROGRAM Main
+VAR n : DINT; index : GETCURTASKINDEX; number : DINT; info, other : PlcTaskSystemInfo; app : PlcAppSystemInfo; first : BOOL;
+END_VAR
+n := n + 1; index(); number := GETCURTASKINDEXEX(); info := TwinCAT_SystemInfoVarList._TaskInfo[number];
+first := first OR info.FirstCycle;
+app := TwinCAT_SystemInfoVarList._AppInfo; other := TwinCAT_SystemInfoVarList._TaskInfo[3 - number];
+END_PROGRAM
+CONFIGURATION Line
+RESOURCE PLC ON fbvm
+    TASK Fast(INTERVAL := T#10ms, PRIORITY := 3); TASK Slow(INTERVAL := T#30ms, PRIORITY := 7);
+    PROGRAM A WITH Fast : Main; PROGRAM B WITH Slow : Main;
+END_RESOURCE
+END_CONFIGURATION"""
+
+
+@pytest.mark.slow
+def test_a_program_knows_its_task_and_its_project() -> None:
+    made = compile_text(TASKS, dialect="twincat")
+    assert made.image is not None, [message.render() for message in made.diagnostics]
+    plc = Plc(made.image)
+    names = "CycleTime Priority CycleCount FirstCycle TaskName"
+
+    def told(program: str, part: str) -> tuple[Any, ...]:
+        return tuple(plc.read(f"{program}.{part}.{name}") for name in names.split())
+
+    assert plc.scan(0) is None
+    assert told("A", "info") == (100_000, 3, 1, True, "Fast")
+    assert told("B", "info") == (300_000, 7, 1, True, "Slow")
+    for at in range(1, 7):
+        assert plc.scan(at * 10 * MS) is None
+    assert told("A", "info") == (100_000, 3, 7, False, "Fast")
+    assert told("B", "info") == (300_000, 7, 3, False, "Slow")
+    assert told("B", "other") == (100_000, 3, 7, False, "Fast")
+    assert [plc.read(f"{name}.{what}") for name in "AB" for what in ("index.index", "number")] == [1, 1, 2, 2]
+    assert [plc.read(f"A.app.{name}") for name in ("TaskCnt", "AppName", "ProjectName")] == [2, "Line", "Line"]

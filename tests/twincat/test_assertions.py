@@ -232,3 +232,12 @@ def test_an_ordered_test_whose_name_is_taken_has_no_turn() -> None:
 IF TEST_ORDERED('a') THEN IF n = 2 THEN TEST_FINISHED(); END_IF END_IF
 IF n = 1 THEN IF TEST_ORDERED('a') THEN twice := 1; END_IF AssertTrue(FALSE, ''); TEST_FINISHED(); END_IF""")
     assert (run.is_over, run.plc.read("Main.s.twice"), run.results["Main.s", "a"].asserts) == (True, 0, 0)
+
+
+@pytest.mark.slow
+def test_a_message_of_a_test_stands_in_the_log_and_a_disabled_name_begins_with_the_word() -> None:
+    run = run_of("r : DINT := 5;", """TEST('not disabled_x'); r := TCUNIT_ADSLOGSTR(2, 'a %s c', 'b'); TEST_FINISHED();
+TEST('Disabled_'); AssertTrue(FALSE, ''); TEST_FINISHED();""")
+    assert log_of(run)[0] == (2, "a b c")
+    assert run.plc.read("Main.s.r") == 0
+    assert {name: result.skipped for (_, name), result in run.results.items()} == {"not disabled_x": False, "": True}
