@@ -170,3 +170,12 @@ def test_a_date_and_a_time_that_64_bits_cannot_hold_stop_the_program(function: s
         machine.scan()
         assert (machine.trap is None) == good
         assert not good or machine.read("Main.v") == (106_751 * 86_400 + 85_635) * NS + NS // 2
+
+
+@each_of(("ns", "day", "weekday"), [(-1, 31, 3), (-86_400 * NS, 31, 3), (-86_400 * NS - 1, 30, 2), (-2 * 86_400 * NS, 30, 2)])
+def test_a_moment_before_1970_is_of_the_day_that_it_is_in(ns: int, day: int, weekday: int) -> None:
+    machine = Plc(image_of("PROGRAM Main VAR ns : LINT; d : DATE; y, m, n, w : INT; END_VAR "
+                           "d := LDATE_TO_DATE(LINT_TO_LDATE(ns)); SPLIT_DATE(d, y, m, n); w := DAY_OF_WEEK(d); END_PROGRAM"))
+    machine.write("Main.ns", ns)
+    machine.scan()
+    assert [machine.read(f"Main.{name}") for name in ("y", "m", "n", "w")] == [1969, 12, day, weekday]
