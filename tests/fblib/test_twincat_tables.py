@@ -100,7 +100,10 @@ def test_a_table_of_three_places_finds_goes_on_and_removes() -> None:
     assert after(plc, "made h.nCount h.nFree h.Places", size=3 * bytes_each - 1) == (True, 0, 2, 2)
     assert after(plc, "made h.nCount h.nFree h.Places", posed=True) == (False, 0, 0, 0)
     assert after(plc, "made h.nCount h.nFree h.Places", posed=False, size=bytes_each - 1) == (False, 0, 0, 0)
-    assert after(plc, "made h.nCount h.nFree h.Places", size=3 * bytes_each) == (True, 0, 3, 3)
+    assert after(plc, "made h.nCount h.nFree h.Places", size=bytes_each) == (True, 0, 1, 1)
+    assert [did(1, k=7, value=70), did(1, k=8), did(2, k=7)] == [(True, 70, 0, 1, 0), (False, 0, 99, 1, 0), (True, 70, 0, 1, 0)]
+    assert did(6, no=0) == (True, 0, 0, 1, 0)
+    assert after(plc, "made h.nCount h.nFree h.Places", what=0, size=3 * bytes_each) == (True, 0, 3, 3)
     assert did(1, k=2, value=20) == (True, 20, 2, 1, 2)
     assert did(1, k=5, value=50) == (True, 50, 0, 2, 1)
     assert did(1, k=8, value=80) == (True, 80, 1, 3, 0)

@@ -161,11 +161,11 @@ def test_the_log_of_suites_of_several_cycles() -> None:
 TEST('good'); AssertTrue(TRUE, ''); AssertTrue(TRUE, ''); TEST_FINISHED();
 TEST('bad'); t(IN := TRUE, PT := T#20ms); AssertEquals_INT(1, 2, 'm'); IF t.Q THEN AssertFalse(TRUE, 'n'); TEST_FINISHED(); END_IF
 TEST(' DISABLED_off '); AssertTrue(FALSE, ''); TEST_FINISHED();
-IF n = 1 THEN TEST('good'); AssertTrue(FALSE, 'twice'); END_IF""", program="s, other : FB_Suite;")
+IF n = 2 THEN TEST('good'); AssertTrue(FALSE, 'twice'); END_IF""", program="s, other : FB_Suite;")
     bad = [(4, "FAILED TEST 'Main.{}@bad', EXP: 1, ACT: 2, MSG: m"),
            (4, "FAILED TEST 'Main.{}@bad', EXP: FALSE, ACT: TRUE, MSG: n")]  # fmt: skip
     twice = (4, "Test with name 'good' already exists in test suite 'Main.{}'")
-    begun = [(mask, text.format(name)) for name in ("s", "other") for mask, text in (bad[0], twice)]
+    begun = [(mask, text.format(name)) for mask, text in (bad[0], twice) for name in ("s", "other")]
     ended = [(bad[1][0], bad[1][1].format(name)) for name in ("s", "other")]
     report = [(1, f"| {line}") for number, name in enumerate(("s", "other")) for line in (
         f"Test suite ID={number} 'Main.{name}'", f"ID={number} number of tests=3, number of failed tests=1, duration=0.02",
