@@ -78,6 +78,7 @@ def test_a_block_of_an_axis_is_in_error_as_long_as_it_is_asked() -> None:
             assert told == ((True, 0x8145) if level else (False, 0)), name
 
 
+@pytest.mark.slow
 def test_a_jog_is_asked_by_either_direction_and_an_axis_counts_its_readings() -> None:
     plc = Plc(image_of("VAR a : AXIS_REF; b : MC_Jog; on, back : BOOL; code : DWORD; END_VAR\n"
                        "a.NcToPlc.ErrorCode := code; a(); b(Axis := a, JogForward := on, JogBackwards := back);"))  # fmt: skip
@@ -195,11 +196,13 @@ def test_the_mode_of_a_file_says_what_may_be_done_with_it(mode: int, told: tuple
     assert done(plc, "gets", "sLine", h=h) == (0, kept)
 
 
+@pytest.mark.slow
 @each_of(("mode", "error"), [(0x1, 0x70C), (0x9, 0x70C), (0x2, 0), (0xA, 0), (0x4, 0), (0xC, 0)])
 def test_a_file_is_made_to_be_written_and_not_to_be_read(mode: int, error: int) -> None:
     assert done(Plc(image_of(FILES)), "open", path="a", mode=mode) == error
 
 
+@pytest.mark.slow
 def test_the_bits_of_a_mode_are_one_of_the_modes_of_codesys() -> None:
     modes = ("AM_READ", "AM_WRITE", "AM_APPEND_PLUS", "AM_READ_PLUS", "AM_WRITE_PLUS")
     wanted = {0: 0, 1: 0, 2: 1, 3: 1, 4: 2, 6: 2, 8: 3, 9: 3, 10: 4, 12: 2, 0x10: 0, 0x20: 0, 0x22: 1}

@@ -100,6 +100,7 @@ def test_texts_bits_and_dates_as_numbers() -> None:
     assert values(given, "ULINT", declared) == given
 
 
+@pytest.mark.slow
 def test_bits_of_numbers_leap_years_results_and_areas_of_memory() -> None:
     rows = [
         ("GETBIT32(1, 0)", True), ("GETBIT32(16#80000000, 31)", True), ("GETBIT32(16#FFFFFFFF, 32)", False),
@@ -115,6 +116,7 @@ def test_bits_of_numbers_leap_years_results_and_areas_of_memory() -> None:
     assert values(rows, "BOOL", "ten : LREAL := 10.0;") == rows
 
 
+@pytest.mark.slow
 def test_functions_of_tc2_math_at_whole_numbers_and_without_a_range() -> None:
     rows = [
         ("FLOOR(3.0)", 3.0), ("FLOOR(-3.0)", -3.0), ("FLOOR(-0.5)", -1.0), ("FLOOR(0.5)", 0.0), ("FRAC(3.0)", 0.0),

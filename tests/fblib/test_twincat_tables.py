@@ -281,6 +281,7 @@ fine := SYSTEMTIME_TO_STRING(c.CDT);"""))
     assert after(plc, names)[1:5] == (day + second, True, day + 2 * second, 0)
 
 
+@pytest.mark.slow
 def test_random_numbers_follow_from_the_first_seed() -> None:
     plc = Plc(image_of("VAR a, b : DRAND; seed : INT; END_VAR\na(Seed := seed); b(Seed := -seed);"))
     state = 5

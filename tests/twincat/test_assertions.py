@@ -61,6 +61,7 @@ def test_each_assertion_about_a_value_tells_both_and_takes_equal_ones() -> None:
     assert run.results["Main.s", "t"].asserts == 4 * len(rows) + 3 + 4
 
 
+@pytest.mark.slow
 @each_of("type", ["REAL", "LREAL"])
 def test_a_real_may_be_off_by_delta_and_no_more(type: str) -> None:
     rows = [("2.0", "2.5", "0.5", True), ("2.0", "1.5", "0.5", True), ("2.0", "2.75", "0.5", False),
