@@ -228,3 +228,10 @@ def test_a_field_of_more_than_255_characters_is_read_up_to_there() -> None:
     assert after(plc, READ, size=300, **{"r.eCmd": 0}) == (True, "x" * 255, 0, 256, False, 257)
     assert after(plc, READ, size=260, **{"r.eCmd": 1}) == (False, "", -1, 0, False, 0)
     assert after(plc, READ, size=261) == (True, "yy", 257, 2, True, 4)
+
+
+@pytest.mark.slow
+def test_an_empty_field_is_an_empty_text() -> None:
+    plc = Plc(image_of(BYTES))
+    assert after(plc, "written taken read", n=1, room=2, size=1, qm=True, text="") == (2, 0, "")
+    assert after(plc, "written taken read", room=1) == (0, 0, "keepkeep")
