@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 
@@ -49,17 +49,6 @@ def test_what_another_thread_leaves_stays_while_one_is_within(usual: int) -> Non
     assert sys.getrecursionlimit() == usual
 
 
-def test_work_that_is_tried_without_more_room_may_be_as_deep_as_another_thread_lets_it(usual: int) -> None:
-    seen: list[int] = []
-
-    def work() -> None:
-        elsewhere(usual + 9_000)
-        seen.append(sys.getrecursionlimit())
-
-    with_room(work, lambda: 0)
-    assert seen == [usual + 9_000] and sys.getrecursionlimit() == usual
-
-
 def test_work_that_is_too_deep_is_done_once_more(usual: int) -> None:
     tries: list[int] = []
 
@@ -69,6 +58,42 @@ def test_work_that_is_too_deep_is_done_once_more(usual: int) -> None:
 
     assert with_room(work, lambda: usual + 5_000) == usual + 5_000
     assert tries == [usual, usual + 5_000] and sys.getrecursionlimit() == usual
+
+
+@pytest.mark.parametrize("frames", [0, 800])
+def test_the_limit_falls_while_another_thread_works_unless_that_is_deep(frames: int, usual: int) -> None:
+    ready, end = Event(), Event()
+
+    def wait(more: int) -> None:
+        if more:
+            wait(more - 1)
+        else:
+            ready.set()
+            end.wait()
+
+    with room(usual + 5_000):
+        thread = Thread(target=lambda: with_room(lambda: wait(frames * usual // 1_000), lambda: 0))
+        thread.start()
+        ready.wait()
+    assert sys.getrecursionlimit() == (usual + 5_000 if frames else usual)
+    with room(usual + 4_000):
+        end.set()
+        thread.join()
+        assert sys.getrecursionlimit() >= usual + 4_000
+    assert sys.getrecursionlimit() == usual
+
+
+def test_a_limit_that_somebody_else_sets_meanwhile_is_left_alone(usual: int) -> None:
+    try:
+        for frames in (0, usual + 5_000):
+            with room(frames):
+                sys.setrecursionlimit(usual + 300)
+            assert sys.getrecursionlimit() == usual + 300
+            with room(0):
+                sys.setrecursionlimit(usual)
+            assert sys.getrecursionlimit() == usual
+    finally:
+        sys.setrecursionlimit(usual)
 
 
 def test_room_that_is_kept_stays(usual: int) -> None:
