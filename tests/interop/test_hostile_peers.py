@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import io
+import itertools
 import os
 import select
 import socket
@@ -178,7 +179,6 @@ def test_a_journal_of_real_connections_is_done_again(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="handles are counted in /proc")
-@pytest.mark.usefixtures("frozen_heap")
 @pytest.mark.parametrize("name", ["black hole", "closed port", "closes at once", "resets in mid-request"])
 def test_many_lost_connections_leave_nothing_behind(name: str) -> None:
     """Neither handles nor objects, however connections end."""
@@ -186,14 +186,19 @@ def test_many_lost_connections_leave_nothing_behind(name: str) -> None:
         for wait in ("conn.Open_Time", "conn.Retry_Time", "rd.Reply_Time"):
             plc.write(f"Main.{wait}", 5_000_000)
         plc.write("Main.Poll", True)
+        run(plc, for_ns=SECOND_NS, pace="event")
+        gc.collect()
+        gc.freeze()
         seen = []
-        for _ in range(3):
+        for _ in range(4):
             run(plc, for_ns=SECOND_NS, pace="event")
             gc.collect()
             seen.append((len(os.listdir("/proc/self/fd")), len(gc.get_objects())))
-    (handles, objects), *later = seen
-    assert max(count for count, _ in later) <= handles + 2, "one is open or not, and the peer's"
-    assert max(count for _, count in later) <= objects + 500
+    handles, objects = zip(*seen, strict=True)
+    assert max(handles[1:]) <= handles[0] + 2, "one is open or not, and the peer's"
+    # Native code that comes from the background, or a module's first use, adds objects once; what connections leave
+    # is more in every second.
+    assert min(after - before for before, after in itertools.pairwise(objects)) <= 8
 
 
 # --- no scan waits ----------------------------------------------------------------------------------------------------
