@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -165,6 +166,32 @@ def test_a_mutant_within_functions_is_tried_in_a_fork(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="POSIX only")
+def test_a_mutant_of_a_library_is_tried_in_a_fork(tmp_path: Path) -> None:
+    """Though the session has compiled a program with the block, and keeps it."""
+    copy = m.Copy(tmp_path)
+    for file in (copy.folder / "tests").rglob("test_*.py"):
+        file.unlink()
+    name = "tests/lang/test_made.py"
+    (copy.folder / name).write_text(
+        "from functools import cache\nfrom fbvm.code.compiler import compile_text\nfrom fbvm.machine.plc import Plc\n\n"
+        "@cache\ndef image():\n"
+        "    text = 'PROGRAM P VAR c : CTU; b : BOOL; END_VAR b := NOT b; c(CU := b, PV := 2); END_PROGRAM'\n"
+        "    return compile_text(text).image\n\n"
+        "image()\n\ndef test_count():\n    plc = Plc(image(), engine='python')\n    plc.scan()\n    plc.scan()\n    plc.scan()\n"
+        "    assert plc.read('P.c.CV') == 2\n", encoding="utf-8")
+    path = Path("fblib/iec/CTU.st")
+    text = (copy.folder / path).read_text(encoding="utf-8")
+    at = text.index("+ 1") + 2
+    try:
+        assert copy.finds_in_fork(m.Mutant(path, at, at + 1, "2"), [name], "not slow", 20)
+        assert not copy.finds_in_fork(m.Mutant(path, at, at, "0"), [name], "not slow", 20)
+        assert (copy.folder / path).read_text(encoding="utf-8") == text
+    finally:
+        copy.close()
+
+
+@pytest.mark.slow
 def test_what_the_quick_tests_do_not_find_is_tried_with_the_slow_ones(tmp_path: Path) -> None:
     """A file of tests where a quick one looks at `a`, a slow one at `b`, none at `c`; a stage without tests finds nothing."""
     copy = m.Copy(tmp_path)
@@ -261,6 +288,24 @@ def test_of_named_tests_so_many_are_tried_and_files_are_tried_whole() -> None:
     assert [item.nodeid for item in forked._chosen(items, tests, True, 2)] == ["b.py::three"]
 
 
-def test_a_mutant_in_structured_text_is_left_to_a_new_process() -> None:
-    with pytest.raises(NotImplementedError):
-        m.Copy.finds_in_fork(object.__new__(m.Copy), m.Mutant(Path("fblib/iec/TON.st"), 0, 1, "x"), [], "slow", 20)
+@pytest.mark.slow
+def test_the_tests_that_load_a_file_of_a_library_are_noted(tmp_path: Path) -> None:
+    """By tests, and by files that load some when they are collected; of both, the whole files are tried last."""
+    (tmp_path / "test_made.py").write_text(
+        "from fbvm.code.compiler import compile_text\n\n"
+        "def made(block):\n    return compile_text(f'PROGRAM P VAR b : {block}; END_VAR b(); END_PROGRAM').image\n\n"
+        "made('CTD')\n\ndef test_up():\n    assert made('CTU')\n\ndef test_none():\n    pass\n", encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HOUSE), str(HOUSE / "tests" / "bench")]),
+                   "XDG_CACHE_HOME": str(tmp_path / "cache")}  # fmt: skip
+    subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "loaded", "--loaded", "noted", "-n", "1", "test_made.py"],
+                   cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
+    reached = Reached(tmp_path / "noted", HOUSE)
+
+    def noted(block: str) -> list[str] | None:
+        path = Path(f"fblib/iec/{block}.st")
+        return reached.tests(path, (HOUSE / path).read_text(encoding="utf-8"), 200)
+
+    assert noted("CTU") == ["test_made.py", "test_made.py::test_up"]
+    assert noted("CTD") == ["test_made.py"]
+    assert noted("CTUD") is None
+    assert list(tmp_path.glob("notedgw*")) == []

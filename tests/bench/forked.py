@@ -2,7 +2,8 @@
 
 A mutant within functions is put into their code; one of a table, a class or a default value is left to a new process, since
 others may hold copies of what was made of it.  What was kept by a cache when the tests were collected keeps what it is, too, so
-that a mutant that is not found here is to be tried in a new process.  POSIX only."""
+that a mutant that is not found here is to be tried in a new process.  For a file of a library in ST, what has been kept of
+libraries and of programs is forgotten in the fork.  POSIX only."""
 
 from __future__ import annotations
 
@@ -16,8 +17,9 @@ import subprocess
 import sys
 import time
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import _lru_cache_wrapper, cache
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,8 @@ SOCKET = "FBVM_MUTANTS_SOCKET"
 """The environment variable with the number of the socket on which the session is asked."""
 WAITING = 10
 """Times the processor time that tests may take in real time."""
+OF_LIBRARIES = ("fbvm.base.cache", "fbvm.check", "fbvm.code.store", "fbvm.interchange.plcopen.read.scope", "fbvm.processor")
+"""The modules whose caches keep something of a library."""
 
 
 class Forked:
@@ -85,13 +89,34 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
     if SOCKET not in os.environ:
         return None
     asked = socket.socket(fileno=int(os.environ.pop(SOCKET)))
-    functions = _functions(Path.cwd())
+    _parse_libraries()
+    functions, caches = _functions(Path.cwd()), _caches(Path.cwd())
     gc.freeze()
     with asked, asked.makefile(encoding="utf-8") as questions:
         asked.sendall(b"{}\n")
         for line in questions:
-            asked.sendall((json.dumps(_answer(session.items, functions, json.loads(line))) + "\n").encode())
+            asked.sendall((json.dumps(_answer(session.items, functions, caches, json.loads(line))) + "\n").encode())
     return True
+
+
+def _parse_libraries() -> None:
+    """Parses the shipped libraries.  A tree is kept by its text, so that only a changed file is parsed in a fork."""
+    from fbvm.check.symbols import library
+
+    library._parsed = cache(library._parsed.__wrapped__)  # type: ignore[assignment]
+    for one in library._shipped():
+        for path in one.files.values():
+            library._file(one.name, path)
+
+
+def _caches(folder: Path) -> list[_lru_cache_wrapper[Any]]:
+    """The functions with a cache of what a library's file says."""
+    from fbvm.check.symbols import library
+
+    tests = str(folder / "tests")
+    files = {name: str(getattr(module, "__file__", "")) for name, module in sys.modules.items()}
+    return [one for one in gc.get_objects() if isinstance(one, _lru_cache_wrapper) and one is not library._parsed
+            and (one.__module__.startswith(OF_LIBRARIES) or files.get(one.__module__, "").startswith(tests))]
 
 
 Key = tuple[str, str, int]
@@ -111,13 +136,25 @@ def _key(code: types.CodeType) -> Key:
     return code.co_filename, code.co_qualname, code.co_firstlineno
 
 
-def _answer(items: list[pytest.Item], functions: dict[Key, list[types.FunctionType]], question: dict[str, Any]) -> dict[str, Any]:
+def _answer(items: list[pytest.Item], functions: dict[Key, list[types.FunctionType]], caches: list[_lru_cache_wrapper[Any]],
+            question: dict[str, Any]) -> dict[str, Any]:
     file = str(Path.cwd() / question["path"])
-    changed = list(_changed(*(compile(question[name], file, "exec", dont_inherit=True) for name in ("then", "now"))))
-    if any(new is None for _, new in changed):
-        return {"is_within_functions": False, "failed": ""}
     chosen = _chosen(items, question["tests"], question["slow"], question["most"])
-    return {"is_within_functions": True, "failed": _in_fork(chosen, changed, functions, question["limit_s"])}
+    if not file.endswith(".py"):
+        def change() -> None:
+            for one in caches:
+                one.cache_clear()
+    else:
+        changed = list(_changed(*(compile(question[name], file, "exec", dont_inherit=True) for name in ("then", "now"))))
+        if any(new is None for _, new in changed):
+            return {"is_within_functions": False, "failed": ""}
+
+        def change() -> None:
+            for old, new in changed:
+                for function in functions.get(_key(old), ()):
+                    assert new is not None
+                    function.__code__ = new
+    return {"is_within_functions": True, "failed": _in_fork(chosen, change, question["limit_s"])}
 
 
 Change = tuple[types.CodeType, types.CodeType | None]
@@ -151,12 +188,11 @@ def _chosen(items: list[pytest.Item], tests: list[str], slow: bool, most: int) -
     return [item for item in chosen if item.nodeid not in left_out]
 
 
-def _in_fork(items: list[pytest.Item], changed: list[Change], functions: dict[Key, list[types.FunctionType]],
-             limit_s: int) -> str | None:
+def _in_fork(items: list[pytest.Item], change: Callable[[], None], limit_s: int) -> str | None:
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        _run(items, changed, functions, limit_s, writing)
+        _run(items, change, limit_s, writing)
     os.close(writing)
     status = _waited(child, limit_s * WAITING)
     with suppress(ProcessLookupError, PermissionError):
@@ -166,19 +202,15 @@ def _in_fork(items: list[pytest.Item], changed: list[Change], functions: dict[Ke
     return None if status == 0 else failed
 
 
-def _run(items: list[pytest.Item], changed: list[Change], functions: dict[Key, list[types.FunctionType]], limit_s: int,
-         writing: int) -> None:
-    """Changes the functions, runs the tests until one fails, and ends the process."""
+def _run(items: list[pytest.Item], change: Callable[[], None], limit_s: int, writing: int) -> None:
+    """Makes the change, runs the tests until one fails, and ends the process."""
     from _pytest.runner import runtestprotocol
 
     status = 1
     try:
         os.setsid()
         resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
-        for old, new in changed:
-            for function in functions.get(_key(old), ()):
-                assert new is not None
-                function.__code__ = new
+        change()
         for item, following in zip(items, [*items[1:], None], strict=True):
             if any(report.failed for report in runtestprotocol(item, nextitem=following, log=False)):
                 os.write(writing, item.nodeid.encode())

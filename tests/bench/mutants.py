@@ -9,13 +9,14 @@ that name the file.  A mutant that they do not find is tried again with the slow
 given.  The last line counts both, and a mutant that no test finds is printed as a difference.
 
 Which tests of the whole suite execute a line is known with `--reach FILE`, the `.coverage` of a run (with `pip install
-pytest-cov`) of `pytest -n auto --cov=fbvm --cov-context=test --cov-report= -W ignore`: then only those of the room's tests run
-that execute the changed statement, first those of the room's own folder, and of each folder those that execute the fewest lines,
-`--limit` of them at most; a mutant that they do not find is tried with those of other rooms.  The sources of that run stay where
-they were: what was changed since is told by comparing.
+pytest-cov`) of `pytest -n auto --cov=fbvm --cov-context=test --cov-report= -W ignore`, or for libraries in ST the file that
+the plugin in loaded.py writes: then only those of the room's tests run that execute the changed statement, first those of the
+room's own folder, and of each folder those that execute the fewest lines, `--limit` of them at most; a mutant that they do not
+find is tried with those of other rooms.  The sources of that run stay where they were: what was changed since is told by
+comparing.
 
-With `--fork` a mutant within functions is first tried in forks of one session of pytest that has collected all tests, which takes
-a fraction of a second; only what is not found there is tried in new processes (forked.py; POSIX).
+With `--fork` a mutant within functions, or of a library, is first tried in forks of one session of pytest that has collected
+all tests, which takes a fraction of a second; only what is not found there is tried in new processes (forked.py; POSIX).
 
 A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out).
 Those that were looked at and stay are in mutants_survivors.md, each with its reason."""
@@ -294,8 +295,6 @@ class Copy:
 
     def finds_in_fork(self, mutant: Mutant, tests: list[str], marks: str, limit_s: int) -> bool:
         """As `finds`, in forks of one session.  Raises NotImplementedError for a mutant outside of functions of Python."""
-        if mutant.path.suffix != ".py":
-            raise NotImplementedError(mutant.path)
         self._forked = self._forked or Forked(self.folder, self._environment)
         file = self.folder / mutant.path
         text = file.read_text(encoding="utf-8")

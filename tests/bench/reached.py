@@ -9,7 +9,8 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-PACKAGE = "fbvm"
+MEASURED = ("fbvm", "fblib")
+"""The folders of the repository whose files are measured."""
 
 
 class Reached:
@@ -23,18 +24,23 @@ class Reached:
         self._house = house
         self._sizes = _sizes(file)
         self._known = {_file(test) for test in self._sizes}
-        measured = next(Path(name) for name in self._data.measured_files() if f"/{PACKAGE}/" in name.replace("\\", "/"))
-        self._root = next(folder.parent for folder in measured.parents if folder.name == PACKAGE)
+        folders = (folder for name in self._data.measured_files() for folder in Path(name).parents)
+        self._root = next(folder.parent for folder in folders if folder.name in MEASURED)
 
     def tests(self, path: Path, text: str, start: int) -> list[str] | None:
-        """The tests that executed the statement at an offset of a source; None if that is not known, as for what is imported."""
-        if path.suffix != ".py" or not (self._root / path).is_file():
+        """The tests that executed the statement at an offset of a source; None if that is not known, as for what is imported.
+
+        For a source in ST their files, too: of tests that share a program, one is known."""
+        if not (self._root / path).is_file():
             return None
         contexts = self._data.contexts_by_lineno(str(self._root / path))
         then = _lines_then((self._root / path).read_text(encoding="utf-8"), text)
-        lines = [then[line] for line in _statement(text, text.count("\n", 0, start) + 1) if line in then]
+        line = text.count("\n", 0, start) + 1
+        changed = _statement(text, line) if path.suffix == ".py" else range(line, line + 1)
+        lines = [then[line] for line in changed if line in then]
         found = {context.rpartition("|")[0] for line in lines for context in contexts.get(line, ())} - {""}
-        return sorted(found) or None
+        files = () if path.suffix == ".py" else {_file(test) for test in found}
+        return sorted({*found, *files}) or None
 
     def among(self, reaching: list[str] | None, own: list[str]) -> list[str]:
         """Those tests of a room that execute the statement, and the whole files that were changed since or did not run; all if
@@ -53,8 +59,8 @@ class Reached:
         return list(dict.fromkeys(_file(test) if self._is_changed(_file(test)) else test for test in small))
 
     def _small_first(self, tests: Iterable[str]) -> list[str]:
-        """First the tests that execute few lines: they take little time, and say much about each line."""
-        return sorted(tests, key=lambda test: self._sizes[test])
+        """First the tests that execute few lines, which take little time and say much about each line; last whole files."""
+        return sorted(tests, key=lambda test: (test not in self._sizes, self._sizes[test]))
 
     def _is_changed(self, file: str) -> bool:
         then = self._root / file
