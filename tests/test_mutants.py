@@ -295,8 +295,7 @@ def test_the_tests_that_load_a_file_of_a_library_are_noted(tmp_path: Path) -> No
         "from fbvm.code.compiler import compile_text\n\n"
         "def made(block):\n    return compile_text(f'PROGRAM P VAR b : {block}; END_VAR b(); END_PROGRAM').image\n\n"
         "made('CTD')\n\ndef test_up():\n    assert made('CTU')\n\ndef test_none():\n    pass\n", encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HOUSE), str(HOUSE / "tests" / "bench")]),
-                   "XDG_CACHE_HOME": str(tmp_path / "cache")}  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HOUSE), str(HOUSE / "tests" / "bench")])}
     subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "loaded", "--loaded", "noted", "-n", "1", "test_made.py"],
                    cwd=tmp_path, env=environment, check=True, stdout=subprocess.DEVNULL)
     reached = Reached(tmp_path / "noted", HOUSE)
