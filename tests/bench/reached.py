@@ -30,7 +30,7 @@ class Reached:
     def tests(self, path: Path, text: str, start: int) -> list[str] | None:
         """The tests that executed the statement at an offset of a source; None if that is not known, as for what is imported.
 
-        For a source in ST their files, too: of tests that share a program, one is known."""
+        For a source in ST, of which all is known, their files, too: of tests that share a program, one is noted."""
         if not (self._root / path).is_file():
             return None
         contexts = self._data.contexts_by_lineno(str(self._root / path))
@@ -40,7 +40,7 @@ class Reached:
         lines = [then[line] for line in changed if line in then]
         found = {context.rpartition("|")[0] for line in lines for context in contexts.get(line, ())} - {""}
         files = () if path.suffix == ".py" else {_file(test) for test in found}
-        return sorted({*found, *files}) or None
+        return sorted({*found, *files}) or (None if path.suffix == ".py" else [])
 
     def among(self, reaching: list[str] | None, own: list[str]) -> list[str]:
         """Those tests of a room that execute the statement, and the whole files that were changed since or did not run; all if
