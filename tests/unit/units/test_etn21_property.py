@@ -96,6 +96,38 @@ def test_the_unit_does_the_same_without_machine_code(
         assert (rigs[0].unit.wake_ns, rigs[0].unit.changed_words) == (rigs[1].unit.wake_ns, rigs[1].unit.changed_words)
 
 
+@pytest.mark.slow
+@settings(max_examples=times(60), deadline=None)
+@given(st.lists(cycles, min_size=1, max_size=25), st.lists(cycles, min_size=1, max_size=25), timings)
+def test_after_a_reset_a_unit_goes_on_as_one_that_was_never_used(
+    before: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
+    after: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
+    timing: str,
+) -> None:
+    """With the network's answers to its closes, at the same time, and as far as they are drawn with the same delays."""
+    used, new = (Rig(Etn21(timing=timing, faults=[Fault(0x2211, socket=7)])) for _ in range(2))
+    asked: list[Request] = []
+    for program, told, is_answered, force, cycle_ms in before:
+        asked = turn(used, program, told + (answer(asked) if is_answered else []), force, cycle_ms)
+    asked = used.unit.reset(used.memory)
+    assert {type(request) for request in asked} <= {Close}
+    new.now_ns = used.now_ns
+    assert used.scan(*answer(asked)) == new.scan() == []
+    assert [used.cio[n + 1 : n + 24].tolist(), used.d[m + 1 : m + 18].tolist()] == [
+        new.cio[n + 1 : n + 24].tolist(), new.d[m + 1 : m + 18].tolist()]  # fmt: skip
+    for words in (used.cio, used.d):
+        words[:] = memoryview(bytes(2 * len(words))).cast("H")
+    used.cio[n + 17], used.cio[n + 18] = new.cio[n + 17], new.cio[n + 18]
+    assert used.unit.exchanged and new.unit.exchanged
+    used.unit.exchanged.processor.view("ETN21_Random")[0] = new.unit.exchanged.processor.view("ETN21_Random")[0]
+    for program, told, is_answered, force, cycle_ms in after:
+        told = told + (answer(asked) if is_answered else [])
+        asked = turn(used, program, told, force, cycle_ms)
+        assert turn(new, program, told, force, cycle_ms) == asked
+        assert used.memory.snapshot() == new.memory.snapshot()
+        assert used.unit.wake_ns == new.unit.wake_ns
+
+
 def turn(
     rig: Rig, program: list[tuple[int, Switch, dict[str, object]]], told: list[Event], force: bool, cycle_ms: int
 ) -> list[Request]:
