@@ -84,6 +84,15 @@ class Forked:
 
 
 @pytest.hookimpl(tryfirst=True)
+def pytest_collection() -> None:
+    """Properties end at the first example that fails: to look for a smaller one takes most of the time of a mutant."""
+    from hypothesis import Phase, settings
+
+    settings.register_profile("first failure", settings.get_profile("quick"), phases=[Phase.explicit, Phase.generate])
+    settings.load_profile("first failure")
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> bool | None:
     """Answers what is asked in place of running the tests."""
     if SOCKET not in os.environ:
