@@ -106,6 +106,16 @@ def test_eight_sockets_are_open_at_once() -> None:
     assert [rig.status(number) for number in range(1, 9)] == [0x8000] * 8
 
 
+def test_eight_areas_ask_in_one_cycle() -> None:
+    rig = Rig()
+    for number in range(1, 9):
+        rig.parameters(number, number)
+        rig.turn_on(Switch.ACTIVE_OPEN, number)
+    assert rig.scan() == [Connect(number, SERVER) for number in range(1, 9)]
+    rig.scan(*[Opened(number, 50000 + number, SERVER) for number in range(1, 9)])
+    assert [rig.status(number) for number in range(1, 9)] == [0x8000] * 8
+
+
 @pytest.mark.parametrize("area", [1, 2, 8])
 @pytest.mark.parametrize("switch", [Switch.UDP_OPEN, Switch.ACTIVE_OPEN])
 def test_each_switch_alone_is_seen_by_a_unit_that_nobody_has_used(area: int, switch: Switch) -> None:
@@ -240,6 +250,21 @@ def test_a_restart_takes_1_to_3_s_assumed() -> None:
         assert rig.scan() == []
     assert 1_000_000_000 <= rig.now_ns - began_ns <= 3_010_000_000
     assert a[501] == 0
+
+
+def test_a_restart_takes_3_to_7_refreshes_where_these_take_longer_assumed() -> None:
+    taken = set()
+    for seed in range(60):
+        rig = Rig(Etn21(timing="real", seed=seed), cycle_ms=10_000)
+        initializing, restart = rig.memory.words("A")[302:303], rig.memory.words("A")[501:502]
+        restart[0] = 1
+        rig.scan()
+        refreshes = 0
+        while initializing[0]:
+            rig.scan()
+            refreshes += 1
+        taken.add(refreshes)
+    assert taken == {3, 4, 5, 6, 7}
 
 
 def test_until_a_restart_is_over_its_status_words_stay_whatever_the_program_does() -> None:

@@ -93,11 +93,13 @@ def test_passive_open_passes_its_filter_on_and_writes_the_peer(remote: Peer) -> 
     assert [rig.result(offset) for offset in (1, 2, 3, 4)] == [502, 0xC0A8, 0xFA07, 5000]
 
 
-def test_passive_open_times_out() -> None:
+@pytest.mark.parametrize("timeout", [1, 25])
+def test_passive_open_times_out(timeout: int) -> None:
+    """In units of 100 ms."""
     rig = Rig()
-    rig.parameters(local_port=502, remote=ANYBODY, timeout=25)
+    rig.parameters(local_port=502, remote=ANYBODY, timeout=timeout)
     rig.scan(Switch.PASSIVE_OPEN)
-    assert rig.wait(2.49) == []
+    assert rig.wait(timeout / 10 - 0.01) == []
     assert rig.scan() == [Close(1)]
     assert (rig.code(), rig.is_on(Switch.PASSIVE_OPEN), rig.status(), rig.state()) == ("0080", False, 0, 0)
 

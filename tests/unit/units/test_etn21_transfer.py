@@ -207,11 +207,12 @@ def test_short_messages_are_granted_room_for_now_and_then() -> None:
     assert granted == [Grant(1, 4096)] * 2
 
 
-def test_a_receive_times_out_and_the_socket_stays_open() -> None:
+@pytest.mark.parametrize("timeout", [1, 3])
+def test_a_receive_times_out_and_the_socket_stays_open(timeout: int) -> None:
     rig = opened()
-    rig.parameters(count=4, timeout=3)
+    rig.parameters(count=4, timeout=timeout)
     rig.scan(Switch.RECEIVE)
-    rig.wait(0.29)
+    rig.wait(timeout / 10 - 0.01)
     assert rig.is_on(Switch.RECEIVE)
     rig.scan()
     assert (rig.is_on(Switch.RECEIVE), rig.code(), rig.is_open()) == (False, "0080", True)
@@ -356,6 +357,15 @@ def test_udp_receive_takes_one_datagram_and_drops_the_rest_of_it() -> None:
     rig.parameters(count=4)
     assert rig.ask(Switch.RECEIVE) == "0000"
     assert [rig.result(offset) for offset in (3, 4, 5)] == [0xFA0A, 4001, 2]
+
+
+def test_udp_receive_of_one_byte() -> None:
+    rig = bound()
+    rig.scan(Received(1, b"abcdef", STATION), Received(1, b"gh", STATION))
+    for first in (0x6100, 0x6700):
+        rig.parameters(count=1)
+        assert rig.ask(Switch.RECEIVE) == "0000"
+        assert (rig.result(5), got(rig, 1)) == (1, [first])
 
 
 def test_udp_receive_tells_the_host_of_a_sender_without_port() -> None:
