@@ -343,8 +343,12 @@ def test_force_close_ends_everything_that_is_open_assumed() -> None:
     assert rig.is_open(4)
 
 
-def test_force_close_with_nothing_open_goes_off_in_the_next_refresh_assumed() -> None:
+@pytest.mark.parametrize("was_used", [False, True])
+def test_force_close_with_nothing_open_goes_off_in_the_next_refresh_assumed(was_used: bool) -> None:
     rig = Rig()
+    if was_used:
+        rig.open()
+        rig.unit.reset(rig.memory)
     rig.cio[1500] = 1 << 2
     assert rig.scan() == []
     assert rig.cio[1500] == 4

@@ -36,6 +36,7 @@ class Watched:
             "switch": rig.cio[1519],
             "flag": rig.status() & 0xF,
             "open": rig.status() >> 15,
+            "data": rig.status() >> 13 & 1,
             "state": rig.state(),
             "code": rig.result(9),
         }
@@ -71,6 +72,22 @@ def test_real_words_are_apart_in_every_way_assumed() -> None:
         watched.open()
         skews |= {watched.changed["open"] - watched.changed["switch"]}
     assert skews == {-1, 0, 1, 2, 3}
+
+
+@pytest.mark.slow
+def test_real_flag_of_a_receive_and_what_says_that_bytes_wait_are_apart_assumed() -> None:
+    skews = set()
+    for seed in SEEDS:
+        watched = Watched(seed)
+        watched.open()
+        watched.rig.parameters(count=2)
+        watched.scan(Switch.RECEIVE)
+        watched.settle()
+        watched.scan(Received(1, b"abc"))
+        watched.settle()
+        assert (watched.rig.status(), watched.rig.waiting(), watched.rig.code()) == (0xA000, 1, "0000")
+        skews |= {watched.changed["flag"] - watched.changed["data"]}
+    assert skews == {-4, -3, -2, -1, 0}
 
 
 @pytest.mark.slow
@@ -147,6 +164,28 @@ def test_real_punishes_a_send_that_does_not_wait_for_bit_15_assumed() -> None:
             rig.scan()
         codes.add(rig.code())
     assert codes == {"0000", "2210"}
+
+
+@pytest.mark.slow
+def test_real_punishes_an_open_that_does_not_wait_until_bit_15_is_off_assumed() -> None:
+    codes = set()
+    for seed in SEEDS:
+        watched = Watched(seed)
+        rig = watched.rig
+        watched.open()
+        watched.scan(Switch.CLOSE)
+        watched.scan()
+        watched.scan(Closed(1))
+        while rig.is_on(Switch.CLOSE):
+            watched.scan()
+        rig.parameters()
+        watched.scan(Switch.ACTIVE_OPEN)
+        watched.scan()
+        watched.scan(Opened(1, 49152, SERVER))
+        while rig.is_on(Switch.ACTIVE_OPEN):
+            watched.scan()
+        codes.add(rig.code())
+    assert codes == {"0000", "220F"}
 
 
 @pytest.mark.slow
