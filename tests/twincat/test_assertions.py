@@ -147,6 +147,16 @@ def test_values_of_different_kinds_are_told_by_their_classes() -> None:
     assert run.results["Main.s", "t"].asserts == len(checks)
 
 
+@pytest.mark.slow
+def test_two_variables_are_equal_byte_by_byte_and_two_texts_up_to_their_end() -> None:
+    run = run_of("a, b, c : STRING(8); i : INT := 16#0100; j : INT := 16#0200; x : LREAL := 1.0; y : LREAL := 1.5;",
+                 """MEMSET(ADR(a), 65, 8); MEMSET(ADR(b), 66, 8); a := 'xy'; b := 'xy';
+TEST('t'); AssertEquals(a, b, ''); b := 'x$01y'; c := 'x$01z'; AssertEquals(b, c, ''); c := 'x$01'; AssertEquals(b, c, '');
+AssertEquals(i, j, ''); AssertEquals(x, y, ''); AssertEquals(a, a, ''); TEST_FINISHED();""")  # fmt: skip
+    assert told(run) == ["EXP: x\x01y, ACT: x\x01z", "EXP: x\x01y, ACT: x\x01", "EXP: 256, ACT: 512", "EXP: 1.0, ACT: 1.5"]
+    assert run.results["Main.s", "t"].asserts == 6
+
+
 # --- tests of a suite, and the log --------------------------------------------------------------------------------------
 
 
@@ -242,3 +252,49 @@ TEST('Disabled_'); AssertTrue(FALSE, ''); TEST_FINISHED();""")
     assert log_of(run)[0] == (2, "a b c")
     assert run.plc.read("Main.s.r") == 0
     assert {name: result.skipped for (_, name), result in run.results.items()} == {"not disabled_x": False, "": True}
+
+
+@pytest.mark.slow
+def test_the_duration_of_an_ordered_test_begins_with_its_turn() -> None:
+    run = run_of("n : INT;", """n := n + 1;
+TEST('beside'); IF n = 7 THEN TEST_FINISHED(); END_IF
+IF TEST_ORDERED('a') THEN IF n = 3 THEN TEST_FINISHED(); END_IF END_IF
+IF TEST_ORDERED('b') THEN AssertTrue(TRUE, ''); IF n = 4 THEN TEST_FINISHED(); END_IF END_IF
+IF TEST_ORDERED('c') THEN IF n = 6 THEN TEST_FINISHED(); END_IF END_IF""")
+    assert {name: result.duration_s for (_, name), result in run.results.items()} == {
+        "beside": 0.06, "a": 0.02, "b": 0.01, "c": 0.02}  # fmt: skip
+    assert run.results["Main.s", "b"].asserts == 2
+
+
+@pytest.mark.slow
+def test_a_name_that_is_given_twice_is_told_once() -> None:
+    run = run_of("n : INT;", """n := n + 1;
+TEST('a'); TEST('a'); TEST('b'); IF n = 3 THEN TEST('b'); TEST_FINISHED_NAMED('a'); TEST_FINISHED_NAMED('b'); END_IF""")
+    assert [text for _, text in log_of(run) if "already" in text] == [
+        f"Test with name '{name}' already exists in test suite 'Main.s'" for name in "ab"]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_program_has_a_hundred_suites_and_runs_no_more() -> None:
+    run = run_of("n : INT;", "n := n + 1; TEST('t'); TEST_FINISHED();",
+                 program="first : ARRAY[1..99] OF FB_Suite; s, last : FB_Suite;")  # fmt: skip
+    assert [run.plc.read(f"Main.{name}.n") for name in ("first[1]", "first[99]", "s", "last")] == [1, 1, 1, 0]
+    assert run.plc.read("TcUnit_Run.NumberOfSuites") == 100
+
+
+WRITABLE = {**PAIRS, **{name: pair for name, pair in OTHERS.items() if name not in ("LTIME", "STRING")}}
+
+
+@pytest.mark.slow
+def test_a_variable_that_a_test_may_not_assign_is_written_through_its_address() -> None:
+    declared = " ".join(f"o_{name} : {name};" for name in WRITABLE) + " o_s : STRING; o_w : WSTRING;"
+    checks = []
+    for name, (value, _) in WRITABLE.items():
+        delta = "0.0, " if "REAL" in name else ""
+        checks.append(f"WRITE_PROTECTED_{name}(ADR(k.o_{name}), {written(value)}); "
+                      f"AssertEquals_{name}({written(value)}, k.o_{name}, {delta}'{name}');")
+    checks.append("WRITE_PROTECTED_STRING(ADR(k.o_s), 'abc'); AssertEquals_STRING('abc', k.o_s, 'STRING');")
+    checks.append("WRITE_PROTECTED_WSTRING(ADR(k.o_w), \"abc\"); AssertEquals_WSTRING(\"abc\", k.o_w, 'WSTRING');")
+    run = run_of("k : FB_Kept;", "TEST('t');\n" + "\n".join(checks) + "\nTEST_FINISHED();",
+                 f"FUNCTION_BLOCK FB_Kept VAR_OUTPUT {declared} END_VAR END_FUNCTION_BLOCK")  # fmt: skip
+    assert (told(run), run.results["Main.s", "t"].asserts) == ([], len(checks))
