@@ -114,6 +114,39 @@ def test_constants_of_the_libraries_have_the_vendors_numbers() -> None:
     assert dict(zip(wanted, found, strict=True)) == wanted
 
 
+SIZES = """
+T_MaxString=256 T_AmsNetId=24 T_AmsNetIdArr=6 AMSNETID=6 T_IPv4Addr=16 T_IPv4AddrArr=4 ST_LibVersion.sVersion=24
+ST_SockAddr.sAddr=16 ST_TimeZoneInformation.standardName=32 ST_TimeZoneInformation.daylightName=32
+NCTOPLC_AXIS_REF.CamCouplingState=8
+NCTOPLC_AXIS_REF.CamCouplingTableID=16 ST_AxisStatus.CamCouplingState=8 ST_AxisParameterSet.sAxisName=32
+ST_AxisParameterSet.sEncName=32 ST_AxisParameterSet.sCtrlName=32 ST_AxisParameterSet.sDriveName=32
+ST_AxisParameterSet.Reserved=376 ST_AxisParameterSet=1024
+PlcAppSystemInfo.AppName=64 PlcAppSystemInfo.ProjectName=64 PlcTaskSystemInfo.TaskName=64
+TwinCAT_LogMessage.Text=254
+"""
+"""Bytes of types and of their members; a text has one more than characters."""
+
+
+@pytest.mark.slow
+def test_types_of_the_libraries_have_the_vendors_sizes() -> None:
+    wanted = {name: int(size) for name, _, size in (row.partition("=") for row in SIZES.split())}
+    declared = " ".join(f"v{at} : {name.partition('.')[0]};" for at, name in enumerate(wanted))
+    parts = [f"v{at}{''.join(name.partition('.')[1:])}" for at, name in enumerate(wanted)]
+    lines = "\n".join(f"n[{at}] := SIZEOF({part});" for at, part in enumerate(parts))
+    plc = Plc(image_of(f"VAR n : ARRAY[0..{len(wanted) - 1}] OF UDINT; tasks, lines : UDINT; {declared} END_VAR\n{lines}\n"
+                       "tasks := SIZEOF(TwinCAT_SystemInfoVarList._TaskInfo) / SIZEOF(PlcTaskSystemInfo);\n"
+                       "lines := SIZEOF(TwinCAT_Log) / SIZEOF(TwinCAT_LogMessage);"))  # fmt: skip
+    found, tasks, kept = after(plc, "n tasks lines")
+    assert dict(zip(wanted, found, strict=True)) == wanted
+    assert (tasks, kept) == (33, 256)
+
+
+@pytest.mark.slow
+def test_inputs_that_are_not_given_have_the_vendors_values() -> None:
+    plc = Plc(image_of("VAR clock : FB_LocalSystemTime; gear : MC_GearIn; file : FB_FileOpen; END_VAR\nclock();"))
+    assert after(plc, "clock.dwCycle clock.dwOpt gear.RatioDenominator file.ePath file.tTimeout") == (5, 1, 1, 1, 5000 * MS)
+
+
 # --- files of Tc2_System ------------------------------------------------------------------------------------------------
 
 FILES = """VAR

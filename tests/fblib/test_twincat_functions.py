@@ -70,6 +70,7 @@ NUMBERS = [
     ("F_CheckSum16(ADR(d), 9, 0)", 0x1DD), ("F_CheckSum16(ADR(d), 1, 16#FFFF)", 0x30),
     ("F_CheckSum16(ADR(d), 0, 16#FFFF)", 0xFFFF),
     ("F_CheckSum16(ADR(d), 1, 16#FFCE)", 0xFFFF), ("F_CheckSum16(ADR(d), 1, 16#FFCF)", 0),
+    ("F_CheckSum16(ADR(d), 2, 16#FFCF)", 0x32),
     ("F_DATA_TO_CRC16_CCITT(ADR(d), 9, 16#FFFF)", 0x29B1), ("F_DATA_TO_CRC16_CCITT(ADR(d), 9, 0)", 0x31C3),
     ("F_DATA_TO_CRC16_CCITT(ADR(d), 0, 16#1234)", 0x1234), ("F_BYTE_TO_CRC16_CCITT(16#31, 0)", 0x2672),
     ("F_BYTE_TO_CRC16_CCITT(1, 0)", 0x1021), ("F_BYTE_TO_CRC16_CCITT(0, 16#100)", 0x1021), ("F_BYTE_TO_CRC16_CCITT(0, 1)", 0x100),
@@ -112,6 +113,7 @@ def test_bits_of_numbers_leap_years_results_and_areas_of_memory() -> None:
         ("LrealIsNaN(1.0)", False), ("F_CheckMemoryArea(ADR(ten), 1) = E_TcMemoryArea.Static", True),
         ("F_CheckMemoryArea(ADR(ten), 0) = E_TcMemoryArea.Unknown", True),
         ("F_CheckMemoryArea(0, 1) = E_TcMemoryArea.Unknown", True),
+        *((f"{name}(1.0E308 * ten - 1.0E308 * ten)", name == "LrealIsNaN") for name in ("LrealIsNaN", "LrealIsFinite")),
     ]  # fmt: skip
     assert values(rows, "BOOL", "ten : LREAL := 10.0;") == rows
 
@@ -150,6 +152,27 @@ ADDRESSES = [
 @pytest.mark.slow
 def test_addresses_and_their_numbers() -> None:
     assert values(ADDRESSES, "STRING") == ADDRESSES
+
+
+CLOCKS = [(count, f"{datetime(2000, 1, 1) + timedelta(seconds=count // 10**9):%Y-%m-%d-%H:%M:%S}.{count % 10**9:09}")
+          for count in (0, 1, 999_999_999, 1_000_000_000, 86_399_123_456_789, 1_000_000_000_000_000_001, 2**64 - 1)]  # fmt: skip
+CONNECTION = """h : T_HSOCKET := (handle := 16#A, localAddr := (nPort := 7, sAddr := '1.2.3.4'),
+    remoteAddr := (nPort := 65535, sAddr := '100.100.100.100')); s : TIMESTRUCT := (wYear := 65535, wMonth := 10);"""
+
+
+@pytest.mark.slow
+def test_texts_of_connections_and_of_clocks() -> None:
+    local, remote = " Local:1.2.3.4:7", " Remote:100.100.100.100:65535"
+    rows = [
+        *((f"HSOCKET_TO_STRINGEX(h, {here}, {there})", f"Handle:0xA{local * (here == 'TRUE')}{remote * (there == 'TRUE')}")
+          for here in ("FALSE", "TRUE") for there in ("FALSE", "TRUE")),
+        ("HSOCKET_TO_STRING(h)", f"Handle:0xA{local}{remote}"),
+        ("HSOCKET_TO_STRING(TCPADS_NULL_HSOCKET)", "Handle:0x0 Local::0 Remote::0"),
+        ("SOCKETADDR_TO_STRING(h.remoteAddr)", "100.100.100.100:65535"),
+        ("SYSTEMTIME_TO_STRING(s)", "65535-10-00-00:00:00.00"),
+        *((f"DCTIME64_TO_STRING({count})", text) for count, text in CLOCKS),
+    ]  # fmt: skip
+    assert values(rows, "T_MaxString", CONNECTION) == rows
 
 
 # --- dates --------------------------------------------------------------------------------------------------------------
@@ -194,7 +217,7 @@ def test_texts_that_are_no_dates_are_zeros() -> None:
     wrong += [good[:at] + sign + good[at + 1 :] for at in range(23) for sign in ("/:" if good[at].isdigit() else "0 ")]
     for text in wrong:
         assert after(plc, names, text=text) == (0,) * 8, text
-    assert after(plc, "s.wYear f", text=good) == (2024, 133537247980070000)
+    assert after(plc, "s.wYear f", text=good) == after(plc, "s.wYear f", text=good + "1") == (2024, 133537247980070000)
 
 
 @pytest.mark.slow

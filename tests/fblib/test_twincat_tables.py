@@ -64,6 +64,26 @@ def test_formats_of_each_type_and_their_widths() -> None:
         assert after(plc, "f.bError f.nErrId f.sOut", what=number) == expected, text
 
 
+@pytest.mark.slow
+def test_what_a_format_says_holds_for_one_call() -> None:
+    plc = Plc(image_of("VAR f : FB_FormatString; n : INT := 5; form : T_MaxString; END_VAR\n"
+                       "f(sFormat := form, arg1 := F_INT(n));"))  # fmt: skip
+    rows = [("%-04d|", (False, 0, "5   |")), ("%04d", (False, 0, "0005")), ("%d%", (True, 1, "")), ("%d", (False, 0, "5")),
+            ("%d%d", (True, 1, "")), ("x", (False, 0, "x")), ("%%", (False, 0, "%")), ("%", (True, 1, ""))]  # fmt: skip
+    assert [(form, after(plc, "f.bError f.nErrId f.sOut", form=form)) for form, _ in rows] == rows
+
+
+@pytest.mark.slow
+def test_ten_arguments_are_the_most_and_a_text_is_cut_at_255_characters() -> None:
+    pins = ", ".join(f"arg{number} := F_INT(n)" for number in range(1, 11))
+    plc = Plc(image_of(f"VAR f, g : FB_FormatString; n : INT := 5; form : T_MaxString; long : STRING(300); END_VAR\n"
+                       f"MEMSET(ADR(long), 66, 300); f(sFormat := form, {pins});\n"
+                       "g(sFormat := '%s', arg1 := F_STRING(long));"))  # fmt: skip
+    assert after(plc, "f.sOut f.bError", form="%d" * 10) == ("5" * 10, False)
+    assert after(plc, "f.sOut f.bError", form="%d" * 11) == ("", True)
+    assert after(plc, "g.sOut g.bError") == ("B" * 255, False)
+
+
 # --- tables and queues --------------------------------------------------------------------------------------------------
 
 HASHED = """VAR
@@ -95,7 +115,8 @@ def test_a_table_of_three_places_finds_goes_on_and_removes() -> None:
     def did(what: int, **inputs: Any) -> tuple[Any, ...]:
         return after(plc, "t.bOk got place h.nCount h.nFree", what=what, **inputs)
 
-    assert did(1, k=1) == did(2) == did(4) == (False, 0, 99, 0, 0)
+    assert did(1, k=1) == did(2) == did(4) == did(7) == (False, 0, 99, 0, 0)
+    assert [did(what)[0] for what in (5, 6)] == [False, False]
     bytes_each = next(size for size in range(1, 64) if after(plc, "made", what=0, size=size)[0])
     assert after(plc, "made h.nCount h.nFree h.Places", size=3 * bytes_each - 1) == (True, 0, 2, 2)
     assert after(plc, "made h.nCount h.nFree h.Places", posed=True) == (False, 0, 0, 0)
@@ -126,6 +147,9 @@ def test_a_table_of_three_places_finds_goes_on_and_removes() -> None:
     assert did(7) == (False, 0, 99, 0, 3)
     assert did(1, k=4, value=4) == (True, 4, 1, 1, 2)
     assert did(8) == (True, 0, 99, 0, 3)
+    assert [did(1, k=k)[0] for k in (0, 1, 2)] == [True] * 3
+    assert after(plc, "made h.nCount h.nFree h.Places", what=0, size=bytes_each) == (True, 0, 1, 1)
+    assert did(4) == did(2, k=1) == (False, 0, 99, 0, 1)
 
 
 QUEUE = """VAR q : FB_StringRingBuffer; room : ARRAY[0..19] OF BYTE; what : INT; END_VAR
@@ -156,6 +180,8 @@ def test_a_queue_of_texts_counts_its_bytes() -> None:
     assert did(2) == (True, "b", 1, 6, 14)
     assert did(0) == (True, "", 0, 0, 20)
     assert did(3) == (False, "", 0, 0, 20)
+    for what in (2, 3):
+        assert [did(1, "c"), did(3), did(what)] == [(True, "", 1, 6, 14), (True, "c", 0, 0, 20), (False, "", 0, 0, 20)]
 
 
 # --- clocks -------------------------------------------------------------------------------------------------------------
@@ -250,7 +276,7 @@ def test_clocks_tell_the_virtual_time() -> None:
     assert at(25, names) == (False, "1970-01-01-00:00:00.025", False, "UTC", True, "1970-01-01-00:00:00.025")
     assert at(30, names) == (False, "1970-01-01-00:00:00.025", False, "UTC", True, "1970-01-01-00:00:00.030")
     assert at(40, names, go=False) == (False, "1970-01-01-00:00:00.025", False, "UTC", False, "1970-01-01-00:00:00.030")
-    assert at(50, "nt.BUSY zone.tzInfo.daylightName now.tzID", go=True)[:2] == (True, "UTC")
+    assert at(50, "nt.BUSY zone.tzInfo.daylightName now.tzID zone.tzID", go=True) == (True, "UTC", UNKNOWN, UNKNOWN)
     assert at(60, "told a b c f") == ("1970-01-01-00:00:00.060", 60 * MS, 60 * MS, 60 * MS, begin + 600_000)
     counters = "sys.timeLoDw sys.timeHiDW cpu.cpuCntLoDW cpu.cpuCntHiDW more.cpuCntLoDW"
     assert at(70, counters) == ((begin + 700_000) % 2**32, (begin + 700_000) // 2**32, 700_001, 0, 700_002)
@@ -331,6 +357,27 @@ RESOURCE PLC ON fbvm
     PROGRAM A WITH Fast : Main; PROGRAM B WITH Slow : Main;
 END_RESOURCE
 END_CONFIGURATION"""
+
+
+@pytest.mark.slow
+def test_there_is_no_task_in_front_of_the_first_cycle_and_from_32_on_tasks_share_a_number() -> None:
+    made = compile_text("""FUNCTION_BLOCK FB_Early
+VAR cycles : UDINT := 7; index : DINT := 7; END_VAR
+METHOD FB_init : BOOL
+VAR_INPUT bInitRetains, bInCopyCode : BOOL; END_VAR
+index := GETCURTASKINDEXEX(); cycles := TwinCAT_SystemInfoVarList._TaskInfo[index].CycleCount;
+END_METHOD
+END_FUNCTION_BLOCK
+PROGRAM Main VAR early : FB_Early; index : DINT; END_VAR index := GETCURTASKINDEXEX(); END_PROGRAM
+CONFIGURATION Line RESOURCE PLC ON fbvm
+""" + "".join(f"TASK T{at}(INTERVAL := T#10ms, PRIORITY := {at}); PROGRAM P{at} WITH T{at} : Main;\n" for at in range(1, 35))
+        + "END_RESOURCE END_CONFIGURATION", dialect="twincat")  # fmt: skip
+    assert made.image is not None, [message.render() for message in made.diagnostics]
+    plc = Plc(made.image)
+    assert plc.scan() is None
+    assert [plc.read(f"P{at}.index") for at in range(1, 35)] == [*range(1, 33), 32, 32]
+    assert (plc.read("P1.early.index"), plc.read("P1.early.cycles")) == (0, 0)
+    assert plc.read("TwinCAT_SystemInfoVarList._AppInfo.TaskCnt") == 34
 
 
 @pytest.mark.slow

@@ -197,6 +197,20 @@ def test_fields_are_written_as_long_as_they_fit() -> None:
     assert write(0, "abc", True, room=4) == (False, 0, 0, 4, 0, 0)
 
 
+@pytest.mark.slow
+def test_a_field_is_the_text_unless_bytes_are_given_and_needs_a_buffer() -> None:
+    plc = Plc(image_of("""VAR w : FB_CSVMemBufferWriter;
+line : ARRAY[0..9] OF BYTE; more : ARRAY[0..2] OF BYTE := [120, 121, 122];
+none, posed : BOOL; size : UDINT; END_VAR
+w(pBuffer := SEL(none, ADR(line), NULL), cbBuffer := 10, pValue := SEL(posed, NULL, ADR(more)), cbValue := size,
+  putValue := 'abcd');"""))
+    for posed, size, told, first in ((False, 0, 4, b"abcd"), (False, 3, 4, b"abcd"), (True, 0, 4, b"abcd"), (True, 1, 1, b"xbcd"),
+                                     (True, 3, 3, b"xyzd")):  # fmt: skip
+        assert after(plc, WRITTEN, posed=posed, size=size, **{"w.eCmd": 0}) == (True, told, told, 10 - told, 1, 0)
+        assert bytes(plc.read("Main.line"))[:4] == first
+    assert after(plc, WRITTEN, none=True) == (False, 0, 0, 10, 0, 0)
+
+
 READER = """VAR r : FB_CSVMemBufferReader; line : ARRAY[0..299] OF BYTE; size : UDINT; place : DINT; none : BOOL; END_VAR
 r(pBuffer := SEL(none, ADR(line), NULL), cbBuffer := size); place := -1;
 IF r.pValue <> NULL THEN place := r.pValue - ADR(line); END_IF"""

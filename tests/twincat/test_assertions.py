@@ -191,6 +191,14 @@ IF n = 2 THEN TEST('good'); AssertTrue(FALSE, 'twice'); END_IF""", program="s, o
 
 
 @pytest.mark.slow
+def test_the_duration_of_all_suites_begins_with_their_first_cycle() -> None:
+    run = run_of("n : INT; done : BOOL;", "n := n + 1; TEST('t'); IF n = 3 THEN done := TEST_FINISHED(); END_IF",
+                 program="s : FB_Suite; n : INT;", run="n := n + 1; IF n > 5 THEN RUN(); END_IF")  # fmt: skip
+    assert (1, "| Duration: 0.03") in log_of(run)
+    assert (run.results["Main.s", "t"].duration_s, run.plc.read("Main.s.done")) == (0.02, True)
+
+
+@pytest.mark.slow
 def test_suites_run_one_after_the_other_or_side_by_side() -> None:
     body = "n := n + 1; TEST('t'); IF n = 3 THEN TEST_FINISHED(); END_IF"
     for run, cycles in (("RUN();", 3), ("RUN_IN_SEQUENCE();", 6)):
