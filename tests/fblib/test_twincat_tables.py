@@ -184,6 +184,24 @@ def test_a_queue_of_texts_counts_its_bytes() -> None:
         assert [did(1, "c"), did(3), did(what)] == [(True, "", 1, 6, 14), (True, "c", 0, 0, 20), (False, "", 0, 0, 20)]
 
 
+@pytest.mark.slow
+def test_a_record_of_a_ring_begins_with_its_length_of_four_bytes() -> None:
+    plc = Plc(image_of("""VAR
+    q : FB_MemRingBuffer; room : ARRAY[0..69999] OF BYTE; give, take : ARRAY[0..66999] OF BYTE; go : INT;
+END_VAR
+q.pBuffer := ADR(room); q.cbBuffer := SIZEOF(room); q.pWrite := ADR(give); q.pRead := ADR(take); q.cbRead := SIZEOF(take);
+CASE go OF 1: give[0] := 7; give[66050] := 9; q.cbWrite := 16#10203; q.A_AddTail(); 2: q.A_RemoveHead(); 3: q.cbWrite := 16#1FF;
+q.A_AddTail(); END_CASE"""))
+    told = "q.bOk q.nCount q.cbSize q.cbReturn"
+    assert after(plc, told, go=1) == (True, 1, 0x10207, 0)
+    assert [plc.read(f"Main.room[{at}]") for at in range(5)] == [3, 2, 1, 0, 7]
+    assert after(plc, told, go=2) == (True, 0, 0, 0x10203)
+    assert [plc.read(f"Main.take[{at}]") for at in (0, 66049, 66050, 66051)] == [7, 0, 9, 0]
+    assert after(plc, told, go=3) == (True, 1, 0x203, 0x10203)
+    assert [plc.read(f"Main.room[{at}]") for at in range(0x10207, 0x1020B)] == [255, 1, 0, 0]
+    assert after(plc, told, go=2) == (True, 0, 0, 0x1FF)
+
+
 # --- clocks -------------------------------------------------------------------------------------------------------------
 
 ZONES = """VAR
