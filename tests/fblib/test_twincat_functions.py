@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
@@ -222,8 +222,9 @@ def test_texts_that_are_no_dates_are_zeros() -> None:
 
 @pytest.mark.slow
 def test_a_part_of_a_date_beyond_its_limit_makes_it_invalid() -> None:
-    plc = Plc(image_of("VAR s : TIMESTRUCT; f : T_FILETIME64; micro, nano : WORD; t : T_DCTIME64; END_VAR\n"
-                       "f := SYSTEMTIME_TO_FILETIME64(s); t := SYSTEMTIME_TO_DCTIME64(s, micro, nano);"))  # fmt: skip
+    plc = Plc(image_of("VAR s : TIMESTRUCT; f : T_FILETIME64; micro, nano : WORD; t : T_DCTIME64; d : DT; END_VAR\n"
+                       "f := SYSTEMTIME_TO_FILETIME64(s); t := SYSTEMTIME_TO_DCTIME64(s, micro, nano);\n"
+                       "d := SYSTEMTIME_TO_DT(s);"))  # fmt: skip
     good = {"wYear": 2024, "wMonth": 12, "wDay": 31, "wHour": 23, "wMinute": 59, "wSecond": 59, "wMilliseconds": 999}
     whole = (datetime(2024, 12, 31, 23, 59, 59, 999000) - EPOCH) // timedelta(microseconds=1) * 10
     clock = (whole - 125911584000000000) * 100
@@ -232,12 +233,14 @@ def test_a_part_of_a_date_beyond_its_limit_makes_it_invalid() -> None:
         return after(plc, "f t", micro=micro, nano=nano, **{f"s.{name}": value for name, value in {**good, **parts}.items()})
 
     assert told() == (whole, clock)
+    assert plc.read("Main.d") == datetime(2024, 12, 31, 23, 59, 59, tzinfo=UTC).timestamp() * 10**9
     assert told(999, 998) == (whole, clock + 999998)
     assert told(0, 999) == (whole, clock + 999)
     assert told(1000, 0) == told(0, 1000) == (whole, 0)
     for name, value in (("wYear", 1600), ("wYear", 0), ("wMonth", 0), ("wMonth", 13), ("wDay", 0), ("wDay", 32), ("wHour", 24),
                         ("wMinute", 60), ("wSecond", 60), ("wMilliseconds", 1000)):  # fmt: skip
         assert told(**{name: value}) == told(5, 6, **{name: value}) == (0, 0), (name, value)
+        assert plc.read("Main.d") == 0, (name, value)
     assert told(wYear=1601) != (0, 0)
     assert told(wDay=1, wHour=0, wMinute=0, wSecond=0, wMilliseconds=0)[0] == whole - 30 * 864000000000 - 863999990000
 
