@@ -157,7 +157,8 @@ def test_addresses_and_their_numbers() -> None:
 CLOCKS = [(count, f"{datetime(2000, 1, 1) + timedelta(seconds=count // 10**9):%Y-%m-%d-%H:%M:%S}.{count % 10**9:09}")
           for count in (0, 1, 999_999_999, 1_000_000_000, 86_399_123_456_789, 1_000_000_000_000_000_001, 2**64 - 1)]  # fmt: skip
 CONNECTION = """h : T_HSOCKET := (handle := 16#A, localAddr := (nPort := 7, sAddr := '1.2.3.4'),
-    remoteAddr := (nPort := 65535, sAddr := '100.100.100.100')); s : TIMESTRUCT := (wYear := 65535, wMonth := 10);"""
+    remoteAddr := (nPort := 65535, sAddr := '100.100.100.100')); s : TIMESTRUCT := (wYear := 65535, wMonth := 10);
+    d : ARRAY[0..3] OF BYTE := [16#A, 16#FF, 16#10, 16#22];"""
 
 
 @pytest.mark.slow
@@ -169,7 +170,8 @@ def test_texts_of_connections_and_of_clocks() -> None:
         ("HSOCKET_TO_STRING(h)", f"Handle:0xA{local}{remote}"),
         ("HSOCKET_TO_STRING(TCPADS_NULL_HSOCKET)", "Handle:0x0 Local::0 Remote::0"),
         ("SOCKETADDR_TO_STRING(h.remoteAddr)", "100.100.100.100:65535"),
-        ("SYSTEMTIME_TO_STRING(s)", "65535-10-00-00:00:00.00"),
+        ("SYSTEMTIME_TO_STRING(s)", "65535-10-00-00:00:00.00"), ("DATA_TO_HEXSTR(ADR(d), 3, FALSE)", "0AFF10"),
+        ("DATA_TO_HEXSTR(ADR(d), 2, TRUE)", "0aff"),
         *((f"DCTIME64_TO_STRING({count})", text) for count, text in CLOCKS),
     ]  # fmt: skip
     assert values(rows, "T_MaxString", CONNECTION) == rows

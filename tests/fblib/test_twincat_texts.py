@@ -30,8 +30,8 @@ nulls[6] := WSTRING_TO_STRING2(NULL, ADR(w), 9); nulls[7] := WSTRING_TO_STRING2(
 
 @pytest.mark.slow
 @each_of(("size", "copy", "joined", "wide", "wide_joined", "widened", "narrowed"), [
-    (0, ("keep", False), None, ("keep", False), None, ("keep", False), ("keep", False)),
-    (1, ("", False), ("", False), ("keep", False), None, ("keep", False), ("", False)),
+    (0, ("keep", False), ("keep", False), ("keep", False), ("keep", False), ("keep", False), ("keep", False)),
+    (1, ("", False), ("", False), ("keep", False), ("keep", False), ("keep", False), ("", False)),
     (2, ("a", False), ("a", False), ("", False), ("", False), ("", False), ("a", False)),
     (3, ("ab", False), ("ab", False), ("", False), ("", False), ("", False), ("ab", False)),
     (4, ("abc", True), ("abc", False), ("a", False), ("a", False), ("a", False), ("abc", True)),
@@ -41,15 +41,34 @@ nulls[6] := WSTRING_TO_STRING2(NULL, ADR(w), 9); nulls[7] := WSTRING_TO_STRING2(
     (10, ("abc", True), ("abcde", True), ("abc", True), ("abcd", False), ("abc", True), ("abc", True)),
     (12, ("abc", True), ("abcde", True), ("abc", True), ("abcde", True), ("abc", True), ("abc", True)),
 ])  # fmt: skip
-def test_copies_are_cut_at_the_size_of_their_place(size: int, copy: tuple[str, bool], joined: Any, **rest: Any) -> None:
+def test_copies_are_cut_at_the_size_of_their_place(size: int, copy: tuple[str, bool], **rest: tuple[str, bool]) -> None:
     plc = Plc(image_of(COPIES))
     given = {"a": "abc", "b": "de", "w": "abc", "v": "de", "n": size}
     found = after(plc, "d one e two x three y four z five f six", **given)
-    wanted = [copy, joined, *(rest[name] for name in ("wide", "wide_joined", "widened", "narrowed"))]
-    for at, pair in enumerate(wanted):
-        assert pair is None or found[2 * at : 2 * at + 2] == pair, at
+    wanted = [copy, *(rest[name] for name in ("joined", "wide", "wide_joined", "widened", "narrowed"))]
+    assert [found[2 * at : 2 * at + 2] for at in range(6)] == wanted
     assert plc.read("Main.lengths") == [3, 0, 3, 0]
     assert plc.read("Main.nulls") == [False] * 10
+
+
+@pytest.mark.slow
+@each_of(("first", "second", "size", "joined", "wide"), [
+    ("abc", "", 3, ("ab", False), ("", False)), ("abc", "", 4, ("abc", True), ("a", False)),
+    ("", "ab", 3, ("ab", True), ("", False)), ("", "ab", 6, ("ab", True), ("ab", True)),
+    ("abc", "", 8, ("abc", True), ("abc", True)), ("", "", 1, ("", True), ("keep", False)), ("", "", 2, ("", True), ("", True)),
+])  # fmt: skip
+def test_a_joined_text_is_whole_if_neither_was_cut(first: str, second: str, size: int, joined: tuple[str, bool],
+                                                   wide: tuple[str, bool]) -> None:  # fmt: skip
+    given = {"a": first, "b": second, "w": first, "v": second, "n": size}
+    assert after(Plc(image_of(COPIES)), "e two y four", **given) == (*joined, *wide)
+
+
+@pytest.mark.slow
+def test_nothing_is_joined_to_a_text_that_fills_its_place() -> None:
+    plc = Plc(image_of("""VAR a, b : STRING(8); w, v : WSTRING(8); n : UDINT; one, two : BOOL; END_VAR
+one := CONCAT2(ADR(a), ADR(b), ADR(a), n); two := WCONCAT2(ADR(w), ADR(v), ADR(w), n);"""))
+    for size in (0, 1, 2, 3):
+        assert after(plc, "a one w two", a="abc", b="d", w="ab", v="d", n=size) == ("abc", False, "ab", False)
 
 
 @pytest.mark.slow
@@ -166,6 +185,8 @@ def test_bytes_go_into_a_field_and_come_back(given: str, quoted: bool, room: int
                   **{"from": raw})  # fmt: skip
     assert found[:2] == (done, back)
     assert not back or found[2] == [*given.encode(), *b"." * (12 - back)]
+    mark = '"' * quoted
+    assert not done or bytes(plc.read("Main.field"))[:done] == (mark + given.replace('"', '""') + mark).encode()
     assert found[3:5] == (done, len(given) if done else 0)
     assert found[5] == (given if done else "keepkeep")
     assert found[6] == [0] * 6
