@@ -84,6 +84,20 @@ def test_ten_arguments_are_the_most_and_a_text_is_cut_at_255_characters() -> Non
     assert after(plc, "g.sOut g.bError") == ("B" * 255, False)
 
 
+@pytest.mark.slow
+def test_an_argument_of_no_kind_is_refused() -> None:
+    plc = Plc(image_of("VAR f : FB_FormatString; n : INT := 5; given : T_Arg; none : BOOL; END_VAR\ngiven := F_INT(n);\n"
+                       "IF none THEN given.eType := ARGTYPE_UNKNOWN; END_IF f(sFormat := '%d', arg1 := given);"))  # fmt: skip
+    assert [after(plc, "f.bError f.sOut", none=none) for none in (False, True)] == [(False, "5"), (True, "")]
+
+
+@pytest.mark.slow
+def test_the_length_of_a_text_as_an_argument_counts_its_end() -> None:
+    plc = Plc(image_of("VAR t : STRING(9); n : UDINT; kind : BOOL; END_VAR\n"
+                       "n := F_STRING(t).cbLen; kind := F_STRING(t).eType = ARGTYPE_STRING;"))  # fmt: skip
+    assert [after(plc, "n kind", t=text) for text in ("", "a", "abcdefghi")] == [(1, True), (2, True), (10, True)]
+
+
 # --- tables and queues --------------------------------------------------------------------------------------------------
 
 HASHED = """VAR
