@@ -176,7 +176,8 @@ nulls[5] := CSVFIELD_TO_ARG(ADR(field), 1, TRUE, F_BIGTYPE(ADR(into), 9));"""
     ('a"b', False, 3, 3, 0, 0),
     ("ab", True, 4, 2, 4, 2), ("ab", True, 3, 2, 0, 0), ("ab", False, 2, 2, 2, 2), ("ab", False, 1, 2, 0, 0),
     ('"', True, 4, 1, 4, 1),
-    ('""', True, 6, 2, 6, 2), ("ab", True, 1, 2, 0, 0), ("a;\n", True, 5, 3, 5, 3),
+    ('""', True, 6, 2, 6, 2), ("ab", True, 1, 2, 0, 0), ("a;\n", True, 5, 3, 5, 3), ('"', True, 3, 1, 0, 0),
+    ('ab"', False, 4, 3, 4, 3), ('ab"', False, 3, 3, 0, 0), ("a#", True, 4, 2, 4, 2), ("#", False, 1, 1, 1, 1),
 ])  # fmt: skip
 def test_bytes_go_into_a_field_and_come_back(given: str, quoted: bool, room: int, size: int, done: int, back: int) -> None:
     plc = Plc(image_of(BYTES))
