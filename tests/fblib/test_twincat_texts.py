@@ -258,6 +258,15 @@ def test_fields_are_read_up_to_the_last_that_ends() -> None:
 
 
 @pytest.mark.slow
+def test_a_field_whose_quotation_mark_is_not_closed_is_not_read_and_keeps_no_other_from_being_read() -> None:
+    plc = Plc(image_of(READER))
+    plc.write("Main.line", [*b'"a;b', *bytes(296)])
+    assert after(plc, READ, size=4, **{"r.eCmd": 0}) == (False, "", -1, 0, False, 0)
+    plc.write("Main.line", [*b"ab;c", *bytes(296)])
+    assert after(plc, READ) == (True, "ab", 0, 2, False, 3)
+
+
+@pytest.mark.slow
 def test_a_field_of_more_than_255_characters_is_read_up_to_there() -> None:
     plc = Plc(image_of(READER))
     plc.write("Main.line", [*b"x" * 256, *b";yy\r\n", *bytes(39)])
