@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from functools import cache
 from pathlib import Path
 
@@ -50,6 +51,32 @@ def test_equality_sets_the_flags_of_the_order_with_or_without_a_sign(name: str, 
     assert flags == {order}
 
 
+RELATIONS = {"=": "EQ", "<>": "LT GT", "<": "LT", "<=": "LT EQ", ">": "GT", ">=": "GT EQ"}
+"""Comparison -> the orders of its operands for which it holds."""
+COMPARED = {
+    "": ([1], [0xFFFF]), "S": ([0xFFFF], [1]), "L": ([0xFFFF], [0, 1]), "SL": ([0xFFFF, 0xFFFF], [1]),
+    "F": ([0, 0xBFC0], [0, 0x3F80]), "D": ([0, 0, 0, 0xBFF8], [0, 0, 0, 0x3FF0]),
+    "DT": ([0x1530, 0x3022, 0x2611], [0x1531, 0x3022, 0x2611]), "$": ([0x4142], [0x4143])}  # fmt: skip
+"""Letters of a comparison -> a smaller and a larger operand: -1.5 and 1.0, two moments, AB and AC."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", ["LT", "EQ", "GT"])
+def test_contacts_that_compare(order: str) -> None:
+    """Operands lie at D0 and D4, D10 and D14 and so on; each word from D100 on has a bit for each relation."""
+    operands = [f"{'#0 ' * (letters == 'DT')}D{10 * at} D{10 * at + 4}" for at, letters in enumerate(COMPARED)]
+    plc = plc_of("\n".join(f"LD{relation}{letters} {operands[at]}\nOUT D{100 + at}.{bit:02}"
+                           for at, letters in enumerate(COMPARED) for bit, relation in enumerate(RELATIONS)))
+    memory = plc.memory.words("D")
+    for at, (smaller, larger) in enumerate(COMPARED.values()):
+        first, second = {"LT": (smaller, larger), "EQ": (smaller, smaller), "GT": (larger, smaller)}[order]
+        for place, value in ((10 * at, first), (10 * at + 4, second)):
+            memory[place:place + 4] = memoryview(array("H", [*value, 0, 0, 0, 0][:4]))
+    assert plc.scan() is None
+    holds = sum(1 << bit for bit, orders in enumerate(RELATIONS.values()) if order in orders.split())
+    assert dict(zip(COMPARED, memory[100:108], strict=True)) == dict.fromkeys(COMPARED, holds)
+
+
 CARRY = "\nSTC"
 """In front of an instruction whose row has CY before it."""
 TABLES = sorted((Path(__file__).parent / "ladder").glob("*.txt"))
@@ -60,12 +87,17 @@ def words(text: str) -> dict[int, int]:
     return {int(number): int(value, 16) for number, value in pairs}
 
 
+def lines(instructions: str) -> str:
+    """What stands in a row, with instructions that follow one another."""
+    return instructions.strip().replace(" ; ", "\n")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("table", first_quick(TABLES), ids=lambda table: table.stem)
 def test_results_and_flags(table: Path) -> None:
     """Each row is a rung of one program, and each scan executes one of them."""
     rows = [row.split("|") for row in table.read_text(encoding="utf-8").splitlines() if row and not row.startswith("#")]
-    plc = plc_of("\n".join(f"LD W{n // 16}.{n % 16:02}{CARRY * ('CY' in row[1])}\n{row[0].strip()}"
+    plc = plc_of("\n".join(f"LD W{n // 16}.{n % 16:02}{CARRY * ('CY' in row[1])}\n{lines(row[0])}"
                            for n, row in enumerate(rows)))
     memory, wrong = plc.memory, []
     for number, (instruction, before, after, flags) in enumerate(rows):
