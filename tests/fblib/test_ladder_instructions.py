@@ -77,6 +77,85 @@ def test_contacts_that_compare(order: str) -> None:
     assert dict(zip(COMPARED, memory[100:108], strict=True)) == dict.fromkeys(COMPARED, holds)
 
 
+MOMENTS = """
+0 0102 0304 0506 | 0102 0304 0506 | EQ
+0 0102 0304 0506 | 0103 0304 0506 | LT
+1 0102 0304 0506 | 0103 0304 0506 | EQ
+0 0102 0304 0506 | 0201 0304 0506 | LT
+2 0102 0304 0506 | 0201 0304 0506 | GT
+0 0201 0304 0506 | 0101 0305 0506 | LT
+4 0201 0304 0506 | 0101 0305 0506 | GT
+0 0000 0305 0506 | 0000 0404 0506 | LT
+8 0000 0305 0506 | 0000 0404 0506 | GT
+0 0000 0404 0506 | 0000 0304 0507 | LT
+10 0000 0404 0506 | 0000 0304 0507 | GT
+0 0000 0404 0507 | 0000 0404 0606 | LT
+20 0000 0404 0507 | 0000 0404 0606 | GT
+3F 0001 0404 0507 | 0000 0505 0606 | EQ
+40 0000 0000 0000 | 0000 0000 0000 | ER
+0 0000 0000 9801 | 0000 0000 0001 | LT
+0 0000 0000 9801 | 0000 0000 9901 | LT
+0 0000 0000 9801 | 0000 0000 9701 | LT
+0 0000 0000 9901 | 0000 0000 0001 | LT
+0 0000 0000 0001 | 0000 0000 9701 | LT
+0 0000 0000 0001 | 0000 0000 9801 | GT
+0 0000 0000 0001 | 0000 0000 9901 | GT
+0 0000 0000 9701 | 0000 0000 9801 | GT
+0 0000 0000 9901 | 0000 0000 9801 | GT
+0 010A 0000 0000 | 0009 0000 0000 | ER
+0 0009 0000 0000 | 0A00 0000 0000 | ER
+0 0000 0000 0A00 | 0000 0000 0000 | ER
+0 0000 0000 0000 | 0000 0000 000A | ER
+"""
+"""What is left out; minute and second, day and hour, year and month; the same of the second operand; their order."""
+LETTERS = """
+4142 | 4142 | EQ
+4142 | 4143 | LT
+4200 | 4143 | GT
+4241 | 4142 | GT
+4142 | 4241 | LT
+4100 | 4142 | LT
+4142 4300 | 4142 | GT
+0000 | 0000 | EQ
+"""
+
+
+def compared(letters: str, operands: str, before: dict[int, int]) -> tuple[set[str], set[str]]:
+    """Which relations hold, and the flags."""
+    rungs = [f"LD{relation}{letters} {operands}\nOUT D19.{bit:02}" for bit, relation in enumerate(RELATIONS)]
+    after, flags = execute("\n".join(rungs), before)
+    return {relation for bit, relation in enumerate(RELATIONS) if after.get(19, 0) >> bit & 1}, flags
+
+
+def holding(order: str) -> tuple[set[str], set[str]]:
+    return {relation for relation, orders in RELATIONS.items() if order in orders.split()}, {order}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("letters", "operands", "table"), [("DT", "D8 D0 D4", MOMENTS), ("$", "D0 D4", LETTERS)])
+def test_the_order_of_moments_and_texts(letters: str, operands: str, table: str) -> None:
+    """An operand that is no moment sets P_ER, and no relation holds; years 98 and 99 lie before 00."""
+    for row in table.split("\n")[1:-1]:
+        first, second, order = row.split(" | ")
+        mask, *moment = [int(word, 16) for word in (first if letters == "DT" else f"0 {first}").split()]
+        before = {8: mask} | dict(enumerate(moment)) | {4 + at: int(word, 16) for at, word in enumerate(second.split())}
+        before |= {3: 9} if letters == "DT" else {}
+        assert compared(letters, operands, before) == holding(order), row
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("letters", "place", "words_there", "order"), [
+    ("DT #0", 32765, [0x102, 0x304, 0x506], "EQ"), ("DT #0", 32766, [0x304, 0x506], "ER"), ("$", 32767, [0x4100], "EQ"),
+    ("$", 32767, [0x4141], "ER")])  # fmt: skip
+def test_moments_and_texts_at_the_end_of_an_area(letters: str, place: int, words_there: list[int], order: str) -> None:
+    """A text without 0 up to the end is none."""
+    name, *mask = letters.split()
+    given = dict(enumerate(words_there))
+    before = (given if order == "EQ" else {}) | {place + at: word for at, word in given.items()}
+    for one, other in ((0, place), (place, 0)):
+        assert compared(name, " ".join([*mask, f"D{one}", f"D{other}"]), before) == holding(order)
+
+
 CARRY = "\nSTC"
 """In front of an instruction whose row has CY before it."""
 TABLES = sorted((Path(__file__).parent / "ladder").glob("*.txt"))
