@@ -377,17 +377,20 @@ class LimitCycle:
     (200, {"forward": True, "hysteresis": 300}), (150, {"forward": True}),
     (200, {"ranges": 0x1090, "low": 0x20, "high": 0xA0}), (100, {"ranges": 0x0010, "period": 20}), (100, {"ranges": 0x0490}),
     (100, {"ranges": 0x0091, "period": 20}), (160, {"ranges": 0x0892, "hysteresis": 700}),
+    (145, {"ranges": 0x0490, "speed": 0.125}), (99, {"hysteresis": 0xFFFF}), (150, {"hysteresis": 0xFFFF}),
+    (150, {"hysteresis": 0xFFFF, "forward": True}), (160, {"ranges": 0x1810, "high": 0xC0}),
 ])  # fmt: skip
-def test_autotuning_measures_the_limit_cycle(start: int, given: dict[str, int]) -> None:
+def test_autotuning_measures_the_limit_cycle(start: int, given: dict[str, float]) -> None:
     """The process value moves evenly and turns back three scans behind the output, which makes four swings of one height."""
     rungs = "LD P_On\n/ #1 #0 D90\nLD W0.00\nPIDAT(191) D0 D10 D100"
     plc = Plc(plc_of(rungs).image, 100 * MS)
     usual = {"gain": 0, "hysteresis": 0, "forward": False, "ranges": SECONDS_TENTHS, "period": 10, "low": 0, "high": 0}
-    row = usual | given
+    row = usual | {name: int(value) for name, value in given.items() if name != "speed"}
     scale = 1 << (row["ranges"] >> 8 & 15)
+    speed = int(scale * given.get("speed", 1))
     value = start * scale
     cycle = LimitCycle(value, **row)  # type: ignore[arg-type]
-    words = (150 * scale, 5000, 8000, 0, row["period"], int(row["forward"]), row["ranges"], row["low"], row["high"],
+    words = (150 * scale, 100, 8000, 0, row["period"], int(row["forward"]), row["ranges"], row["low"], row["high"],
              0x8000 | row["gain"], row["hysteresis"])  # fmt: skip
     for at, word in enumerate(words):
         plc.write(f"D{10 + at}", word)
@@ -398,9 +401,13 @@ def test_autotuning_measures_the_limit_cycle(start: int, given: dict[str, int]) 
         assert step(plc, value) == [expected], len(cycle.seen)
         assert [plc.read(flag) for flag in ("CF3", "CF4", "CF5", "CF7")] == [False, True, False, False]
         rises.append(cycle.is_high)
-        value += (3 if rises[-3] != row["forward"] else -2) * scale
+        value += (3 if rises[-3] != row["forward"] else -2) * speed
         assert len(cycle.seen) < 1000
     assert [plc.read(f"D{at}") for at in (11, 12, 13, 19)] == [*cycle.constants, row["gain"]]
+    plc.write("D19", 0x8000)
+    plc.write("D16", row["ranges"] & 0xFFF)
+    assert step(plc, cycle.wanted + scale, 3) == [cycle.outputs * row["forward"]] * 3, "tuning begins again"
+    assert plc.read("D19") == 0x8000
 
 
 @pytest.mark.slow
@@ -432,5 +439,9 @@ def test_a_loop_that_was_tuned_goes_on_with_what_was_found() -> None:
     plc.write("D19", 0x8000)
     assert step(plc, 200) == [0]
     plc.write("D11", 500)
+    plc.write("D14", 30)
     plc.write("D19", 0)
-    assert step(plc, 120) == [60]
+    assert step(plc, 120) + step(plc, 130, 3) == [60, 60, 60, 40], "once a sampling period"
+    plc.write("D11", 0)
+    plc.write("D19", 0x8000)
+    assert step(plc, 100) == [40] and plc.read("CF3") is True, "settings are read where tuning begins"
