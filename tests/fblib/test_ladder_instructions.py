@@ -194,6 +194,67 @@ def test_results_and_flags(table: Path) -> None:
     assert wrong == []
 
 
+BEFORE = {"CMP #1 #1": "GE LE EQ", "CMP #1 #2": "NE LE LT", "CMP #2 #1": "GE NE GT", "MOV #8000 D0": "N", "STC": "CY",
+          "+ #7FFF #1 D0": "N OF", "+ #8000 #8000 D0": "CY EQ UF", "/ #1 #0 D0": "ER"}  # fmt: skip
+"""Instruction -> the flags that are ON behind it."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("instruction", BEFORE)
+def test_flags_are_off_when_a_program_begins(instruction: str) -> None:
+    """Whatever the cycle before has left: W473 p6-43."""
+    names = ["GE", "NE", "LE", *FLAGS]
+    read = "\n".join(f"LD P_{name}\nOUT {{}}.{bit:02}" for bit, name in enumerate(names))
+    plc = plc_of(f"{read.replace('{}', 'W0')}\nLD P_On\n{instruction}\n{read.replace('{}', 'W1')}")
+    for _ in range(2):
+        assert plc.scan() is None
+        seen = [{name for bit, name in enumerate(names) if int(plc.read(word)) >> bit & 1} for word in ("W0", "W1")]
+        assert seen == [set(), set(BEFORE[instruction].split())]
+
+
+@pytest.mark.slow
+def test_messages() -> None:
+    """Up to 32 characters, up to the first 0 or the end of the area."""
+    plc = plc_of("LD P_On\nMSG D0 D10\nMSG #7 D32767\nMSG #0 D30")
+    for at, text in ((10, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghij"), (32767, "XY"), (30, "odd\0")):
+        for word in range(len(text) // 2):
+            plc.write(f"D{at + word}", ord(text[2 * word]) << 8 | ord(text[2 * word + 1]))
+    plc.write("D0", 5)
+    assert plc.scan() is None
+    assert [plc.read(f"CX_Message[{number}]") for number in (0, 5, 6, 7)] == ["odd", "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdef", "", "XY"]
+
+
+@pytest.mark.slow
+def test_four_words_for_a_subroutine_and_back() -> None:
+    """At the end of an area, too; with fewer words there it is an error."""
+    rungs = ("LD 0.00\nMCRO 3 D0 D32764\nLD 0.01\nMCRO 3 D32764 D4\nLD 0.02\nMCRO 3 D0 D32765\nLD P_ER\nOUT W0.00\n"
+             "SBN 3\nLD P_On\nMOV A600 A607\nMOV A601 A606\nMOV A602 A605\n"
+             "MOV A603 A604\nRET\nEND")  # fmt: skip
+    plc = plc_of(rungs)
+    for word in range(4):
+        plc.write(f"D{word}", word + 1)
+    for bit, wrong in (("CIO 0.00", 0), ("CIO 0.01", 0), ("CIO 0.02", 1)):
+        plc.write(bit, True)
+        assert plc.scan() is None
+        plc.write(bit, False)
+        assert plc.read("W0") == wrong, bit
+        assert [plc.read(f"D{at}") for at in (32764, 32765, 32766, 32767)] == [4, 3, 2, 1]
+    assert [plc.read(f"D{at}") for at in range(4, 9)] == [1, 2, 3, 4, 0]
+
+
+@pytest.mark.slow
+def test_fals_stops_the_program() -> None:
+    plc = Plc(plc_of("LD 0.00\nFALS 511 #0\nLD P_On\nFALS 1 #0").image, engine="python")
+    trap = plc.scan()
+    assert trap is not None and trap.code == "R0120"
+    assert (plc.read("A400"), plc.read("A401.06")) == (0xC101, True)
+    plc = Plc(plc_of("LD 0.00\nFALS 511 #0\nLD P_On\nOUT W0.00").image, engine="python")
+    assert plc.scan() is None and plc.read("A401.06") is False
+    plc.write("CIO 0.00", True)
+    assert plc.scan() is not None
+    assert (plc.read("A400"), plc.read("A401.06")) == (0xC2FF, True)
+
+
 @pytest.mark.slow
 def test_nothing_is_done_with_the_condition_off() -> None:
     plc = plc_of("LD P_Off\nMOV #1 D0\n++ D1\n+ D0 D1 D2")
