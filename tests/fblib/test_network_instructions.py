@@ -116,9 +116,9 @@ def test_flags_of_a_port_over_the_scans() -> None:
     rows = []
     for _ in range(5):
         pair.one.scan()
-        rows.append((pair.enabled(1), pair.word(204), pair.word(219), pair.one.read("D300") != 0))
+        rows.append((pair.word(202), pair.word(204), pair.word(219), pair.one.read("D300") != 0))
         pair.other.scan()
-    assert rows == [(False, 0, 0, False), (True, 0, 0, True)] + [(True, 0, 0, True)] * 3
+    assert rows == [(0x80FD, 0, 0, False), (0x80FF, 0, 0, True)] + [(0x80FF, 0, 0, True)] * 3
 
 
 @pytest.mark.slow
@@ -263,15 +263,50 @@ def test_a_port_in_use_sets_the_error_flag_and_goes_on_assumed() -> None:
 def test_automatic_allotment_takes_a_free_port_and_says_which() -> None:
     pair = Pair("SEND D100 D200 D0", other=False)
     pair.control(0, [1, 0, NODE_2, 0x0F00, 100])
-    pair.go(1)
-    assert [pair.word(number) for number in (216, 217, 218)] == [0xD800 + 203, 0, 0]
-    pair.scan(1)
-    assert [pair.word(number) for number in (216, 217, 218)] == [0xD800 + 204, 0, 1]
-    pair.scan(6)
-    assert pair.word(202) == 0
-    assert pair.one.read("D900.00") is False
+    pair.one.write("A217", 5)
+    for port in range(8):
+        pair.go(1)
+        assert [pair.word(number) for number in (216, 217, 218)] == [0xD800 + 203 + port, 0, port]
+        assert pair.word(202) == (0xFF & 0xFF << port + 1) | 0x8000 * (port < 7)
+        assert pair.one.read("D900.00") is False
     pair.scan(1)
     assert pair.one.read("D900.00") is True
+    assert [pair.word(number) for number in (216, 217, 218)] == [0xD800 + 210, 0, 7], "those of the last one"
+
+
+@pytest.mark.slow
+def test_the_last_free_port_counts_for_automatic_allotment() -> None:
+    pair = Pair("\nLD go\n".join(f"@SEND D100 D200 D{10 * port}" for port in range(1, 8)), other=False)
+    for port in range(1, 8):
+        pair.control(10 * port, [1, 0, NODE_2, port << 8, 100])
+    pair.go(1)
+    assert pair.word(202) == 0x8001
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", ["own D200", "D100 own"])
+@pytest.mark.parametrize("name", ["SEND", "RECV", "CMND"])
+def test_words_without_an_address_are_an_error_and_no_port_is_allotted(name: str, words: str) -> None:
+    """Those of a variable that the program does not place."""
+    compilation = compile_text(program(f"{name} {words} D0").replace("go : BOOL;", "go : BOOL; own : ARRAY[0..7] OF WORD;"))
+    assert compilation.image, [str(found) for found in compilation.diagnostics]
+    plc = Plc(compilation.image)
+    plc.attach(Etn21(0, HERE, fins=True), LoopNetwork())
+    plc.write("D0..D5", [2, 4, 0, 0, 0x0F00, 0] if name == "CMND" else [1, 0, 0, 0x0F00, 0, 0])
+    plc.write("Main.go", True)
+    plc.scan()
+    assert plc.read("D900.00") is True
+    assert (plc.read("A202"), plc.read("A216")) == (0x80FF, 0)
+
+
+@pytest.mark.slow
+def test_ports_are_free_from_the_beginning() -> None:
+    """In the first cycle, too."""
+    compilation = compile_text("PROGRAM Main\nLADDER\nLD P_On\nMOV A202 D900\nSEND D100 D200 D0\nEND_LADDER\nEND_PROGRAM")
+    assert compilation.image
+    plc = Plc(compilation.image)
+    plc.scan()
+    assert plc.read("D900") == 0x80FF
 
 
 @pytest.mark.slow
