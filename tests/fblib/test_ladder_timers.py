@@ -233,11 +233,11 @@ def test_a_ring_counts_edges_and_goes_round_both_ways() -> None:
     """The flag is ON from going round to the next count."""
     up, down, off = {"CIO 0.00": True}, {"CIO 0.01": True}, {"CIO 0.00": False, "CIO 0.01": False}
     reset, free = {"CIO 0.02": True}, {"CIO 0.02": False}
-    rows = [up, {}, off, up, off, up, off, up, off, down, off, down, off, down, off, {**up, **down}, off, reset, up, free,
-            off, up]  # fmt: skip
+    rows = [up, {}, off, up, off, up, off, up, off, down, {}, off, down, off, down, off, {**up, **down}, off, reset, up,
+            free, off, up, off, down, off, down, reset]  # fmt: skip
     assert run_bits("LD 0.00\nLD 0.01\nLD 0.02\nCNTR 2 #0002", rows, "C2 CNF2") == [
-        [1, 0], [1, 0], [1, 0], [2, 0], [2, 0], [0, 1], [0, 1], [1, 0], [1, 0], [0, 0], [0, 0], [2, 1], [2, 1], [1, 0], [1, 0],
-        [1, 0], [1, 0], [0, 0], [0, 0], [0, 0], [0, 0], [1, 0]]  # fmt: skip
+        [1, 0], [1, 0], [1, 0], [2, 0], [2, 0], [0, 1], [0, 1], [1, 0], [1, 0], [0, 0], [0, 0], [0, 0], [2, 1], [2, 1], [1, 0],
+        [1, 0], [1, 0], [1, 0], [0, 0], [0, 0], [0, 0], [0, 0], [1, 0], [1, 0], [0, 0], [0, 0], [2, 1], [0, 0]]  # fmt: skip
 
 
 def test_a_count_that_rises_while_a_counter_is_reset_is_none() -> None:
@@ -249,10 +249,10 @@ def test_a_timer_that_adds_up_goes_on_from_where_it_stood() -> None:
     """From a present value that somebody has written, from the last one where the set value grows; not beyond the set value."""
     rungs = "LD 0.00\nLD 0.01\nTTIM 1 D0"
     rows = [{"CIO 0.00": True, "D0": 3}, {}, {"T1": 2}, {}, {}, {}, {"D0": 9}, {}, {"CIO 0.01": True}, {},
-            {"CIO 0.01": False}, {}, {"CIO 0.00": False, "T1": 5}, {}, {"CIO 0.00": True}, {}]  # fmt: skip
+            {"CIO 0.01": False}, {}, {"CIO 0.00": False, "T1": 5}, {}, {"CIO 0.00": True}, {}, {"T1": 9}, {"T1": 3}]  # fmt: skip
     seen = run_bits(rungs, rows, "T1 TF1")  # type: ignore[arg-type]
     assert seen == [[0, 0], [1, 0], [3, 1], [3, 1], [3, 1], [3, 1], [4, 0], [5, 0], [0, 0], [0, 0], [0, 0], [1, 0], [5, 0],
-                    [5, 0], [5, 0], [6, 0]]  # fmt: skip
+                    [5, 0], [5, 0], [6, 0], [9, 1], [4, 0]]  # fmt: skip
 
 
 @pytest.mark.slow
@@ -264,6 +264,8 @@ def test_timers_of_two_words() -> None:
         [0xFFF0, 0x12, 0, 0xFFF0, 0x12, 0], [0xFFF0, 0x12, 0, 0xFFF0, 0x12, 0], [0xFFF0, 0x11, 0, 0xFFF0, 0x11, 0],
         [0xFFF0, 0x10, 0, 0xFFF0, 0x10, 0], [0xFFF0, 0x09, 0, 0xFFF0, 0x0F, 0], [0xFFF0, 2, 0, 0xFFF0, 2, 0],
         [0xFFF0, 1, 0, 0xFFF0, 1, 0], [0xFFF1, 0, 0, 0xFFF1, 0, 0], [0xFFF0, 0x12, 0, 0xFFF0, 0x12, 0]]
+    rungs = "LD 0.00\nTIML D0 D2 #00000012\nLD P_ER\nOUT W0.00"
+    assert run_bits(rungs, [{"CIO 0.00": True}, {"D2": 0x1A}], "D0 D2 W0") == [[0, 0x12, 0], [1, 0, 0]], "no BCD counts as 0"
     rungs = "LD 0.00\nTIMLX D4 D6 #00020000"
     assert run_bits(rungs, [{"CIO 0.00": True}, {}], "D6 D7") == [[0, 2], [0xFFFF, 1]]
 
@@ -284,7 +286,7 @@ def test_eight_outputs_of_one_timer_assumed() -> None:
         for at, value in enumerate((ten, 1, 2, 3, 4, 5, 6, 7)):
             plc.write(f"D{10 + at}", value)
         plc.write("CIO 0.00", True)
-        for passed in range(12):
+        for passed in range(20):
             plc.scan()
             bits = sum(1 << bit for bit, at in enumerate((10, 1, 2, 3, 4, 5, 6, 7)) if passed >= at)
             assert plc.read("D0") == 0xF800 | bits, (name, passed)
@@ -294,6 +296,12 @@ def test_eight_outputs_of_one_timer_assumed() -> None:
         plc.scan()
         plc.scan()
         assert plc.read("D1") == before, "paused"
+        plc.write("D0", 0x1FF)
+        plc.scan()
+        assert (plc.read("D0"), plc.read("D1")) == (0x100, 0), "reset"
+        plc.write("D0", 0)
+        plc.run(scans=11)
+        before = plc.read("D1")
         plc.write("D0", 0)
         plc.write("CIO 0.00", False)
         plc.scan()
@@ -317,8 +325,11 @@ def test_a_timer_with_eight_outputs_stands_at_the_highest_value() -> None:
 
 @pytest.mark.slow
 def test_eight_set_values_at_the_end_of_an_area() -> None:
-    for place, wrong in ((32760, 0), (32761, 1)):
-        assert run_bits(f"LD 0.00\nMTIMX D0 D1 D{place}\nLD P_ER\nOUT W0.00", [{"CIO 0.00": True}], "W0") == [[wrong]]
+    given = {f"D{32760 + at}": 1 for at in range(8)}
+    for place, bits, wrong in ((32760, 0xFF, 0), (32761, 0, 1)):
+        rows = [given | {"CIO 0.00": True}, {}]
+        assert run_bits(f"LD 0.00\nMTIMX D0 D1 D{place}\nLD P_ER\nOUT W0.00", rows, "D0 W0") == [  # type: ignore[arg-type]
+            [0, wrong], [bits, wrong]]
 
 
 @pytest.mark.slow
