@@ -213,6 +213,18 @@ def test_flags_are_off_when_a_program_begins(instruction: str) -> None:
 
 
 @pytest.mark.slow
+def test_words_of_a_variable_without_an_address() -> None:
+    """A stack needs addresses; XFER holds 32768 words at most."""
+    for instruction, wrong in (("SSET own #5", True), ("XFER #8000 own own", False), ("XFER #8001 own own", True)):
+        made = compile_text(f"PROGRAM Main\nVAR own : ARRAY[0..39999] OF WORD; END_VAR\nLADDER\nLD P_On\n{instruction}\n"
+                            "END_LADDER\nEND_PROGRAM")  # fmt: skip
+        assert made.image is not None, made.errors[0].render()
+        plc = Plc(made.image)
+        assert plc.scan() is None
+        assert plc.read("CF3") is wrong, instruction
+
+
+@pytest.mark.slow
 def test_messages() -> None:
     """Up to 32 characters, up to the first 0 or the end of the area."""
     plc = plc_of("LD P_On\nMSG D0 D10\nMSG #7 D32767\nMSG #0 D30")
