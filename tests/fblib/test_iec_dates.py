@@ -161,6 +161,20 @@ def test_each_part_of_a_date_or_time_has_limits(function: str) -> None:
             assert trap is None or (trap.code == "R0103" and f"value {value} outside {low}..{high}" in trap.message)
 
 
+NAMES = ("YEAR", "MONTH", "DAY", "HOUR", "MINUTE", "SECOND", "MILLISECOND")
+SPLITS = {"SPLIT_DT": (0, 7), "SPLIT_LDT": (0, 7), "SPLIT_DATE": (0, 3), "SPLIT_TOD": (3, 7), "SPLIT_LTOD": (3, 7)}
+
+
+@each_of("function", SPLITS)
+def test_each_part_that_is_taken_apart_says_its_range(function: str) -> None:
+    """A variable that can hold no part is told the type and the range of each."""
+    first, end = SPLITS[function]
+    calls = " ".join(f"{function}(IN := v, {name} => b);" for name in NAMES[first:end])
+    errors = compile_text(f"PROGRAM Main VAR v : {function.removeprefix('SPLIT_')}; b : BOOL; END_VAR {calls} END_PROGRAM").errors
+    for error, name, (low, high) in zip(errors, NAMES[first:end], RANGES[first:end], strict=True):
+        assert f"{name} is {'UINT' if high > 255 else 'USINT'} ({low}..{high})" in error.message
+
+
 @each_of("function", ["CONCAT_DATE_TOD", "CONCAT_DATE_LTOD"])
 def test_a_date_and_a_time_that_64_bits_cannot_hold_stop_the_program(function: str) -> None:
     kind = function.rpartition("_")[2]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from random import Random
+from struct import pack, unpack
 
 import pytest
 from mb_tcp_rig import ADDRESS, CYCLE_NS, Rig, image_of
@@ -114,6 +116,26 @@ def test_the_most_at_once(pdu: str, head: str, bytes_in_all: int) -> None:
     reply = Rig(**LONG).client().connect().ask(pdu)
     assert reply.startswith(head)
     assert len(reply) == 3 * bytes_in_all - 1
+
+
+def test_of_the_most_at_once_each_is_in_its_place() -> None:
+    draw = Random(1)
+    bits, words = [bool(draw.getrandbits(1)) for _ in range(4001)], [draw.getrandbits(16) for _ in range(200)]
+    rig = Rig(**LONG)
+    for name, values in (("coils", bits), ("inputs", bits), ("holding", words), ("registers", words)):
+        rig.set(name, values)
+    client = rig.client().connect()
+    packed = sum(bit << at for at, bit in enumerate(bits[3:2003])).to_bytes(250, "little")
+    for code in ("01", "02"):
+        assert bytes.fromhex(client.ask(f"{code} 0003 07D0")) == bytes.fromhex(code) + b"\xfa" + packed
+    for code in ("03", "04"):
+        assert bytes.fromhex(client.ask(f"{code} 0004 007D")) == bytes.fromhex(code) + b"\xfa" + pack(">125H", *words[4:129])
+    given = draw.randbytes(246)
+    assert client.ask(f"0F 0005 07B0 F6 {given.hex()}") == "0F 00 05 07 B0"
+    number = int.from_bytes(given, "little")
+    assert rig.get("coils") == bits[:5] + [bool(number >> at & 1) for at in range(1968)] + bits[1973:]
+    assert client.ask(f"10 0006 007B F6 {given.hex()}") == "10 00 06 00 7B"
+    assert rig.get("holding") == words[:6] + list(unpack(">123H", given)) + words[129:]
 
 
 REFUSED = {
