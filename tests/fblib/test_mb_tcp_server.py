@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from random import Random
 from struct import pack, unpack
+from typing import Any
 
 import pytest
 from mb_tcp_rig import ADDRESS, CYCLE_NS, Rig, image_of
@@ -367,7 +368,8 @@ def test_bits_of_what_is_not_bool_are_packed(kind: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("passed", "overlaps"), first_quick([
-    ({"coils": "holding"}, True), ({"coils": "holding[199]"}, True), ({"inputs": "holding[3]", "coils": "holding[4]"}, True),
+    ({"coils": "holding"}, True), ({"coils": "holding[199]"}, True), ({"coils": "registers"}, True), ({"coils": "inputs"}, True),
+    ({"inputs": "holding"}, True), ({"inputs": "registers"}, True), ({"inputs": "holding[3]", "coils": "holding[4]"}, True),
     ({"registers": "holding"}, True), ({"registers": "holding[0]", "holding": "holding[1]"}, False),
     ({"coils": "inputs[3]", "registers": "inputs[4]", "inputs": "registers"}, False),
     ({"coils": "inputs[4]", "registers": "inputs[3]", "inputs": "registers"}, False),
@@ -450,7 +452,10 @@ def test_who_may_connect(remote: str, remote_port: int, number: int, own_port: i
     assert is_let_in(rig, number, own_port=own_port) == expected
 
 
-@pytest.mark.parametrize(("local", "expected"), [("0.0.0.0", True), (ADDRESS, True), ("192.168.250.24", False)])
+@pytest.mark.parametrize(("local", "expected"), [
+    ("0.0.0.0", True), (ADDRESS, True), ("192.168.250.24", False), ("192.169.250.23", False), ("0.0.250.23", False),
+    ("192.168.0.0", False), ("0.0.0.1", False), ("23.250.168.192", False),
+])  # fmt: skip
 def test_the_local_address(local: str, expected: bool) -> None:
     """An address that the controller does not have: nobody is let in, and the block goes on waiting."""
     rig = described(Rig(), local=local)
@@ -468,6 +473,30 @@ def test_a_description_that_changes_is_followed_while_nobody_is_connected() -> N
     described(rig, local_port=502)
     rig.scan(3)
     assert rig.status() == "7006", "a connection stays"
+
+
+FIRST = {"remote": "192.168.250.50", "remote_port": 5000, "local_port": 1502}
+
+
+def after_change(part: dict[str, Any]) -> Rig:
+    """A server that has waited for the client described first, when the description has changed in one part."""
+    rig = described(Rig(), **FIRST)
+    rig.scan(4)
+    described(rig, **FIRST | part)
+    rig.scan(4)
+    return rig
+
+
+@each_of(("part", "caller"), [
+    ({"remote": "192.169.250.50"}, None), ({"remote": "192.168.250.51"}, (51, 1502, 5000)),
+    ({"remote_port": 5001}, (50, 1502, 5001)), ({"local_port": 1503}, (50, 1503, 5000)),
+    ({"local_port": 0}, (50, 502, 5000)), ({"local": "192.168.250.24"}, None),
+])  # fmt: skip
+def test_each_part_of_a_description_that_changes_is_followed(part: dict[str, Any], caller: tuple[int, int, int] | None) -> None:
+    """Whoever was described first is not let in any more, whoever is described then is."""
+    assert is_let_in(after_change({}), 50, 1502, 5000)
+    assert not is_let_in(after_change(part), 50, 1502, 5000)
+    assert caller is None or is_let_in(after_change(part), *caller)
 
 
 def several(count: int) -> str:
