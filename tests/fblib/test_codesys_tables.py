@@ -65,6 +65,11 @@ def test_results_have_the_numbers_of_the_runtime_system() -> None:
     assert dict(zip(numbers, found, strict=True)) == numbers
 
 
+def test_ways_to_open_a_file_have_the_numbers_of_the_runtime_system() -> None:
+    ways = ["READ", "WRITE", "APPEND", "READ_PLUS", "WRITE_PLUS", "APPEND_PLUS"]
+    assert values_of([f"ACCESS_MODE.AM_{way}" for way in ways], "DINT", "codesys") == [0, 1, 2, 3, 4, 5]
+
+
 def controls(direction: int, number: int) -> int:
     """The command of a socket that passes an unsigned long, as Winsock's _IOR and _IOW make it: a signed number."""
     command = direction << 30 | 4 << 16 | ord("f") << 8 | number
