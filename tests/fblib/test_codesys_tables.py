@@ -20,10 +20,10 @@ def image_of(text: str, dialect: str) -> Image:
     return made.image
 
 
-def values_of(expressions: list[str], type: str, dialect: str) -> list[Any]:
-    """What expressions of a type are in a scan."""
+def values_of(expressions: list[str], type: str, dialect: str, declared: str = "") -> list[Any]:
+    """What expressions of a type are in a scan of a program with more variables `declared`."""
     rows = "\n".join(f"v[{at}] := {expression};" for at, expression in enumerate(expressions))
-    plc = Plc(image_of(f"VAR v : ARRAY[0..{len(expressions) - 1}] OF {type}; END_VAR\n{rows}", dialect))
+    plc = Plc(image_of(f"VAR v : ARRAY[0..{len(expressions) - 1}] OF {type}; {declared} END_VAR\n{rows}", dialect))
     assert plc.scan() is None
     return list(plc.read("Main.v"))
 
@@ -100,9 +100,13 @@ def test_how_many_bytes_a_structure_has(type: str, bytes: int, dialect: str) -> 
     assert values_of([f"SIZEOF({type})"], "DINT", dialect) == [bytes]
 
 
-def test_the_store_has_eight_files() -> None:
-    expressions = ["LOWER_BOUND(SysFile_Store, 1)", "UPPER_BOUND(SysFile_Store, 1)"]
-    assert values_of(expressions, "DINT", "codesys") == [1, 8]
+@each_of(("array", "bounds", "dialect"), [
+    ("a.sin_zero", [0, 7], "codesys2"), ("f.fd_array", [0, 63], "codesys2"),
+    ("SysFile_Store", [1, 8], "codesys2"), ("SysFile_Store[8].Content", [0, 128 * 1024 - 1], "codesys2"),
+])  # fmt: skip
+def test_from_where_to_where_an_array_goes(array: str, bounds: list[int], dialect: str) -> None:
+    expressions = [f"LOWER_BOUND({array}, 1)", f"UPPER_BOUND({array}, 1)"]
+    assert values_of(expressions, "DINT", dialect, "a : SOCKADDRESS; f : SOCKET_FD_SET;") == bounds
 
 
 @each_of(("call", "texts", "dialect"), [
