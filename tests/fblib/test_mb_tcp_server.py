@@ -425,6 +425,11 @@ def described(rig: Rig, remote: str = "0.0.0.0", remote_port: int = 0, local: st
     return rig
 
 
+@each_of("address", ["RemoteAddress", "LocalAddress"])
+def test_an_address_has_four_bytes(address: str) -> None:
+    assert described(Rig(), "192.168.250.50", local="192.168.250.50").get(f"config.{address}") == [192, 168, 250, 50]
+
+
 def is_let_in(rig: Rig, number: int = 50, port: int = 502, own_port: int = 0) -> bool:
     client = rig.client(number, port)
     client.submit(Connect(1, client.server, own_port))
