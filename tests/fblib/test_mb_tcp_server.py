@@ -150,6 +150,7 @@ REFUSED = {
     "03 0000 00": "8382 83 03", "04 0000 007E": "8382 84 03", "05 0000 FF": "8382 85 03", "05 0000 FF00 00": "8382 85 03",
     "06 0000": "8382 86 03", "06 0000 0000 00": "8382 86 03", "0F 0000 0000 00": "8382 8F 03",
     "0F 0000 000A 01 FF": "8382 8F 03", "0F 0000 000A 02 FF": "8382 8F 03", "0F 0000 07B1 F6" + 246 * "00": "8382 8F 03",
+    "0F 0000 07B1 F7" + 247 * "00": "8382 8F 03",
     "0F 0000": "8382 8F 03", "10 0000 0001 02 00": "8382 90 03", "10 0000 0001 03 0000": "8382 90 03",
     "10 0000 007C F6" + 246 * "00": "8382 90 03", "10 0000 0001 02 000000": "8382 90 03", "10 0000 0000 00": "8382 90 03",
     # 8384, exception 03: the value of 05
@@ -295,10 +296,11 @@ def test_frames_that_are_none() -> None:
         assert (client.data, client.end) == (b"", "FIN")
 
 
-def test_a_frame_that_never_ends() -> None:
+@each_of("begun", ["00", "0001 0000 00", "0001 0000 0006", "0001 0000 0006 01 06 0000"])
+def test_a_frame_that_never_ends(begun: str) -> None:
     rig = Rig()
     client = rig.client().connect()
-    client.submit(Send(1, bytes.fromhex("0001 0000 0006 01 06 0000")), Close(1))
+    client.submit(Send(1, bytes.fromhex(begun)), Close(1))
     assert rig.statuses(client, 6) == ["7006", "8380 ERROR", "7007", "7002", "7002", "7002"]
 
 
@@ -310,6 +312,18 @@ def test_a_connection_that_breaks() -> None:
     again = rig.client(51)
     again.submit(Connect(1, again.server))
     assert rig.statuses(again, 4) == ["7002", "7004", "7006", "7006"], "the program is told of the new one"
+
+
+@each_of("end", [Close(1), Close(1, reset=True), Send(1, bytes.fromhex("0001 0000 00FF 01"))])
+def test_the_program_is_told_of_each_new_connection(end: Close | Send) -> None:
+    """However the one before has ended: by the client, by a reset, by the server when a frame cannot be one."""
+    rig = Rig()
+    client = rig.client().connect()
+    client.submit(end)
+    assert rig.statuses(client, 5)[-1] == "7002"
+    again = rig.client(51)
+    again.submit(Connect(1, again.server))
+    assert rig.statuses(again, 4) == ["7002", "7004", "7006", "7006"]
 
 
 # --- data areas ---------------------------------------------------------------------------------------------------------
