@@ -439,6 +439,12 @@ def described(rig: Rig, remote: str = "0.0.0.0", remote_port: int = 0, local: st
     return rig
 
 
+def test_a_connection_is_probed_when_it_is_silent() -> None:
+    rig = Rig()
+    rig.scan(3)
+    assert rig.plc.read("MB_TCP_Lines[1].Keep_Alive") == 1
+
+
 @each_of("address", ["RemoteAddress", "LocalAddress"])
 def test_an_address_has_four_bytes(address: str) -> None:
     assert described(Rig(), "192.168.250.50", local="192.168.250.50").get(f"config.{address}") == [192, 168, 250, 50]
