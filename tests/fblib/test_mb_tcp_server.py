@@ -326,6 +326,19 @@ def test_the_program_is_told_of_each_new_connection(end: Close | Send) -> None:
     assert rig.statuses(again, 4) == ["7002", "7004", "7006", "7006"]
 
 
+@each_of("pin", ["stop", "config.ActiveEstablished"])
+def test_the_program_is_told_of_the_connection_after_one_that_it_has_ended(pin: str) -> None:
+    rig = Rig()
+    client = rig.client().connect()
+    rig.set(pin, True)
+    client.step(3)
+    rig.set(pin, False)
+    assert rig.statuses(client, 3)[-1] == "7002"
+    again = rig.client(51)
+    again.submit(Connect(1, again.server))
+    assert rig.statuses(again, 4) == ["7002", "7004", "7006", "7006"]
+
+
 # --- data areas ---------------------------------------------------------------------------------------------------------
 
 
