@@ -224,6 +224,7 @@ def test_the_mode_of_a_file_says_what_may_be_done_with_it(mode: int, told: tuple
     error, h = done(plc, "open", "hFile", mode=mode)
     assert error == 0
     assert (*done(plc, "gets", "sLine", h=h), done(plc, "puts", line="x")) == told
+    assert done(plc, "read", "cbRead bEOF", room=1) == (0, 0, True)
     assert done(plc, "close") == 0
     _, h = done(plc, "open", "hFile", mode=0x1)
     assert done(plc, "gets", "sLine", h=h) == (0, kept)

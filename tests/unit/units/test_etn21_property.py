@@ -104,15 +104,17 @@ def test_after_a_reset_a_unit_goes_on_as_one_that_was_never_used(
     after: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
     timing: str,
 ) -> None:
-    """With the network's answers to its closes, at the same time, and as far as they are drawn with the same delays."""
+    """When the network has answered its closes, at the same time, and with the same delays where these are drawn."""
     used, new = (Rig(Etn21(timing=timing, faults=[Fault(0x2211, socket=7)])) for _ in range(2))
     asked: list[Request] = []
+    closes: list[Request] = []
     for program, told, is_answered, force, cycle_ms in before:
         asked = turn(used, program, told + (answer(asked) if is_answered else []), force, cycle_ms)
+        closes += [request for request in asked if isinstance(request, Close)]
     asked = used.unit.reset(used.memory)
     assert {type(request) for request in asked} <= {Close}
-    new.now_ns = used.now_ns
-    assert used.scan(*answer(asked)) == new.scan() == []
+    new.now_ns, new.cycle_ns = used.now_ns, used.cycle_ns
+    assert used.scan(*answer([*closes, *asked])) == new.scan() == []
     assert [used.cio[n + 1 : n + 24].tolist(), used.d[m + 1 : m + 18].tolist()] == [
         new.cio[n + 1 : n + 24].tolist(), new.d[m + 1 : m + 18].tolist()]  # fmt: skip
     for words in (used.cio, used.d):
