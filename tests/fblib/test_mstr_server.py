@@ -49,6 +49,24 @@ class Station:
         return Client(self.scan, self.plc, self.network.attach(f"192.168.250.{number}"), HERE)
 
 
+def test_a_line_that_an_operation_has_used_serves_every_caller() -> None:
+    """Its partner is the one of the operation until the server claims it."""
+    text = "PROGRAM Main VAR Server : MSTR_Server; END_VAR Server(Rack_Slot := 9); END_PROGRAM"
+    plc, network = Plc(image_of(text), CYCLE_NS), LoopNetwork()
+    for line in range(1, 33):
+        for name, value in (("Remote_IP[0]", 0xC0A8), ("Remote_IP[1]", 0xFA63), ("Remote_Port", 502), ("Local_Port", 4000)):
+            plc.write(f"MSTR_Lines[{line}].{name}", value)
+    plc.attach(Noc(9, HERE.host), network)
+
+    def scan(count: int = 1) -> None:
+        for _ in range(count):
+            assert plc.scan() is None
+
+    scan(2)
+    client = Client(scan, plc, network.attach("192.168.250.50"), HERE).connect()
+    assert client.ask("03 0000 0001") == "03 02 00 00"
+
+
 # --- the CPU ------------------------------------------------------------------------------------------------------------
 
 
