@@ -56,6 +56,13 @@ def lines(name: str, text: str) -> list[str]:
             if line.startswith("+")]
 
 
+def copy_without_tests(folder: Path) -> Any:
+    copy = m.Copy(folder)
+    for file in (copy.folder / "tests").rglob("test_*.py"):
+        file.unlink()
+    return copy
+
+
 def test_mutants_of_python() -> None:
     assert sorted(lines("x.py", PYTHON)) == sorted([
         "LIMIT: int = 4  # ö",
@@ -137,9 +144,7 @@ def test_a_copy_runs_the_mutant_and_is_restored(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="POSIX only")
 def test_a_mutant_within_functions_is_tried_in_a_fork(tmp_path: Path) -> None:
     """Also one of an inner function and of a method; what stands outside of functions is left to a new process."""
-    copy = m.Copy(tmp_path)
-    for file in (copy.folder / "tests").rglob("test_*.py"):
-        file.unlink()
+    copy = copy_without_tests(tmp_path)
     path = Path("fbvm/wire/made.py")
     text = ("LIMIT = 1\n\ndef outer():\n    def inner():\n        return 2\n    return inner\n\n"
             "class Made:\n    size = 3\n    def get(self):\n        return 4\n    def unseen(self):\n        return 5\n")
@@ -169,9 +174,7 @@ def test_a_mutant_within_functions_is_tried_in_a_fork(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="POSIX only")
 def test_a_mutant_of_a_library_is_tried_in_a_fork(tmp_path: Path) -> None:
     """Though the session has compiled a program with the block, and keeps it."""
-    copy = m.Copy(tmp_path)
-    for file in (copy.folder / "tests").rglob("test_*.py"):
-        file.unlink()
+    copy = copy_without_tests(tmp_path)
     name = "tests/lang/test_made.py"
     (copy.folder / name).write_text(
         "from functools import cache\nfrom fbvm.code.compiler import compile_text\nfrom fbvm.machine.plc import Plc\n\n"
