@@ -237,7 +237,7 @@ def test_the_time_of_a_new_name_grows_with_the_places_in_a_file() -> None:
         places = [Place(made.files["a.st"], at, at + 1) for line in range(lines) for at in (8 * line, 8 * line + 5)]
         return lambda: applied(places, "bb")["a.st"].index("bb := bb;\n" * lines)
 
-    assert_linear(prepared, 4_000)
+    assert_linear(prepared, 16_000)
 
 
 CONSTRUCTED = """\
