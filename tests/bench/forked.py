@@ -19,7 +19,7 @@ import time
 import types
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import _lru_cache_wrapper, cache
+from functools import _lru_cache_wrapper, cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +112,7 @@ def _parse_libraries() -> None:
     """Parses the shipped libraries.  A tree is kept by its text, so that only a changed file is parsed in a fork."""
     from fbvm.check.symbols import library
 
-    library._parsed = cache(library._parsed.__wrapped__)  # type: ignore[assignment]
+    library._parsed = cache(library._parsed.__wrapped__)
     for one in library._shipped():
         for path in one.files.values():
             library._file(one.name, path)
@@ -150,20 +150,23 @@ def _answer(items: list[pytest.Item], functions: dict[Key, list[types.FunctionTy
     file = str(Path.cwd() / question["path"])
     chosen = _chosen(items, question["tests"], question["slow"], question["most"])
     if not file.endswith(".py"):
-        def change() -> None:
-            for one in caches:
-                one.cache_clear()
-    else:
-        changed = list(_changed(*(compile(question[name], file, "exec", dont_inherit=True) for name in ("then", "now"))))
-        if any(new is None for _, new in changed):
-            return {"is_within_functions": False, "failed": ""}
+        return {"is_within_functions": True, "failed": _in_fork(chosen, partial(_forget, caches), question["limit_s"])}
+    changed = list(_changed(*(compile(question[name], file, "exec", dont_inherit=True) for name in ("then", "now"))))
+    if any(new is None for _, new in changed):
+        return {"is_within_functions": False, "failed": ""}
+    return {"is_within_functions": True, "failed": _in_fork(chosen, partial(_put, changed, functions), question["limit_s"])}
 
-        def change() -> None:
-            for old, new in changed:
-                for function in functions.get(_key(old), ()):
-                    assert new is not None
-                    function.__code__ = new
-    return {"is_within_functions": True, "failed": _in_fork(chosen, change, question["limit_s"])}
+
+def _forget(caches: list[_lru_cache_wrapper[Any]]) -> None:
+    for one in caches:
+        one.cache_clear()
+
+
+def _put(changed: list[Change], functions: dict[Key, list[types.FunctionType]]) -> None:
+    for old, new in changed:
+        for function in functions.get(_key(old), ()):
+            assert new is not None
+            function.__code__ = new
 
 
 Change = tuple[types.CodeType, types.CodeType | None]
