@@ -40,6 +40,9 @@ cycles = st.tuples(
     st.sampled_from([10, 10, 10, 200, 80_000]),
 )
 timings = st.sampled_from(["exact", "real"])
+Turns = list[tuple[int, Switch, dict[str, object]]]
+Script = list[tuple[Turns, list[Event], bool, bool, int]]
+"""Of each cycle: what the program asks, what the network tells, whether it answers, a force close, and the ms that it takes."""
 
 
 def has_only_cleared_switches(rig: Rig, before: dict[str, bytes]) -> bool:
@@ -51,7 +54,7 @@ def has_only_cleared_switches(rig: Rig, before: dict[str, bytes]) -> bool:
 @settings(max_examples=times(150), deadline=None)
 @given(st.lists(cycles, max_size=25), timings, st.integers(0, 9))
 def test_any_order_of_switches_and_events(
-    script: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
+    script: Script,
     timing: str,
     seed: int,
 ) -> None:
@@ -81,7 +84,7 @@ def test_any_order_of_switches_and_events(
 @given(st.lists(cycles, max_size=25), timings)
 def test_the_unit_does_the_same_without_machine_code(
     monkeypatch: pytest.MonkeyPatch,
-    script: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
+    script: Script,
     timing: str,
 ) -> None:
     rigs = [Rig(Etn21(timing=timing, faults=[Fault(0x2211, Switch.SEND)]))]
@@ -100,8 +103,8 @@ def test_the_unit_does_the_same_without_machine_code(
 @settings(max_examples=times(60), deadline=None)
 @given(st.lists(cycles, min_size=1, max_size=25), st.lists(cycles, min_size=1, max_size=25), timings)
 def test_after_a_reset_a_unit_goes_on_as_one_that_was_never_used(
-    before: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
-    after: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
+    before: Script,
+    after: Script,
     timing: str,
 ) -> None:
     """When the network has answered its closes, at the same time, and with the same delays where these are drawn."""
@@ -131,7 +134,7 @@ def test_after_a_reset_a_unit_goes_on_as_one_that_was_never_used(
 
 
 def turn(
-    rig: Rig, program: list[tuple[int, Switch, dict[str, object]]], told: list[Event], force: bool, cycle_ms: int
+    rig: Rig, program: Turns, told: list[Event], force: bool, cycle_ms: int
 ) -> list[Request]:
     """One cycle: what the program does, then a refresh in which the network tells something."""
     for area, switch, values in program:
