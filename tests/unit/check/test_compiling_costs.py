@@ -54,7 +54,7 @@ def test_what_a_compilation_leaves_does_not_wait_for_the_collector() -> None:
         return gc.collect()
 
     left(1)  # what is made once
-    assert left(400) < left(1) + 100
+    assert min(left(400) for _ in range(3)) < left(1) + 100, "other threads leave garbage, too"
 
 
 BIG = "ARRAY [0..2_000_000] OF LINT"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import tracemalloc
+import itertools
 
 import pytest
+from growth import least_kept_bytes
 from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_of
@@ -483,24 +484,17 @@ def test_peers_keep_the_last_frames_callers_and_ends_only(monkeypatch: pytest.Mo
 
 @pytest.mark.slow
 def test_a_reply_of_before_needs_no_more_than_that() -> None:
-    grown = [_grown_behind_replies() for _ in range(3)]  # other threads of the process may allocate meanwhile
-    assert min(grown) <= 16_000, "200 replies are 48,000 bytes"
-
-
-def _grown_behind_replies() -> int:
-    """By how many bytes the memory grows with 200 replies that come too late."""
     peer = RUDE_PEERS["previous reply instead"](ModbusServer())
     conversation = peer.accept(Peer(UNIT, 49152))
     assert conversation is not None
-    tracemalloc.start()
-    try:
-        sizes = []
-        for number in range(300):
+    heard, numbers = getattr(peer, "received"), itertools.count()  # noqa: B009
+
+    def replies(count: int) -> None:
+        for number in itertools.islice(numbers, count):
             said = list(conversation.received(Adu(number, 255, modbus.read(3, 1000, 100)).to_bytes(), 0))
             assert [action.data[:2] for action in said if isinstance(action, Say)] == (
                 [(number - 1).to_bytes(2, "big")] if number else [])  # fmt: skip
-            getattr(peer, "received").clear()  # noqa: B009
-            sizes.append(tracemalloc.get_traced_memory()[0])
-    finally:
-        tracemalloc.stop()
-    return sizes[-1] - sizes[100]
+            heard.clear()
+
+    replies(100)
+    assert least_kept_bytes(lambda: replies(200)) <= 16_000, "200 replies are 48,000 bytes"
