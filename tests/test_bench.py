@@ -5,9 +5,11 @@ from __future__ import annotations
 import importlib.util
 import io
 import json
+import os
 import re
 import shutil
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -87,6 +89,31 @@ def test_every_script_is_tried() -> None:
     tried = {name.removeprefix("test_the_script_") for name in globals() if name.startswith("test_the_script_")}
     elsewhere = {"mutants", "reached", "forked", "loaded", "large_text"}  # in test_mutants.py; a text for other scripts
     assert tried | elsewhere == set(SCRIPTS)
+
+
+DISTURBED = """
+import gc, os, time
+
+def test_disturbed():
+    ends_s, seen = time.monotonic() + 60, set()
+    while len(seen) < 3:
+        assert time.monotonic() < ends_s, seen
+        objects, handles = len(gc.get_objects()), len(os.listdir("/proc/self/fd"))
+        used_s, now_s = time.thread_time(), time.monotonic()
+        time.sleep(0.001)
+        seen |= {"objects"} if len(gc.get_objects()) > objects + 1000 else set()
+        seen |= {"handles"} if len(os.listdir("/proc/self/fd")) > handles else set()
+        seen |= {"stops"} if time.monotonic() - now_s > 0.05 + time.thread_time() - used_s else set()
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="handles are counted in /proc")
+def test_the_script_disturbed(tmp_path: Path) -> None:
+    (tmp_path / "test_made.py").write_text(DISTURBED, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(HOUSE / "tests" / "bench")}
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "disturbed", "-n", "1", "test_made.py"],
+                          cwd=tmp_path, env=environment, check=False, capture_output=True, text=True)  # fmt: skip
+    assert done.returncode == 0, done.stdout
 
 
 def test_the_script_latencies(load: Load) -> None:
