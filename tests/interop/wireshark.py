@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 TSHARK = shutil.which("tshark")
-WRONG = "_ws.malformed || tcp.checksum.status == 0 || ip.checksum.status == 0 || _ws.expert.severity >= 6291456"
+WRONG = "_ws.malformed || tcp.checksum.status == 0 || ip.checksum.status == 0 || ({}_ws.expert.severity >= 6291456)"
 """Malformed, a wrong checksum, or a warning or error of any dissector."""
 
 
@@ -17,11 +17,12 @@ def tshark(capture: Path, *arguments: str) -> list[str]:
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
 
 
-def dissected(capture: Path) -> list[str]:
+def dissected(capture: Path, with_resets: bool = False) -> list[str]:
     """Function codes of the Modbus frames that tshark finds, if it has nothing to say against the capture.
 
-    An empty list where tshark is not installed."""
+    It warns of each RST, which is right `with_resets`: a server may close with linger.  An empty list where tshark is not
+    installed."""
     if not TSHARK:
         return []
-    assert tshark(capture, "-Y", WRONG) == []
+    assert tshark(capture, "-Y", WRONG.format("!tcp.flags.reset == 1 && " if with_resets else "")) == []
     return tshark(capture, "-Y", "modbus", "-T", "fields", "-e", "modbus.func_code")
