@@ -26,6 +26,9 @@ TABLE_BYTES = 256 * MIB
 LINE_CHARACTERS = 256 * MIB
 """Longest line of a journal; its first line holds the sources."""
 
+MOST_FOLDERS = 20_000
+"""How many folders are looked through below one that is given: about a second."""
+
 
 class Unreadable(OSError):
     """The path is no regular file, or the file is too large; `strerror` says which."""
@@ -59,6 +62,18 @@ def open_file(path: Path | str) -> BinaryIO:
     except BaseException:
         os.close(number)
         raise
+
+
+def folders_below(root: Path) -> list[tuple[Path, list[str]]]:
+    """A folder and all folders below it with the names of their files, sorted.  Links to folders are not followed.
+
+    Raises Unreadable if there are more than MOST_FOLDERS: a whole disk was given in place of a folder."""
+    folders: list[tuple[Path, list[str]]] = []
+    for at, _, names in os.walk(root):
+        if len(folders) > MOST_FOLDERS:
+            raise Unreadable(errno.EFBIG, f"it has more than {MOST_FOLDERS} folders; give the one in which the files are")
+        folders.append((Path(at), sorted(names)))
+    return sorted(folders)
 
 
 def read_file(path: Path | str, most_bytes: int) -> bytes:

@@ -62,7 +62,8 @@ def _declare(context: Context, declaration: GlobalDeclaration) -> None:
     project, declared, source = context.project, declaration.declared, declaration.source
     keys = _keys(project, declaration)
     project.busy_globals.update(keys)
-    with project.recording(Dependencies()):
+    resolved = None
+    with context.chain.link(source, declared.names[0], declared.names[0].text), project.recording(Dependencies()):
         scope = Scope(context, source, None)
         resolved = type_of(scope, declared)
         if resolved is not None:

@@ -112,7 +112,7 @@ def _give_value(context: Context, made: Variable, declared: tree.VarDecl) -> Non
 def later_constant(context: Context, pou: Pou, name: tree.NameRef) -> Variable | None:
     """A CONSTANT of a POU that is declared behind the declaration that names it; None after a diagnostic."""
     declared, section = pou.later[fold(name.text)]
-    if fold(name.text) in pou.failed_names:
+    if fold(name.text) in pou.failed_names or context.chain.too_long:
         return None
     if not is_constant(section):
         context.report.add("S0701", pou.source, name, f"{name.text} has no value yet where this is worked out",

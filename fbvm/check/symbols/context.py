@@ -22,6 +22,7 @@ from fbvm.base.areas import (
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import EnumType, RefType, StructType, Type, derives, fold
+from fbvm.check.symbols.chain import Chain
 from fbvm.check.symbols.config_facts import TaskFact
 from fbvm.check.symbols.dependencies import Dependencies, Key, has_lasting_body, key_of
 from fbvm.check.symbols.elementary_types import elementary_type
@@ -74,6 +75,7 @@ class Context:
         self.evaluate = evaluate
         self.report = project.report
         self.facts: Facts = project.facts
+        self.chain = Chain(project.report)
         mailboxes = project.libraries.mailboxes
         self.areas: dict[str, Area] = {**AREAS, **{name: e_bank(name, 0) for name in E_NAMES},
                                        **{name: box.at(0) for name, box in mailboxes.items()}}
@@ -161,13 +163,15 @@ class Context:
         entry = self.project.type_entry(name, source)
         assert entry is not None
         self.project.dependencies.record("declared", name)
+        if self.chain.too_long:
+            return entry.resolved
         if entry.busy:
             self.report.add("S0207", entry.source, entry.tree.name,
                             f"{entry.name} contains itself", "a type cannot hold a value of its own type")
             return None
         if not entry.done:
             entry.busy = True
-            with self.project.recording(Dependencies()):
+            with self.chain.link(entry.source, entry.tree.name, entry.name), self.project.recording(Dependencies()):
                 entry.resolved = self.rules.type_declaration(self, entry)
             entry.busy = False
             entry.done = True
@@ -292,6 +296,8 @@ class Context:
     def is_failed_global(self, name: tree.NameRef, source: Source) -> bool:
         """True if there is no such global variable and the reason is reported; it is now if its own declaration needs it."""
         project = self.project
+        if self.chain.too_long:
+            return True
         if any((owner, fold(name.text)) in project.busy_globals for owner in project.owners(source)):
             self.report.add("S0207", source, name, f"the initial value of {name.text} needs {name.text} itself")
             return True
@@ -306,10 +312,21 @@ class Context:
         self.project.dependencies.record("interface", *reversed(key_of(pou)))
         if pou.resolved:
             return True
+        if self.chain.too_long:
+            return False
         if pou.busy:
             self.report.add("S0207", source, node, f"{pou.name} holds an instance of itself",
                             "an instance can hold instances of other blocks only")
             return False
+        with self.chain.link(pou.source, pou.tree.name, pou.name):
+            self._resolve(pou)
+        while self._awaited and not self._resolving:
+            awaited = self._awaited.pop()
+            self.interface(awaited, awaited.source, awaited.tree.name)
+        return pou.resolved
+
+    def _resolve(self, pou: Pou) -> None:
+        """Resolve the variables and the layout of a POU, and check the body of one of a library."""
         pou.busy = True
         self._resolving += 1
         outer, self.project.dependencies = self.project.dependencies, Dependencies()
@@ -324,10 +341,6 @@ class Context:
             self.check_body(pou)
         self.project.dependencies = outer
         self._resolving -= 1
-        while self._awaited and not self._resolving:
-            awaited = self._awaited.pop()
-            self.interface(awaited, awaited.source, awaited.tree.name)
-        return True
 
     def waits_for(self, pou: Pou, source: Source) -> bool:
         """True if a reference to a block that is declared now gets its target later, when nothing else is being resolved.

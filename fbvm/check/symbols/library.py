@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cache, lru_cache
@@ -35,7 +35,7 @@ from pathlib import Path
 from fbvm.base.areas import AREAS, Mailbox, refusal
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.files import SETTINGS_BYTES, read_file, reason
+from fbvm.base.files import SETTINGS_BYTES, Unreadable, folders_below, read_file, reason
 from fbvm.base.toml import TomlError, load_toml
 from fbvm.base.types import fold
 from fbvm.check.symbols.report import Report
@@ -94,7 +94,11 @@ _KEYS = ("globals", "mailbox", "pins", "spaces", "writes", "by_dialect", "lists"
 
 
 def _libraries_below(root: Path) -> Iterator[Library]:
-    for folder, names in sorted((Path(at), sorted(names)) for at, _, names in os.walk(root)):
+    try:
+        folders = folders_below(root)
+    except Unreadable as error:
+        raise LibraryError(root, reason(error)) from error
+    for folder, names in folders:
         sources = [name for name in names if name.endswith(".st")]
         if not sources and "library.toml" not in names:
             continue
@@ -234,6 +238,10 @@ class Libraries:
                 if not library.by_dialect or library.name in preferred:
                     self._put(library)
         self._files = {name for below in shelves[:len(own)] for library in below for name in library.files}
+        self._holders: dict[str, dict[str, None]] = {}
+        for library in self._libraries.values():
+            for name in library.files:
+                self._holders.setdefault(name, {})[library.name] = None
         self._block_names: list[str] | None = None
         self.mailboxes: dict[str, Mailbox] = {}
         """What the libraries' units bring, by area."""
@@ -253,6 +261,10 @@ class Libraries:
     def has_file(self, name: str) -> bool:
         """True if a library may have a file for a folded name."""
         return name in _shipped_files() or name in self._files
+
+    def holders(self, name: str) -> Collection[str]:
+        """The libraries that have a file for a folded name, in the order of `names`."""
+        return self._holders.get(name, ())
 
     def has_own_file(self, name: str) -> bool:
         """True if a library of the user has a file for a folded name."""

@@ -110,6 +110,8 @@ class SymbolTable:
         self.dependencies = Dependencies()
         """What the check of the present body looks up."""
         self._owners: dict[str, tuple[str, ...]] = {}
+        self._declaring: dict[str, set[str]] = {}
+        """By folded name of a POU or type: the libraries in which it was declared, "" for the user's own texts."""
         self._found_pous: dict[str, dict[Seen, Pou | None]] = {}
         self._found_types: dict[str, dict[Seen, TypeEntry | None]] = {}
         """Results of look-ups: by folded name, and by the library and the namespaces in which the name is used."""
@@ -164,7 +166,7 @@ class SymbolTable:
                 full = full_name(declaration.name.text, source)
                 key = (source.library, fold(full))
                 if not self._twice(key, declaration.name, source, "type"):
-                    self._forget(self._found_types, key[1])
+                    self._made_known(self._found_types, key)
                     self.types[key] = TypeEntry(full, declaration, source, frozenset(attributes(text, declaration)),
                                                 pack_mode(text, declaration))
             elif isinstance(declaration, tree.GlobalVars):
@@ -208,7 +210,7 @@ class SymbolTable:
         for refused in declaration.refused:
             self.report.refuse(source, refused)
         if not self._twice(key, declaration.name, source, "POU"):
-            self._forget(self._found_pous, key[1])
+            self._made_known(self._found_pous, key)
             self.pous[key] = pou = Pou(name, declaration.kind, self.namespaces.used_by(declaration, source), declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
             pou.modifiers = frozenset(word.text for word in declaration.modifiers)
@@ -224,9 +226,10 @@ class SymbolTable:
             return pou
         return None
 
-    @staticmethod
-    def _forget(known: dict[str, dict[Seen, T | None]], full: str) -> None:
-        """Forget what the names meant that may mean a declaration with this folded full name."""
+    def _made_known(self, known: dict[str, dict[Seen, T | None]], key: tuple[str, str]) -> None:
+        """Note a new declaration, and forget what the names meant that may mean it."""
+        owner, full = key
+        self._declaring.setdefault(full, set()).add(owner)
         while full:
             known.pop(full, None)
             full = full.partition(".")[2]
@@ -299,8 +302,11 @@ class SymbolTable:
                 self._load_own(last, source)
             if (meant := self._in_namespaces(folded, source)) is not None:
                 return table.get(meant[0]) if len(meant) == 1 else None
+        holders, declaring = self.libraries.holders(last) if last == folded else (), self._declaring.get(folded, ())
         for owner in self.owners(source):
-            if in_file and owner and last == folded and (owner, folded) not in table:
+            if owner != source.library and owner not in holders and owner not in declaring:
+                continue
+            if owner in holders and (owner, folded) not in table:
                 self._load(folded, owner)
             if (owner, folded) in table and self._kept_by((owner, folded), source) is None:
                 return table[owner, folded]
@@ -308,8 +314,8 @@ class SymbolTable:
 
     def _load_own(self, name: str, source: Source) -> None:
         """Read the files of that name in the user's libraries, since they may declare it in a NAMESPACE."""
-        for owner in self.owners(source):
-            if owner and not self.libraries.is_shipped(owner):
+        for owner in self.libraries.holders(name):
+            if not self.libraries.is_shipped(owner):
                 self._load(name, owner)
 
     def _in_namespaces(self, folded: str, source: Source) -> list[Key] | None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from fbvm.base.files import resolved
+from fbvm.base.files import Unreadable, folders_below, reason, resolved
 
 _HEAD_BYTES = 4_000
 _SOURCES = (b"plcopen.org/xml/tc6", b"<tcplcobject", b"<tcsmproject", b"developer/msbuild")
@@ -78,7 +78,11 @@ class LibraryFolder(ExistingPath):
             other = "give its folder" if str(value).endswith(".st") else f"make a folder of it by `fbvm import {value} -o DIR`"
             self.fail(f"{str(value)!r} is a file, and libraries are folders; name it among the sources, or {other}", param, ctx)
         path = Path(super().convert(value, param, ctx))
-        if not any(name.endswith(".st") or name == "library.toml" for _, _, names in os.walk(path) for name in names):
+        try:
+            names = [name for _, inside in folders_below(path) for name in inside]
+        except Unreadable as error:
+            self.fail(f"{str(path)!r}: {reason(error)}", param, ctx)
+        if not any(name.endswith(".st") or name == "library.toml" for name in names):
             self.fail(f"there is no library in {str(path)!r}: it holds no .st and no library.toml; `fbvm import FILE -o DIR` "
                       "makes them of other tools' libraries", param, ctx)
         return path

@@ -14,7 +14,7 @@ from typing import Any
 from fbvm.base.cache import Cache, name_of, state_of
 from fbvm.base.data import PACKAGE, data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.files import SOURCE_BYTES, read_file, reason
+from fbvm.base.files import SOURCE_BYTES, Unreadable, folders_below, read_file, reason
 from fbvm.code.image import Image
 from fbvm.code.store.encoding import decode, encode
 
@@ -81,9 +81,11 @@ def _own() -> str:
 
 def _library(folder: Path) -> str:
     """A hash of all that compiling may find in a folder of libraries."""
-    parts = [part for path in sorted(folder.rglob("*")) if path.suffix in (".st", ".toml")
-             for part in (path.relative_to(folder).as_posix(), _content(path))]
-    return name_of([str(folder), *parts])
+    try:
+        paths = (at / name for at, names in folders_below(folder) for name in names if name.endswith((".st", ".toml")))
+        return name_of([str(folder), *(part for path in paths for part in (path.relative_to(folder).as_posix(), _content(path)))])
+    except Unreadable as error:
+        return reason(error)
 
 
 def _content(path: Path) -> str:

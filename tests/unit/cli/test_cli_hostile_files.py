@@ -83,6 +83,18 @@ def test_what_is_no_file_in_a_project_or_a_library(fbvm: Fbvm, what: str) -> Non
     assert "it is no file" in fbvm("check", "counter.st", "--library", "own").output
 
 
+def test_a_disk_in_the_place_of_a_library_is_refused(fbvm: Fbvm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "MOST_FOLDERS", 3)
+    for name in "abc":
+        Path("own", name).mkdir()
+        Path("own", name, f"{name}.st").write_text(COUNTER, encoding="utf-8")
+    assert fbvm("check", "counter.st", "--library", "own").exit_code == 0
+    Path("own/d").mkdir()
+    refused = fbvm("check", "counter.st", "--library", "own")
+    assert refused.exit_code == 2 and "it has more than 3 folders" in refused.output
+    assert [each.code for each in compile_sources([Source("counter.st", COUNTER)], libraries=[Path("own")]).errors] == ["P0201"]
+
+
 @needs_devices
 def test_links_that_lead_to_one_another_are_refused_wherever_a_path_is_written(fbvm: Fbvm) -> None:
     os.symlink("loop.st", "loop.st")
