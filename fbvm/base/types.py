@@ -54,6 +54,10 @@ class StringType(Type):
     wide: bool = False
 
 
+DEEPEST_TYPE = 200
+"""How many arrays, structures and instances one type may have in one another."""
+
+
 @dataclass(frozen=True)
 class ArrayType(Type):
     """ARRAY with constant bounds; the rightmost subscript varies fastest.  Of a `packed` one each BOOL is a bit."""

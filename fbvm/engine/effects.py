@@ -85,18 +85,29 @@ class Effects:
 
     def _of_body(self, number: int) -> Spans:
         """Where a body stores with all that it calls; the span of its own instance stands for any place in it."""
-        if number not in self._bodies:
-            found: set[Span] = set()
-            code = self._image.bodies[number].code
-            range_of = with_temporaries(code)
-            for node in statements(code):
-                spans = self.of(node, None, range_of)
-                if spans is None:
-                    self._bodies[number] = None
-                    return None
-                found.update(each if each.base == "abs" else Span("self", 0, 0) for each in spans)
-            self._bodies[number] = tuple(sorted(found)) if len(found) <= MOST_SPANS else _hull(found)
+        waiting = [number]
+        while waiting:  # those that it calls come first, however long the chain of calls is
+            last = waiting[-1]
+            called = (node[1] for node in statements(self._image.bodies[last].code) if node[0] in CALLS)
+            if last in self._bodies:
+                waiting.pop()
+            elif inner := [each for each in called if each not in self._bodies]:
+                waiting += inner
+            else:
+                self._bodies[last] = self._stored_in(last)
         return self._bodies[number]
+
+    def _stored_in(self, number: int) -> Spans:
+        """Where a body stores; what the bodies that it calls do is known."""
+        found: set[Span] = set()
+        code = self._image.bodies[number].code
+        range_of = with_temporaries(code)
+        for node in statements(code):
+            spans = self.of(node, None, range_of)
+            if spans is None:
+                return None
+            found.update(each if each.base == "abs" else Span("self", 0, 0) for each in spans)
+        return tuple(sorted(found)) if len(found) <= MOST_SPANS else _hull(found)
 
 
 def _hull(spans: set[Span]) -> tuple[Span, ...]:

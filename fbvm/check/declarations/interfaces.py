@@ -404,8 +404,7 @@ class _Interface:
             self.pou.frame_given = len(content)
         for variable in variables:
             variable.place = "frame"
-        self.pou.frame_size = len(content)
-        self.pou.frame_initial = bytes(content)
+        self.pou.frame_size, self.pou.frame_initial = len(content), bytes(content)
 
     def _instance(self) -> None:
         self.pou.identifier = self.context.new_type_identifier()
@@ -420,11 +419,12 @@ class _Interface:
         parents = tuple(each.type for each in (self.pou.base, *self.pou.interfaces) if each is not None and each.type is not None)
         self.pou.type = StructType(self.pou.name, len(content), 8, fields, True, self.pou.other_names, parents)
         self.pou.initial = bytes(content)
+        inner = (field.type for field in fields.values() if not field.reference)
+        self.project.size_limits.nests(self.pou.type, inner, f"{self.pou.name} has", self.pou.source, self.pou.tree.name)
 
     def _fit(self, variables: Iterable[Variable]) -> bool:
         """True if an instance or a frame can hold the variables; else a diagnostic."""
-        size = sum(8 if variable.reference else variable.type.size for variable in variables)
-        pou = self.pou
+        size, pou = sum(8 if variable.reference else variable.type.size for variable in variables), self.pou
         return self.project.size_limits.reserve(size, f"the variables of {pou.name} take", pou.source, pou.tree.name)
 
 

@@ -121,9 +121,9 @@ def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:
     if resolved is None:
         return None
     kind = resolved[0]
-    if spec.kind == "REFERENCE TO":
-        return bound(followed(kind)), bytes(8)
-    return (pointer if spec.kind == "POINTER TO" else reference)(kind), bytes(8)
+    made = bound(followed(kind)) if spec.kind == "REFERENCE TO" else (pointer if spec.kind == "POINTER TO" else reference)(kind)
+    inner = [] if isinstance(kind, StructType) else [kind]
+    return (made, bytes(8)) if scope.project.size_limits.nests(made, inner, "the reference has", scope.source, spec) else None
 
 
 def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
@@ -294,8 +294,9 @@ def _array(scope: Scope, spec: tree.ArraySpec, name: str) -> Resolved | None:
     element = _instances(scope, given) if given is not None else resolve(scope, spec.element)
     if element is None:
         return None
-    kind = array(tuple(bounds), element[0])
-    if not scope.project.size_limits.reserve(kind.count * max(1, element[0].size), "the array takes", scope.source, spec):
+    kind, limits = array(tuple(bounds), element[0]), scope.project.size_limits
+    if not limits.nests(kind, [element[0]], "the array has", scope.source, spec) or \
+            not limits.reserve(kind.count * max(1, element[0].size), "the array takes", scope.source, spec):
         return None
     content = element[1] * kind.count
     return kind, initial_bytes(scope, kind, given.values, content) \
@@ -374,13 +375,19 @@ def _structure(scope: Scope, spec: tree.StructSpec | tree.UnionSpec, name: str,
                 return None
             elif wrong := made.add(member.text, kind, initial, place, packed):
                 scope.error("S0604", declared.location or member, wrong, RELATIVE)
-    if not complete or not limits.reserve(made.size, "the structure takes", scope.source, spec):
+    return _whole(scope, spec, made, name) if complete else None
+
+
+def _whole(scope: Scope, spec: tree.StructSpec | tree.UnionSpec, made: Members, name: str) -> Resolved | None:
+    """The structure that these members are; None after a diagnostic."""
+    limits = scope.project.size_limits
+    if not limits.reserve(made.size, "the structure takes", scope.source, spec):
         return None
-    if name:
-        return made.structure(name)
-    kind, content = made.structure(f"STRUCT {scope.context.new_anonymous_number()}")
-    scope.project.nameless[kind] = content
-    return kind, content
+    kind, content = made.structure(name or f"STRUCT {scope.context.new_anonymous_number()}")
+    if not name:
+        scope.project.nameless[kind] = content
+    inner = (field.type for field in made.fields.values())
+    return (kind, content) if limits.nests(kind, inner, "the structure has", scope.source, spec) else None
 
 
 def _extend(scope: Scope, spec: tree.StructSpec, made: Members) -> bool:

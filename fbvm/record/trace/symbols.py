@@ -5,10 +5,12 @@ Structures are written once and named by number.  A type that a reader does not 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
 from fbvm.base.types import (
+    DEEPEST_TYPE,
     ELEMENTARY,
     ArrayType,
     Elementary,
@@ -24,9 +26,6 @@ from fbvm.base.types import (
     string,
 )
 
-DEEPEST = 200
-"""Types one in the other: far more than programs have, and few enough for who follows them."""
-
 
 class SymbolError(ValueError):
     """The data are no symbols that `to_data` has written."""
@@ -36,6 +35,7 @@ def to_data(symbols: Mapping[str, Field]) -> dict[str, Any]:
     """Symbols as lists and dictionaries that JSON can write."""
     writer = _Writer()
     fields = [writer.field(field) for field in symbols.values()]
+    writer.write_waiting()
     return {"types": writer.structures, "symbols": fields}
 
 
@@ -44,8 +44,9 @@ def from_data(data: Mapping[str, Any]) -> dict[str, Field]:
     try:
         reader, known = _Reader(data["types"]), dict[int, int]()
         fields = {fold(field.name): field for field in map(reader.field, data["symbols"])}
-        if max((_depth(field.type, known) for field in fields.values()), default=0) > DEEPEST:
-            raise SymbolError(f"no symbols: types are nested deeper than {DEEPEST}")
+        reader.read_waiting()
+        if max((_depth(field.type, known) for field in fields.values()), default=0) > DEEPEST_TYPE + 1:  # what it holds is 1
+            raise SymbolError(f"no symbols: types are nested deeper than {DEEPEST_TYPE}")
         return fields
     except SymbolError:
         raise
@@ -72,6 +73,15 @@ class _Writer:
     def __init__(self) -> None:
         self.structures: list[Any] = []
         self._numbers: dict[int, int] = {}
+        self._waiting: deque[tuple[int, StructType]] = deque()
+        """Structures whose rows are not written yet: references may lead from one to the next by thousands."""
+
+    def write_waiting(self) -> None:
+        """Write the rows of all structures that were named."""
+        while self._waiting:
+            number, kind = self._waiting.popleft()
+            fields = [self.field(field) for field in kind.fields.values()]
+            self.structures[number] = [kind.name, kind.size, kind.align, kind.block, fields]
 
     def field(self, field: Field) -> list[Any]:
         flags = field.absolute | field.reference << 1 | field.constant << 2 | field.hexadecimal << 3
@@ -101,8 +111,7 @@ class _Writer:
         if number is None:
             number = self._numbers[id(kind)] = len(self.structures)
             self.structures.append(None)
-            fields = [self.field(field) for field in kind.fields.values()]
-            self.structures[number] = [kind.name, kind.size, kind.align, kind.block, fields]
+            self._waiting.append((number, kind))
         return number
 
 
@@ -110,6 +119,15 @@ class _Reader:
     def __init__(self, structures: list[Any]) -> None:
         self._rows = structures
         self._made: dict[int, StructType] = {}
+        self._waiting: deque[int] = deque()
+        """Structures whose members are not read yet."""
+
+    def read_waiting(self) -> None:
+        """Read the members of all structures that were named."""
+        while self._waiting:
+            number = self._waiting.popleft()
+            for field in map(self.field, self._rows[number][4]):
+                self._made[number].fields[fold(field.name)] = field
 
     def field(self, row: list[Any]) -> Field:
         name, kind, offset, section, bit, flags, *rest = row
@@ -124,11 +142,9 @@ class _Reader:
 
     def structure(self, number: int) -> Type:
         if number not in self._made:
-            name, size, align, block, fields = self._rows[number]
-            made = self._made[number] = StructType(str(name), int(size), int(align), {}, bool(block))
-            for row in fields:
-                field = self.field(row)
-                made.fields[fold(field.name)] = field
+            name, size, align, block, _ = self._rows[number]
+            self._made[number] = StructType(str(name), int(size), int(align), {}, bool(block))
+            self._waiting.append(number)
         return self._made[number]
 
     def array(self, bounds: list[list[int]], element: Any) -> Type:

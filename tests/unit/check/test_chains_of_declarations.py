@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from rows import each_of
 
+from fbvm.check.symbols import size_limits
 from fbvm.code.compiler import compile_text, passes
 
 LENGTH, FRAMES = 200, 1200
@@ -59,3 +60,19 @@ def test_a_chain_through_files_of_a_library(tmp_path: Path) -> None:
         (tmp_path / f"{part.split()[1]}.st").write_text(part, encoding="utf-8")
     found = compile_text("PROGRAM Main VAR x : F0; END_VAR x(); END_PROGRAM", libraries=[tmp_path]).errors
     assert [each.code for each in found] == ["S0106"]
+
+
+@pytest.mark.slow
+@each_of(("link", "last"), (
+    ("TYPE T{n} : STRUCT a : T{next}; END_STRUCT END_TYPE\n", "TYPE T{n} : STRUCT a : INT; END_STRUCT END_TYPE\n"),
+    ("TYPE T{n} : ARRAY [0..0] OF T{next}; END_TYPE\n", "TYPE T{n} : ARRAY [0..0] OF INT; END_TYPE\n"),
+    ("TYPE T{n} : REF_TO T{next}; END_TYPE\n", "TYPE T{n} : REF_TO INT; END_TYPE\n"),
+    ("FUNCTION_BLOCK T{n} VAR a : T{next}; END_VAR a(); END_FUNCTION_BLOCK\n", "FUNCTION_BLOCK T{n} END_FUNCTION_BLOCK\n"),
+))  # fmt: skip
+def test_types_are_in_one_another_up_to_a_depth(link: str, last: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(size_limits, "DEEPEST_TYPE", 30)
+    inner_first = "".join(_chain(link, last).splitlines(keepends=True)[:-31:-1])
+    program = "PROGRAM Main VAR x : T{}; END_VAR ; END_PROGRAM"
+    assert compile_text(inner_first + program.format(LENGTH - 28)).image is not None, "29, and the program's instance"
+    deeper = link.format(n=LENGTH - 30, next=LENGTH - 29)
+    assert [each.code for each in compile_text(inner_first + deeper + program.format(LENGTH)).errors] == ["S0106"]

@@ -67,3 +67,8 @@ def test_a_body_with_more_places_than_are_told_apart_stores_between_the_first_an
     call = ("call", 1, at(128))
     assert stored(call, places) == [("abs", 2, 3), ("abs", 9, 10), ("abs", 30, 31)]
     assert stored(call, places + inner) == [("abs", 2, 31), ("abs", 128, 192)]
+
+
+def test_a_chain_of_calls_may_be_longer_than_the_stack() -> None:
+    chain = [(("call", number + 2, None),) for number in range(2000)]
+    assert stored(("call", 1, None), *chain, (store("u8", 3, const("u8", 1)),)) == [("abs", 3, 4)]

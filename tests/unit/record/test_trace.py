@@ -481,6 +481,13 @@ def test_a_type_may_refer_to_itself() -> None:
     assert found["A"].type.name == "A"
 
 
+def test_references_may_lead_through_thousands_of_types() -> None:
+    last = 3000
+    types = [structure(f"S{number}", ["ref", "", ["struct", number + 1], False, False]) for number in range(last)]
+    data = {"types": [*types, structure("Last", "INT")], "symbols": [["a", ["struct", 0], 0, "VAR", None, 0]]}
+    assert symbols.to_data(symbols.from_data(data)) == data
+
+
 @pytest.mark.parametrize("selected", [(), ("Main.*",)])
 def test_references_are_left_out_of_a_chart_of_everything(selected: Sequence[str]) -> None:
     plc = Plc(image("PROGRAM Main\nVAR a : INT; r : REF_TO INT; p : POINTER TO INT; f : REFERENCE TO INT;\n"
