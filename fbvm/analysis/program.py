@@ -20,6 +20,7 @@ from fbvm.check.calls import generics
 from fbvm.check.checker import Checker
 from fbvm.check.lint.linter import lint_steps
 from fbvm.check.lint.suppression import ANY, Suppressions
+from fbvm.check.symbols.forgetting import forget
 from fbvm.check.symbols.library import Libraries, LibraryError
 from fbvm.check.symbols.report import Report
 from fbvm.check.symbols.size_limits import SizeLimits
@@ -258,6 +259,7 @@ class Program:
         project.collect(new.syntax, new.source)
         before_check = len(report.diagnostics)
         project.new_pous.clear()
+        forget(project.facts, former, old.syntax)
         made, starts = project.pous["", fold(_name(new))], len(project.facts.starts)
         checker.check_body(made)
         checker.check_starts(starts)

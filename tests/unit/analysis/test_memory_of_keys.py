@@ -15,6 +15,7 @@ from fbvm.analysis import garbage
 from fbvm.analysis.hover import hover
 from fbvm.analysis.program import Program
 from fbvm.analysis.references import references, use_at
+from fbvm.syntax import tree
 
 BODY = "".join(f"    Level := Level + {number};\n" for number in range(50))
 TEXT = f"PROGRAM Main\nVAR Level : DINT; END_VAR\n{BODY}    Level := 0;\nEND_PROGRAM\n"
@@ -57,6 +58,23 @@ def test_keys_leave_nothing_behind(way: Callable[[Program], None]) -> None:
 
     typed(5)
     assert least_kept_bytes(lambda: typed(KEYS)) < MOST_BYTES
+
+
+@pytest.mark.slow
+def test_keys_without_a_pause_leave_one_version_of_a_body() -> None:
+    program = Program()
+    program.replace("a.st", TEXT + "ACTION Main.More:\n" + BODY + "END_ACTION\n")
+    program.check_all()
+    known, bodies = [], []
+    for number in range(5):
+        program.replace("a.st", program.files["a.st"].text.replace("Level := ", f"Level := ADD(1, {number}) + ", 1))
+        check_changes(program)
+        assert program.checked is not None
+        known.append(sum(len(table) for table in vars(program.checked.project.facts).values()))
+        gc.collect()
+        bodies.append(sum(isinstance(each, tree.Pou) and len(each.body) > 50 for each in gc.get_objects()))
+    assert bodies[-1] == bodies[0]
+    assert known[-1] - known[0] < known[0] // 10, "what was added, and no former version"
 
 
 class Ring:
