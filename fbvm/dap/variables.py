@@ -23,6 +23,8 @@ from fbvm.watch.values import Value, in_hexadecimal, show, show_time
 
 MOST_ROWS = 256
 """Rows that a client without paging gets at once; more are in nodes of so many."""
+MOST_ELEMENTS = 16
+"""Arrays up to so many elements have them as their value; of others these are not read."""
 SECTIONS = (("Inputs", ("VAR_INPUT",), "arguments"), ("Outputs", ("VAR_OUTPUT",), ""), ("In-outs", ("VAR_IN_OUT",), ""))
 """Scopes by the sections of a POU, and their presentation hints; all others are Locals."""
 FORCED = " (forced)"
@@ -293,9 +295,9 @@ def text_of(debug: DebugSession, session: Session | PastSession, place: Place, *
     plain = base(place.type)
     if isinstance(plain, StructType):
         return plain.name
+    if isinstance(plain, ArrayType) and plain.count > MOST_ELEMENTS:
+        return place.type.name
     value = session.names.name_references(place.type, session.player.read(place))
-    if isinstance(plain, ArrayType) and plain.count > 16:
-        return f"{place.type.name}"
     if value is None:
         return "NULL"
     text = _shown(debug, place, value)

@@ -19,8 +19,8 @@ from fbvm.watch.terms import LEVEL_OF, Read, Term, inverted, literal_term, pair,
 from fbvm.watch.values import sort_of
 
 Find = Callable[[str], Place | Span]
-DEEPEST = 50
-"""Parentheses and NOTs within each other."""
+DEEPEST, MOST_OPERATORS = 50, 250
+"""Parentheses and NOTs within each other; operators of two operands in one condition, which may stand in one row."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,7 @@ class _Parser:
         self.rest = list(tokens(text))
         self.places: list[Place] = []
         self.depth = 0
+        self.operators = 0
 
     @property
     def kind(self) -> str:
@@ -92,6 +93,9 @@ class _Parser:
         left = self.unary()
         while self.kind in ("word", "sign") and LEVEL_OF.get(self.word, -1) >= loosest:
             sign = self.rest.pop(0)[1]
+            self.operators += 1
+            if self.operators > MOST_OPERATORS:
+                raise ConditionError(f"the condition has more than {MOST_OPERATORS} operators")
             left = pair(sign, left, self.level(LEVEL_OF[sign] + 1), self.text)
         return left
 

@@ -12,6 +12,7 @@ from rows import each_of
 
 from fbvm.base.areas import AREAS
 from fbvm.dap.variables import _written, text_of
+from fbvm.watch import places
 from fbvm.watch.paths import find_place
 
 TEXT = """\
@@ -41,6 +42,14 @@ def begun(path: Path, **said: object) -> Client:
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Client:
     return begun(tmp_path_factory.mktemp("pages") / "own.st")
+
+
+def test_an_array_that_is_not_shown_with_its_elements_is_not_read(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[Any] = []
+    monkeypatch.setattr(places, "read_found", lambda memory, place: read.append(place.name) or 0)
+    rows = client.rows(client.scopes()["Locals"]["variablesReference"])
+    assert rows["full"]["value"] == client.value("full") == "ARRAY [0..255] OF INT"
+    assert read == []
 
 
 def test_the_properties_of_an_instance_follow_its_variables_on_every_page(client: Client) -> None:

@@ -168,11 +168,17 @@ def test_does_not_hold(text: str) -> None:
     ("D200..D201 = 3", "not understood"),
     ("(" * 200 + "done" + ")" * 200, "nested too deep"),
     ("NOT " * 200 + "done", "nested too deep"),
+    ("n" + " + n" * 2000 + " > 0", "more than 250 operators"),
 ])
 def test_what_is_no_condition_says_why(text: str, message: str) -> None:
     with pytest.raises(ConditionError) as error:
         parse_condition(text, resolve)
     assert message in str(error.value)
+
+
+def test_a_condition_has_as_many_operators_as_can_be_computed() -> None:
+    text = " OR ".join(["(" * 40 + "n > 32767" + ")" * 40] * 125)
+    assert not parse_condition(text, resolve).holds(lambda place: 1)
 
 
 def test_arithmetic_behind_a_null_reference_holds_for_nothing() -> None:
