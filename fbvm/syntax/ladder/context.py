@@ -128,9 +128,7 @@ class RungContext:
         words lie there (0: a bit) that may be read, or `written`."""
         kept = self.temporary(self.name(f"at{self._position}"), "UDINT")
         if kept.text not in self._computed:
-            values = (self.temporary(kept.text, "UDINT"), self.number(words), self.truth(written))
-            found = tree.Call(self.start, self.end, NameRef(self.start, self.end, "CX_Reachable"),
-                              tuple(tree.Argument(self.start, self.end, "", None, value) for value in values))
+            found = self.function("CX_Reachable", self.temporary(kept.text, "UDINT"), self.number(words), self.truth(written))
             self._computed[kept.text] = self.assign(kept, address), found
         return self.temporary(kept.text, "UDINT")
 
@@ -166,15 +164,16 @@ class RungContext:
 
     def call(self) -> Expr:
         """The function of the step with its operands."""
-        arguments = [self.operand(position) for position in range(len(self.line.row.operands))]
-        return tree.Call(self.start, self.end, NameRef(self.start, self.end, self.line.row.does),
-                         tuple(tree.Argument(a.start, a.end, "", None, a) for a in arguments))
+        return self.function(self.line.row.does, *(self.operand(position) for position in range(len(self.line.row.operands))))
 
     def call_of(self, function: str, *values: Expr) -> Statement:
         """A call of a function as a statement."""
+        return tree.CallStatement(self.start, self.end, self.function(function, *values))
+
+    def function(self, name: str, *values: Expr) -> tree.Call:
+        """A call of a function for its result."""
         arguments = tuple(tree.Argument(value.start, value.end, "", None, value) for value in values)
-        call = tree.Call(self.start, self.end, NameRef(self.start, self.end, function), arguments)
-        return tree.CallStatement(self.start, self.end, call)
+        return tree.Call(self.start, self.end, NameRef(self.start, self.end, name), arguments)
 
     # --- nodes ---
 

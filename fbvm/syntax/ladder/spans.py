@@ -15,7 +15,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.ladder.context import Interlock, RungContext, StepRefused
 from fbvm.syntax.ladder.mnemonics import RungText
 from fbvm.syntax.ladder.operands import TASKS
-from fbvm.syntax.tree import Action, Argument, Block, Call, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
+from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
 from fbvm.syntax.tree.ladder import Rung
 
 INTERLOCK = "$IL"
@@ -135,11 +135,13 @@ class Spans:
         context.emit(context.when(context.variation(context.power()), self._call()))
 
     def macro(self) -> None:
-        """MCRO: as SBS, with four words copied to A600..A603 before the call and four copied from A604..A607 after the call."""
+        """MCRO: as SBS, with four words copied to A600..A603 before the call and four copied from A604..A607 after the call.
+        Nothing of that is done where fewer than four words lie at an operand."""
         context = self.context
-        copy_in, call = context.call_of("CX_MCRO_In", context.operand(1)), self._call()
-        whole = copy_in, call, context.call_of("CX_MCRO_Out", context.operand(2))
-        context.emit(context.when(context.variation(context.power()), *context.if_reachable(*whole)))
+        source, target = context.operand(1), context.operand(2)
+        fits = context.function("CX_MCRO_In", source, target)
+        whole = context.when(fits, self._call(), context.call_of("CX_MCRO_Out", context.operand(2)))
+        context.emit(context.when(context.variation(context.power()), *context.if_reachable(whole)))
 
     def _call(self) -> Statement:
         context = self.context
@@ -189,8 +191,7 @@ class Spans:
         """Calls a function with the number of a task, and leaves the program if it says so."""
         context = self.context
         number = context.number(whole_number(self._number(context.line.step.operands[0], "cyclic task", TASKS)))
-        leaves = Call(context.start, context.end, NameRef(context.start, context.end, function),
-                      (Argument(context.start, context.end, "", None, number),))  # fmt: skip
+        leaves = context.function(function, number)
         done = context.if_reachable(context.when(leaves, Return(context.start, context.end)))
         context.emit(context.when(context.variation(context.power()), *done))
 
