@@ -48,8 +48,7 @@ class Dialect:
     initial_variables: bool = False
     round_arrays: bool = False
     nested_repetitions: bool = False
-    lenient_texts: str = ""
-    """How a text that is no literal is converted: "leading", "whole", or "" for a trap."""
+    lenient_texts: str = ""  # how a text that is no literal is converted: "leading", "whole", or "" for a trap
     whole_powers: bool = False
     no_open_inputs: bool = False
     instances_are_values: bool = False
@@ -121,10 +120,9 @@ class Dialect:
     plain_names: bool = False
     locals_hide_results: bool = False
     selects_at_first: bool = False
-    dynamic_memory: str = ""
-    """Whether there are __NEW and __DELETE: "marked" if they want an attribute at what is made, "free" if they do not."""
-    offered: bool = True
-    """Whether hints for sources of any tool name it."""
+    plain_en: bool = False
+    dynamic_memory: str = ""  # __NEW and __DELETE: "marked" if they want an attribute at what is made, "free" if not, "" if none
+    offered: bool = True  # whether hints for sources of any tool name it
 
 
 QUESTIONS = {
@@ -302,6 +300,8 @@ QUESTIONS = {
                             "the variable, and the function returns the first value of its type, with a warning (S0193)"),
     "selects_at_first": ("SEL(p <> 0, 0, p^.n): the input that is not chosen", "worked out, too: a null pointer stops it",
                          "not worked out"),
+    "plain_en": ("EN declared as VAR_INPUT, and FALSE in a call", "nothing of the call happens: EN is that of the standard",
+                 "the body is executed: EN is an input as any other, FALSE where nothing is passed"),
     "dynamic_memory": ("p := __NEW(Motor); __DELETE(p);", "an error (S0903)",
                        "make and end variables while the program runs: with {attribute 'enable_dynamic_creation'} at blocks "
                        "and types of no library, under strucpp without it"),
@@ -332,7 +332,7 @@ _CODESYS = Dialect("codesys", "programs for CODESYS and the tools that are made 
                    exceptions=True, conditional_returns=True, constant_in_outs_take_texts=True, persistent_parameters=True,
                    bounds_are_not_compared=True, empty_structures=True, texts_have_addresses=True, assignments_are_values=True,
                    signs_are_lost=True, generic_constants=True, outputs_are_passed=True, short_addresses=True,
-                   dates_take_durations=True, dynamic_memory="marked", selects_at_first=True)
+                   dates_take_durations=True, dynamic_memory="marked", selects_at_first=True, plain_en=True)
 _ROWS = (
     STANDARD,
     _CODESYS,

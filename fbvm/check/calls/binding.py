@@ -66,11 +66,16 @@ def bind_of_action(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> N
             _named(scope, argument, pou, bound, given)
 
 
+def _without_names(pou: Pou, named: Sequence[tree.Argument]) -> list[Variable]:
+    """The parameters that arguments without a name are for, in their order, where `named` are those with one."""
+    names = {fold(a.name.text) for a in named if a.name is not None}
+    names = {pou.other_names.get(name, name) for name in names} | {"ENO"}
+    return [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in names and not v.guards]
+
+
 def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument], named: Sequence[tree.Argument], pou: Pou,
                 bound: PouCall, given: dict[str, tree.Node]) -> None:
-    names = {fold(a.name.text) for a in named if a.name is not None}
-    names = {pou.other_names.get(name, name) for name in names} | {"EN", "ENO"}
-    parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in names]
+    parameters = _without_names(pou, named)
     if _lacks_parameters(pou):  # the others would move up
         given.update((fold(v.name), call) for v in parameters)
         for argument in arguments:
@@ -161,7 +166,7 @@ def _pass(scope: Scope, argument: tree.Argument, variable: Variable, bound: PouC
     value = argument.value
     assert value is not None
     if variable.kind == "VAR_INPUT":
-        if fold(variable.name) == "EN":
+        if variable.guards:
             if scope.fit(value, BOOL, "S0405", "EN"):
                 bound.enable = value
         elif is_block(variable.type):

@@ -286,8 +286,8 @@ class _Interface:
                             f"{variable.kind} of a {self.pou.kind} has no location", "declare it in a VAR section")
         if declared.edge:
             self._edge(variable, declared)
-        if fold(variable.name) == "EN" and variable.kind == "VAR_INPUT" and not variable.explicit:
-            variable.initial = b"\x01"  # EN is TRUE where nobody connects it
+        if self.context.guards_calls(variable):
+            variable.guards, variable.initial = True, variable.initial if variable.explicit else b"\x01"
 
     def _place_by_var_config(self, variable: Variable, location: tree.Location) -> None:
         """`AT %I*`: VAR_CONFIG gives each instance its place; without VAR_CONFIG it is a variable like others."""

@@ -342,6 +342,14 @@ class Context:
         self.project.dependencies = outer
         self._resolving -= 1
 
+    def guards_calls(self, variable: Variable) -> bool:
+        """True for a declared EN that holds calls back while it is FALSE; in some dialects EN is an input like any other."""
+        if variable.kind != "VAR_INPUT" or fold(variable.name) != "EN":
+            return False
+        libraries, owner = self.project.libraries, variable.source.library
+        plain = libraries.has_plain_en(owner) if owner and libraries.is_shipped(owner) else self.project.dialect.plain_en
+        return not plain
+
     def waits_for(self, pou: Pou, source: Source) -> bool:
         """True if a reference to a block that is declared now gets its target later, when nothing else is being resolved.
 

@@ -52,6 +52,7 @@ class Variable:
     initial: bytes = b""
     explicit: bool = False
     """True if the declaration itself gives an initial value."""
+    guards: bool = False  # True for an EN that holds calls back while it is FALSE
     value: Value | None = None
     """The value of a CONSTANT of elementary type."""
     wrong: bool = False

@@ -12,6 +12,8 @@ A library for a unit that has no words of its own in the PLC's areas declares th
 
 Names that programs put in front of its own, with a point, are its `spaces = ["Standard"]`.
 
+In blocks of a tool that knows EN as an input like any other (`plain_en` of base.dialects), `plain_en = true` says so.
+
 Files of global variables and constants that are read when a program names one of them, or their file with a point:
 `lists = ["TwinCAT_SystemInfoVarList.st"]`.  If one of these was read, each task calls in front of its programs the function
 `task = "TwinCAT_TaskBegins"` with Index (from 1 on), CycleTime (a ULINT in units of 100 ns), Priority and Name.
@@ -67,6 +69,8 @@ class Library:
     """By the folded name of such a file, and of each of its variables: the file."""
     task: str = ""
     """The function that each task calls in front of its programs, if one of `lists` was read."""
+    plain_en: bool = False
+    """True if a declared EN is an input like any other in its blocks, whatever the dialect of the program."""
     shipped: bool = False
     """True for one that comes with fbvm, whose files do not change."""
     loaded: set[str] = field(default_factory=set)
@@ -89,7 +93,7 @@ class LibraryError(ValueError):
         return Diagnostic("P0201", Source(str(self.described), text), 0, len(text.partition("\n")[0]), self.why)
 
 
-_KEYS = ("globals", "mailbox", "pins", "spaces", "writes", "by_dialect", "lists", "task")
+_KEYS = ("globals", "mailbox", "pins", "spaces", "writes", "by_dialect", "lists", "task", "plain_en")
 """What a `library.toml` can say to the compiler; everything else in it is for people."""
 
 
@@ -111,7 +115,8 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         yield Library(name, folder, files, _files_of(table, "globals", described),
                       _mailbox(table, described), _pins(table, described), frozenset(map(fold, spaces)),
                       _written(table, described), _flag(table, "by_dialect", described),
-                      lists, _names_in(folder, lists, described), _task(table, files, described))
+                      lists, _names_in(folder, lists, described), _task(table, files, described),
+                      _flag(table, "plain_en", described))
 
 
 def _described(described: Path) -> dict[str, object]:
@@ -313,6 +318,10 @@ class Libraries:
         texts = (read(path, path.name) for library in self._libraries.values() if not library.shipped
                  for path in library.files.values())
         return any(isinstance(each, Source) and pattern.search(each.text) is not None for each in texts)
+
+    def has_plain_en(self, name: str) -> bool:
+        """True for a library in whose blocks a declared EN is an input like any other."""
+        return self._libraries[name].plain_en
 
     def is_by_dialect(self, name: str) -> bool:
         """True for a library whose blocks stand in place of others in what users write, and not in shipped libraries."""

@@ -151,9 +151,10 @@ def _instance(body: BodyContext, called: PouCall) -> Place | None:
 
 
 def _enable(callee: Callee, site: int) -> Node | None:
-    """The value of EN, which is stored if the POU declares it; None if it is neither given nor declared."""
+    """The value of EN, which is stored if the POU declares it; None if it is neither given nor declared, or an input as any
+    other."""
     body, called = callee.body, callee.called
-    declared = callee.parameter("EN", "VAR_INPUT")
+    declared = next((variable for variable in called.pou.parameters("VAR_INPUT") if variable.guards), None)
     enable = body.value(called.enable, BOOL) if called.enable is not None else None
     if declared is None:
         return enable
@@ -228,7 +229,7 @@ def _inputs(callee: Callee, site: int) -> None:
     if called.pou.is_routine:
         given = {id(v) for v, _ in called.inputs}
         for variable in called.pou.parameters("VAR_INPUT"):
-            if id(variable) not in given and variable.name.upper() != "EN":
+            if id(variable) not in given and not variable.guards:
                 body.emit(("fill", callee.slot(variable).address, variable.initial))
 
 
