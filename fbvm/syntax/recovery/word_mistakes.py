@@ -9,7 +9,10 @@ from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.lookahead import advance
 
-DROPPED = {"LET": "an assignment has no word in front of it: x := 5;", "SET": "write x := TRUE;",
+NO_WORD = "an assignment has no word in front of it: x := 5;"
+BITS = {"SET": "TRUE", "RESET": "FALSE", "RST": "FALSE", "RSET": "FALSE"}
+"""Word that sets or resets the bit behind it -> what is to be assigned to that."""
+DROPPED = {"LET": NO_WORD,
            "CALL": "a block is called by the name of its instance: timer(IN := a);",
            "CAL": "a block is called by the name of its instance: timer(IN := a);",
            "WHEN": "a label of CASE has no word in front of it"}
@@ -27,21 +30,38 @@ BODIES = {ENDS[word] for word in POUS} | {"END_ACTION", "END_TRANSITION"}
 def foreign_word(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`CALL timer();`, `GOTO over;`, `CONST a : INT := 5; END_CONST`"""
     word, place = automaton.before, anchor(automaton.states)
-    if place.symbol != "ended_list" or len(automaton.states) != place.size + 1 or word.type != "NAME":
+    if place.symbol != "ended_list" or len(automaton.states) != place.size + 1 or word.type not in ("NAME", "ACCESSOR"):
         return None
-    if token.type not in ("NAME", "NUMBER", "TYPED_LITERAL") or "\n" in automaton.text[word.end:token.start]:
+    if token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "DIRECT") or "\n" in automaton.text[word.end:token.start]:
         return None
     text = word.text.upper()
     message = f"{found(word)} begins no statement"
     if text == "GOTO":
         return Repair([Token("JMP", "JMP", word.start, word.end), token], word.start, word.end, message,
                       f"write JMP {token.text};", cut=True, lossless=True)
+    if text in BITS and token.type in ("NAME", "DIRECT"):
+        return _bit(automaton, word, token)
     if text in DROPPED:
         return Repair([token], word.start, word.end, message, DROPPED[text], cut=True, lossless=True)
     if text not in SKIPPED:
         return None
     return Repair(_behind(automaton, token, ENDED.get(text, ";")), word.start, word.end, message, SKIPPED[text], cut=True,
                   lossless=False)
+
+
+def _bit(automaton: Automaton, word: Token, token: Token) -> Repair:
+    """`SET x;`, `RESET t.IN;`: the assignment is read that was meant; `token` is the first of the bit."""
+    bit, message = [], f"{found(word)} begins no statement"
+    while token.type in ("NAME", "DIRECT", "NUMBER", "DOT", "PART", "LSQB", "RSQB", "COMMA", "CARET") and \
+            "\n" not in automaton.text[word.end:token.start]:
+        bit.append(token)
+        token = automaton.next()
+    if token.type in ("ASSIGN", "EQUAL"):
+        return Repair([*bit, token], word.start, word.end, message, NO_WORD, cut=True, lossless=True)
+    value, at = BITS[word.text.upper()], bit[-1].end
+    rest = [token] if token.type == "SEMICOLON" else [Token("SEMICOLON", ";", at, at), token]
+    return Repair([*bit, Token("ASSIGN", ":=", at, at), Token(value, value, word.start, word.end), *rest], word.start, word.end,
+                  message, f"write {automaton.text[bit[0].start:at]} := {value};", cut=True, lossless=True)
 
 
 def _behind(automaton: Automaton, token: Token, end: str) -> list[Token]:
