@@ -11,7 +11,8 @@ import pytest
 from page_rig import ReadPage
 from rows import first_quick
 
-import fbvm.testing.rig  # noqa: F401 - what is loaded before pytest runs within pytest stays loaded
+import fbvm.code.compiler.passes  # what is loaded before pytest runs within pytest stays loaded
+import fbvm.testing.rig  # noqa: F401
 
 pytest_plugins = ["pytester"]
 
