@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import ast
 import linecache
+import sys
 import textwrap
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
@@ -22,7 +23,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pytest
 
 from fbvm.base.data import PACKAGE
-from fbvm.testing.session import MOST_PAGES, count_coverage, explains, failure_page, library_folders, search_folders, varied_run
+from fbvm.testing.session import (
+    MOST_PAGES,
+    count_coverage,
+    explains,
+    failure_page,
+    library_folders,
+    project_folder,
+    search_folders,
+    varied_run,
+)
 from fbvm.testing.warning_plugin import NAME as WARNINGS
 from fbvm.testing.warning_plugin import WarningPlugin, add_options, warning_plugin
 
@@ -275,6 +285,40 @@ def _statement(file: str, line: int) -> range:
     found = [range(node.lineno, (node.end_lineno or node.lineno) + 1) for node in ast.walk(tree)
              if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or node.lineno)]  # fmt: skip
     return min(found, key=len, default=range(line, line + 1))
+
+
+# --- test modules of projects -----------------------------------------------------------------------------------------
+
+
+class ProjectModule(pytest.Module):
+    """A test module of a project or lesson, beside which others lie that have test modules of the same names.
+
+    Unless a configuration says otherwise, pytest imports a module by the name of its file alone, and refuses a second one."""
+
+    def collect(self) -> Iterable[pytest.Item | pytest.Collector]:
+        """The tests of the module, which is imported by its path if another file was imported by its name."""
+        option = self.config.option
+        mode = option.importmode
+        if _is_taken(self.path):
+            option.importmode = "importlib"
+        try:
+            return list(super().collect())
+        finally:
+            option.importmode = mode
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> ProjectModule | None:
+    """Projects and lessons may lie side by side."""
+    if project_folder(module_path) is None:
+        return None
+    made: ProjectModule = ProjectModule.from_parent(parent, path=module_path)
+    return made
+
+
+def _is_taken(path: Path) -> bool:
+    """True if another file was imported by the name of a module that lies in no package."""
+    file = getattr(sys.modules.get(path.stem), "__file__", None)
+    return file is not None and not (path.parent / "__init__.py").exists() and Path(file) != path
 
 
 # --- tests in ST ------------------------------------------------------------------------------------------------------

@@ -25,6 +25,8 @@ UNEXPLAINED: pytest.StashKey[bool] = pytest.StashKey()
 """In the stash of the configuration: that nobody reads why tests fail, which takes longer to find out than to execute them."""
 MOST_PAGES = 20
 """Pages that one session writes unless --fbvm-pages says another number."""
+PROJECT_FILES = ("fbvm.toml", "answers.toml")
+"""Files that show that a folder is a project (run.project) or a lesson (testing.lesson)."""
 SOURCE_FOLDER = "src"
 """The folder of a project's blocks, beside its pytest.ini or pyproject.toml."""
 
@@ -40,8 +42,15 @@ def varied_run(config: pytest.Config) -> VariedRun | None:
 
 
 def search_folders(path: Path, root: Path) -> list[Path]:
-    """The folders in which the files that a test names are looked for: that of the test, then those above it up to `root`."""
-    return [folder for folder in path.parents if folder.is_relative_to(root)] or [path.parent]
+    """The folders in which the files that a test names are looked for: that of the test, then those above it up to `root`, or to
+    the project of the test if that lies elsewhere."""
+    top = root if path.is_relative_to(root) else project_folder(path) or path.parent
+    return [folder for folder in path.parents if folder.is_relative_to(top)]
+
+
+def project_folder(path: Path) -> Path | None:
+    """The project or lesson to which a test file belongs: the nearest folder above it with one of PROJECT_FILES, if any."""
+    return next((folder for folder in path.parents if any((folder / name).is_file() for name in PROJECT_FILES)), None)
 
 
 def library_folders(config: pytest.Config, path: Path) -> list[Path]:

@@ -685,3 +685,29 @@ def test_the_dialect_of_a_rig_and_of_a_session(project: pytest.Pytester) -> None
                 fb("src/last.st", dialect="standard")
     """)
     run(project).assert_outcomes(passed=3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [[], ["two", "one"]], ids=["from_above", "named"])
+def test_projects_and_lessons_lie_side_by_side(pytester: pytest.Pytester, order: list[str]) -> None:
+    """Each has a test module of the same name, and sources of its own: `fbvm new one`, `fbvm new two`, and pytest above them."""
+    for name, starts in (("one", 1), ("two", 2)):
+        folder = pytester.path / name
+        for part, text in {
+            "fbvm.toml": "", "pytest.ini": "[pytest]\n", "src/part.st": PUMP.replace("Starts + 1", f"Starts + {starts}"),
+            "tests/test_part.py": "def test_starts(fb):\n    pump = fb('src/part.st::Pump')\n    pump.run('100ms', Start=True)\n"
+                                  f"    assert pump.Starts == {starts}\n",
+            "lesson/answers.toml": "lamp = true\n",
+            "lesson/test_lesson.py": "from fbvm.testing.lesson import predicted\n\n\ndef test_lamp():\n"
+                                     "    assert predicted(__file__, 'lamp') is True\n",
+        }.items():  # fmt: skip
+            (folder / part).parent.mkdir(parents=True, exist_ok=True)
+            (folder / part).write_text(text, encoding="utf-8")
+    run(pytester, *order).assert_outcomes(passed=4)
+
+
+@pytest.mark.slow
+def test_modules_of_one_name_in_no_project_are_refused_as_ever(pytester: pytest.Pytester) -> None:
+    for name in ("one", "two"):
+        pytester.mkdir(name).joinpath("test_part.py").write_text("def test_it():\n    pass\n", encoding="utf-8")
+    run(pytester).stdout.fnmatch_lines("*import file mismatch*")
