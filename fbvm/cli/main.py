@@ -155,7 +155,7 @@ class _Verbs(click.Group):
             near = suggestion(name, GROUP_OF)
             ctx.fail(f"There is no command {name!r}" + (f"; run the file by `fbvm run {name}`" if Path(name).exists() else near))
         found, command, rest = super().resolve_command(ctx, args)
-        if command is not None and not ctx.resilient_parsing:
+        if command is not None and not ctx.resilient_parsing and any(map(_may_be_empty, rest)):
             _refuse_empty(click.Context(command, ctx, found, **command.context_settings), rest)
         return found, command, rest
 
@@ -173,6 +173,12 @@ class _Verbs(click.Group):
         for heading, verbs in VERB_GROUPS.values():
             with formatter.section(heading):
                 formatter.write_dl(list(verbs.items()))
+
+
+def _may_be_empty(argument: str) -> bool:
+    """True if an argument may be an empty value or end with one: `""`, `--show=`, `-o " "`.  Without such an argument nothing is
+    read for _refuse_empty before the verb reads its command line."""
+    return not argument or argument.endswith("=") or argument[-1].isspace()
 
 
 def _refuse_empty(verb: click.Context, arguments: Sequence[str]) -> None:

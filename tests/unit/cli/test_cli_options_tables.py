@@ -43,6 +43,14 @@ def test_a_value_that_is_empty_is_refused_and_not_passed_over(arguments: tuple[s
     assert (result.exit_code, said in result.stderr) == (2, True), result.output
 
 
+def test_a_command_line_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str | None] = []
+    make_parser = click.Command.make_parser
+    monkeypatch.setattr(click.Command, "make_parser", lambda verb, ctx: (read.append(verb.name), make_parser(verb, ctx))[1])
+    assert CliRunner().invoke(main, ["explain", "S0101"]).exit_code == 0
+    assert read == ["main", "explain"]
+
+
 @each_of("function, text, made", [
     ("time_ns", "5ms", 5_000_000), ("time_ns", 0, 0), ("time_ns", "0s", "0s is not a time that can pass"),
     ("time_ns", "soon", "soon"), ("moment_ns", "0s", 0), ("moment_ns", "-1ms", "-1ms is not a time that can pass"),
