@@ -176,6 +176,8 @@ def _computed(text: str, sign: str, left: Term, right: Term, sort: str, kind: Ty
     if left.constant is not None and right.constant is not None:
         try:
             constant = value(lambda place: None)
+        except OverflowError:
+            raise ConditionError(f"{text} cannot be computed: it is out of range of {'REAL' if single else 'LREAL'}") from None
         except (ArithmeticError, TypeError) as error:
             raise ConditionError(f"{text} cannot be computed: {error}") from None
     return Term(text, value, sort, kind, constant, sign=sign, parts=(left, right))

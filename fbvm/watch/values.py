@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 import struct
+from datetime import date, time
 from typing import TypeAlias
 
 from fbvm.base.arithmetic import shortest
@@ -96,6 +97,7 @@ def sort_of(kind: Type) -> str:
 
 
 DATES = ("DATE", "TIME_OF_DAY", "DATE_AND_TIME")
+_DAYS = ("DATE", "DATE_AND_TIME")
 _EXAMPLES = {
     "BOOL": "TRUE or FALSE", "time": "a time such as 10ms", "text": "a text such as 'abc'",
     "DATE": "a date such as D#2024-01-31", "TIME_OF_DAY": "a time of day such as TOD#12:30:00",
@@ -131,7 +133,6 @@ def conform(kind: Type, value: object, name: str) -> Value:
     literal of a TIME or a date its nanoseconds.
 
     Raises ValueError (out of range) or TypeError (another kind of value), with the name of the variable, `name`."""
-    low, high = (kind.low, kind.high) if isinstance(kind, SubrangeType) else (None, None)
     plain = base(kind)
     if isinstance(value, str) and sort_of(plain) in ("time", *DATES):
         return conform(kind, _literal_of(kind, value, name), name)
@@ -146,16 +147,22 @@ def conform(kind: Type, value: object, name: str) -> Value:
     if plain is BOOL:
         if isinstance(value, bool) or (isinstance(value, int) and value in (0, 1)):
             return bool(value)
-        raise refusal(kind, name, repr(value))
+        raise refusal(kind, name, _given(value))
     if plain.machine in ("f32", "f64"):
         return _real(plain, value, name)
     if isinstance(value, bool) or not isinstance(value, int):
-        raise refusal(kind, name, repr(value))
-    if not (plain.low if low is None else low) <= value <= (plain.high if high is None else high):
-        limits = f"{plain.low if low is None else low}..{plain.high if high is None else high}"
+        raise refusal(kind, name, _given(value))
+    low, high = (kind.low, kind.high) if isinstance(kind, SubrangeType) else (plain.low, plain.high)
+    if not low <= value <= high:
+        limits = f"{literals.DATE_RANGE} as nanoseconds since 1970" if sort_of(plain) in _DAYS else f"{low}..{high}"
         wrong = f"{name}: {value} is out of range of {kind.name}, which holds {limits}"
         raise ValueError(wrong + _unsigned(plain, value))
     return value
+
+
+def _given(value: object) -> str:
+    """A Python value for a message; of a date or time, as TOML has them, the form of TOML."""
+    return value.isoformat() if isinstance(value, date | time) else repr(value)
 
 
 def _unsigned(kind: Elementary, value: int) -> str:
@@ -168,7 +175,7 @@ def _unsigned(kind: Elementary, value: int) -> str:
 
 def _real(kind: Elementary, value: object, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise refusal(kind, name, repr(value))
+        raise refusal(kind, name, _given(value))
     try:
         number = float(value)
         if kind.machine == "f32" and math.isfinite(number):
@@ -180,7 +187,7 @@ def _real(kind: Elementary, value: object, name: str) -> float:
 
 def _text(kind: StringType, value: object, name: str) -> str:
     if not isinstance(value, str):
-        raise refusal(kind, name, repr(value))
+        raise refusal(kind, name, _given(value))
     size = len(packed(value)) // 2 if kind.wide else len(value)
     if size > kind.capacity:
         raise ValueError(f"{name}: {size} characters are out of range of {kind.name}")
@@ -192,7 +199,7 @@ def _text(kind: StringType, value: object, name: str) -> str:
 
 def _character(kind: Type, value: object, name: str) -> str:
     if not isinstance(value, str):
-        raise refusal(kind, name, repr(value))
+        raise refusal(kind, name, _given(value))
     if len(value) != 1:
         raise ValueError(f"{name} is {kind.name} and takes one character, not {len(value)}")
     if ord(value) >= 1 << 8 * kind.size:

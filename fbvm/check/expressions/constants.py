@@ -10,6 +10,7 @@ from fbvm.base.strings import packed
 from fbvm.base.types import BOOL, DAY_NS, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
 from fbvm.base.types import base as base_of
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Value
+from fbvm.syntax.st.literals import DATE_RANGE
 
 
 class NotConstant(Exception):
@@ -123,7 +124,7 @@ def moment(op: str, a: int, b: int) -> int:
     """The value of `a + b` or `a - b` where a is a DATE or DT, in ns.  Raises NotConstant outside 1677-09-22 to 2262-04-11."""
     value = a + b if op == "+" else a - b
     if arithmetic.wrap(value, "i64") != value:
-        raise NotConstant("it is outside the range of 64 bits of nanoseconds, for dates 1677-09-22 to 2262-04-11")
+        raise NotConstant(f"it is outside the range of 64 bits of nanoseconds, for dates {DATE_RANGE}")
     return value
 
 

@@ -289,6 +289,10 @@ def _scaled(whole: str, fraction: str, unit_ns: int, text: str) -> int:
 MONTH_DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 
+DATE_RANGE = "1677-09-22 to 2262-04-11"
+"""The days that 64 bits of nanoseconds have whole, or up to 23:47:16."""
+
+
 def _day(text: str) -> int:
     """Days since 1970-01-01."""
     found = re.fullmatch(_DATE, text)
@@ -302,7 +306,7 @@ def _day(text: str) -> int:
     days = before * 365 + before // 4 - before // 100 + before // 400 - DAYS_1970
     days += sum(MONTH_DAYS[:month - 1]) + (leap and month > 2) + day
     if not -NS_MAX <= days * DAY_NS <= NS_MAX:
-        raise OutOfRange(f"the date {text} is outside 1677-09-22 to 2262-04-11", "")
+        raise OutOfRange(f"the date {text} is outside {DATE_RANGE}", "")
     return days
 
 
@@ -323,5 +327,5 @@ def _moment(text: str) -> int:
         raise Malformed(f"`{_short(text)}` is no date with time", "write it as 2024-05-31-13:45:30")
     moment = _day(day) * DAY_NS + _clock(clock)
     if moment > NS_MAX:
-        raise OutOfRange(f"the moment {text} is outside 1677-09-22 to 2262-04-11", "")
+        raise OutOfRange(f"the moment {text} is outside {DATE_RANGE}", "")
     return moment

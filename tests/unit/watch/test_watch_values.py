@@ -1,6 +1,7 @@
 """Values on their way in and out, and the places that hold them."""
 
 import math
+from datetime import date, datetime, time
 
 import pytest
 from rows import each_of
@@ -130,6 +131,14 @@ def test_a_value_out_of_range_is_refused(kind: Type, value: object, message: str
     with pytest.raises(ValueError) as error:
         conform(kind, value, "x")
     assert message in str(error.value)
+
+
+@each_of(("value", "message"), [
+    (datetime(1600, 1, 1), "not 1600-01-01T00:00:00"), (date(2300, 1, 1), "not 2300-01-01"), (time(12, 30), "not 12:30:00"),
+])
+def test_dates_of_toml_are_shown_as_they_are_written_there(value: object, message: str) -> None:
+    with pytest.raises(TypeError, match=f"x is DATE and takes a date such as D#2024-01-31, {message}$"):
+        conform(t.DATE, value, "x")
 
 
 def test_times_and_dates_may_be_given_as_literals() -> None:
