@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from fbvm.base.arithmetic import limits
 from fbvm.base.codes import CODES
 from fbvm.base.memory import OBJECT_SHIFT, Memory
+from fbvm.base.types import DAY_NS
 from fbvm.code.image import Image, Objects, Site
 from fbvm.code.operations import LEASE_BYTES, LEASED
 
@@ -64,6 +66,9 @@ ENDLESS = "a loop waits for what does not change within a scan, or there is too 
 """The usual causes of R0104."""
 _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} outside {1}..{2}"}
 """R0105 by the number of its values: BCD, text and data type, value and limits."""
+_TICKS = {"ns": 1, "ms": 1_000_000, "s": 1_000_000_000}
+_UNITS = {highest // tick: unit for highest in (limits("i64")[1], DAY_NS - 1) for unit, tick in _TICKS.items()}
+"""By the greatest number that a conversion to a duration, date or time of day takes, the unit in which it counts."""
 SHOWN_CHARACTERS = 60
 """Characters of a text in a message, which is one line: texts may have 65,534."""
 
@@ -77,7 +82,7 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), insta
     place = image.sites[site]
     values = tuple(int(value) if isinstance(value, bool) else value for value in values)
     if code == "R0105" and values:
-        words = _CONVERSION[len(values)].format(*map(_shown, values))
+        words = _CONVERSION[len(values)].format(*map(_shown, values)) + _unit(values)
     elif code in _WORDS and values:
         words = _WORDS[code].format(*map(_shown, values))
     elif code == _RAISED:
@@ -89,6 +94,15 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), insta
     else:
         words = CODES[code].title if code in CODES else code
     return Trap(code, place, values, f"{code} {place}: {words}", instance)
+
+
+def _unit(values: tuple[Any, ...]) -> str:
+    """The unit of the numbers of an R0105 about times and dates: of whole numbers only those have limits.  A sum with a date has
+    one limit of the 64 bits and another that depends on the summand."""
+    if len(values) != 3 or not isinstance(values[0], int):
+        return ""
+    unit = _UNITS.get(values[2]) or _UNITS.get(-values[1] - 1)
+    return f" {unit}" if unit else ""
 
 
 def _of_heap(objects: Objects, reference: int, memory: Memory) -> str:
