@@ -96,10 +96,15 @@ COMMANDS = (
 COMMANDS_BY_WORD = {word: command for command in COMMANDS for word in (command.name, command.short) if word}
 
 
+_OPERATOR = re.compile(r"\s*(?::=|=|(?:[<>*/&]|[+-]\s|(?:AND|OR|XOR|MOD)\b)\s*\S)", re.IGNORECASE)
+"""What stands behind the first operand of an assignment or expression, and begins no argument of a command."""
+
+
 def command_of(line: str) -> Command | None:
-    """The command that a line begins with; None without one, and for an assignment, whose variable may be called as one is."""
+    """The command that a line begins with; None without one, and for an assignment or an expression, whose variable may be
+    called as a command is."""
     name, _, rest = line.partition(" ")
-    return None if rest.lstrip().startswith((":=", "=")) else COMMANDS_BY_WORD.get(name.lower())
+    return None if _OPERATOR.match(rest) else COMMANDS_BY_WORD.get(name.lower())
 
 
 class Commands:
@@ -126,6 +131,8 @@ class Commands:
         rest = rest.strip()
         if command is None and re.search(r":=|(?<![<>])=", line):
             command, rest = COMMANDS_BY_WORD["write"], line
+        if command is None and name.lower() in COMMANDS_BY_WORD:
+            raise CommandError(f"{line} is an expression: `expect` says whether a condition holds, `print` shows variables")
         if command is None:
             raise CommandError(f"{name!r} is no command{_near(name) or '; `help` lists them'}")
         if command.moves:

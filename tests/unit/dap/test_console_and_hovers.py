@@ -116,7 +116,9 @@ def test_an_expression_has_a_value_and_a_type(console: Console, text: str, more:
     ("own.Add()", "watch", METHOD), ("own.Add", "repl", METHOD),
     ("quit", "repl", "quit: the editor has that of its own"), ("BREAK 5", None, "break: the editor has that of its own"),
     ("n / (n - 5)", "watch", "n / (n - 5) cannot be computed: division by zero"),
-    ("1 / 0", "watch", "division by zero in '1 / 0'"),
+    ("1 / 0", "watch", "division by zero in '1 / 0'"), ("n MOD 0", "repl", "division by zero in 'n MOD 0'"),
+    ("n MOD (n - 5)", "repl", "n MOD (n - 5) cannot be computed: division by zero"),
+    ("n > wrong", "repl", "there is no wrong; known here: Main"),
 ])
 def test_what_cannot_be_evaluated_says_why(console: Console, text: str, context: str | None, said: str) -> None:
     with pytest.raises(RefusedError) as refused:

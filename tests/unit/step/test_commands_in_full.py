@@ -54,6 +54,9 @@ def place(made: Commands) -> tuple[int, int | None]:
     return made.session.here.scan, site.line if site else None
 
 
+EXPRESSION = "! {} is an expression: `expect` says whether a condition holds, `print` shows variables"
+
+
 @each_of("lines, printed, stands", [
     # moves count from 1, and one of them is meant if nobody says how many
     ("step", [], (0, 9)), ("step 3", [], (0, 10)), ("next 2", [], (0, 10)), ("step 2|next", [], (0, 10)),
@@ -61,6 +64,10 @@ def place(made: Commands) -> tuple[int, int | None]:
     ("scan", [], (1, 8)), ("SCAN 3", [], (3, 8)), ("step|scan", [], (1, 8)), ("goto 0", [], (0, 8)), ("goto 4|goto", [], (1, 8)),
     ("step 3|back", [], (0, 4)), ("step 3|back 2", [], (0, 9)), ("scan 2|step 2|back scan", [], (2, 8)),
     ("scan 2|step 2|back SCAN|back scan", [], (1, 8)),
+    # a line that goes on with an operator is an expression, whatever its variable is called
+    ("n MOD 0", [EXPRESSION.format("n MOD 0")], (0, 8)), ("S > 3", [EXPRESSION.format("S > 3")], (0, 8)),
+    ("n + 1", [EXPRESSION.format("n + 1")], (0, 8)), ("b  and c", [EXPRESSION.format("b  and c")], (0, 8)),
+    ("run -Main.N > 0", ["-Main.N > 0 was not reached in 6 scans"], (6, 8)),
     ("step 0", ["! '0' is no number of steps"], (0, 8)), ("back 0", ["! '0' is no number of steps"], (0, 8)),
     ("scan x", ["! 'x' is no number of steps"], (0, 8)), ("goto -1", ["! '-1' is no number of steps"], (0, 8)),
     # an empty line does the last move again
