@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from fbvm.base.host import WAITLESS, replace
+from fbvm.base.host import WAITLESS, has_ended, process_space, replace
 
 MIB = 1 << 20
 SOURCE_BYTES = 64 * MIB
@@ -146,8 +147,27 @@ def _refuse_unwritable(target: Path, path: Path) -> None:
 
 
 def _beside(target: Path) -> Path:
-    """The file that is written before it takes the place of another one."""
-    return target.with_name(f".fbvm.{os.getpid()}.part")
+    """The file that is written before it takes the place of another one.  Those in its folder that killed processes have left are
+    removed, once for each folder."""
+    space = process_space()
+    if space and target.parent not in _tidied:
+        _tidied.add(target.parent)
+        _tidy(target.parent, space)
+    return target.with_name(f".fbvm.{f'{space}.' if space else ''}{os.getpid()}.part")
+
+
+_tidied: set[Path] = set()
+"""Folders in which this process has removed what others have left."""
+
+
+def _tidy(folder: Path, space: str) -> None:
+    """Removes the parts of processes of this space that have ended; what cannot be removed stays."""
+    own = re.compile(rf"\.fbvm\.{space}\.([1-9][0-9]{{0,9}})\.part")
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if (match := own.fullmatch(entry.name)) and has_ended(int(match[1])):
+                with suppress(OSError):
+                    os.unlink(entry.path)
 
 
 def is_part(path: Path) -> bool:

@@ -14,6 +14,7 @@ import stat
 import struct
 import sys
 import time
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PureWindowsPath
@@ -224,6 +225,44 @@ NICENESS = 10
 def can_end_others() -> bool:
     """True if a program can ask another one to end, and not only end it: Windows has no SIGTERM."""
     return sys.platform != "win32"
+
+
+# --- processes --------------------------------------------------------------------------------------------------------
+
+
+_HOST = ("/etc/machine-id", "/proc/sys/kernel/random/boot_id")
+"""Files of Linux with a number that no other host has: of the installation (machine-id(5)), of this start (random(4))."""
+
+
+def process_space() -> str:
+    """A short name for the processes that know each other by their numbers: under Linux those of this host and container.  ""
+    under other systems, where nothing tells hosts apart that may use the same folder."""
+    try:
+        container = os.readlink("/proc/self/ns/pid")
+        number = next(text for text in map(_text, _HOST) if text)
+    except (OSError, StopIteration):
+        return ""
+    return f"{zlib.crc32(f'{number} {container}'.encode()):08x}"
+
+
+def _text(path: str) -> str:
+    """The text of a small file; "" if there is none."""
+    try:
+        return Path(path).read_text(encoding="ascii").strip()
+    except (OSError, ValueError):
+        return ""
+
+
+def has_ended(process: int) -> bool:
+    """True if there is no process of this number; False under Windows, where the same question would end it."""
+    if sys.platform != "win32":
+        try:
+            os.kill(process, 0)
+        except (ProcessLookupError, OverflowError):
+            return True
+        except PermissionError:  # it is another user's
+            return False
+    return False
 
 
 # --- files that one process has ---------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -31,6 +32,31 @@ def test_what_is_broken_off_leaves_what_was_there(ending: type[BaseException]) -
             file.flush()
             raise ending
     assert (inside(), Path("page.html").read_bytes()) == (["page.html"], b"old")
+
+
+KILLED = """
+import os, signal
+from pathlib import Path
+from fbvm.base.files import new_file
+with new_file(Path("image.json")) as file:
+    file.write(b"half")
+    file.flush()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="others do not tell hosts apart that use the same folder")
+def test_what_a_killed_process_has_left_goes_with_the_next_write_in_its_folder() -> None:
+    """That of a living process stays, and of another host or container, where the same number is another process."""
+    subprocess.run([sys.executable, "-c", KILLED], check=False)
+    (left,) = inside()
+    others = [left.replace(left.split(".")[2], "01234567"), f".fbvm.{left.split('.')[3]}.part", left.replace("part", "json")]
+    living = left.replace(left.split(".")[3], str(os.getppid()))
+    for name in (*others, living):
+        Path(name).touch()
+    write_file(Path("image.json"), "whole")
+    assert inside() == sorted([*others, living, "image.json"])
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="rights are others there, and links a privilege")

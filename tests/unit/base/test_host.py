@@ -8,6 +8,7 @@ import select
 import selectors
 import signal
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -160,6 +161,35 @@ def test_a_file_that_one_process_has(tmp_path: Path, monkeypatch: pytest.MonkeyP
         monkeypatch.setattr("fcntl.flock", _refusing(errno.EIO))
         with pytest.raises(OSError):
             host.taken_alone(again)
+
+
+def test_processes_that_have_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of another user lives; under Windows the question would end it."""
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        process.wait()
+    assert host.has_ended(process.pid) is (sys.platform != "win32")
+    assert not host.has_ended(os.getpid())
+    monkeypatch.setattr(os, "kill", _refusing(errno.EPERM))
+    assert not host.has_ended(process.pid)
+    monkeypatch.setattr(host, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setattr(os, "kill", lambda *_: pytest.fail("asked"))
+    assert not host.has_ended(process.pid)
+
+
+def test_hosts_and_containers_have_processes_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    installed, started = tmp_path / "machine-id", tmp_path / "boot_id"
+    monkeypatch.setattr(host, "_HOST", (str(installed), str(started)))
+    containers = {"/proc/self/ns/pid": "pid:[1]"}
+    monkeypatch.setattr(os, "readlink", containers.__getitem__)
+    assert host.process_space() == ""
+    seen = set()
+    for file, text in ((started, "b"), (installed, ""), (installed, "a"), (installed, "c")):
+        file.write_text(f"{text}\n", encoding="ascii")
+        seen.add(host.process_space())
+    containers["/proc/self/ns/pid"] = "pid:[2]"
+    assert len({*seen, host.process_space()}) == 4 and all(len(space) == 8 for space in seen)
+    monkeypatch.setattr(os, "readlink", _refusing(errno.ENOENT))
+    assert host.process_space() == ""
 
 
 def _refusing(number: int) -> Callable[..., None]:
