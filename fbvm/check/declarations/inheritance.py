@@ -4,7 +4,7 @@ Source: IEC 61131-3 ed. 3, 6.6.5 to 6.6.8; what CODESYS and TwinCAT add is a row
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, StructType, Type, fold
@@ -119,9 +119,8 @@ def check_members(context: Context, pou: Pou) -> None:
         parents = [found for parent in (pou.base, *pou.interfaces) if parent and (found := parent.method(key)) is not None]
         for parent in parents:
             _check_override(context, pou, method, parent)
-        if "OVERRIDE" in method.modifiers and not parents and not pou.inherits:
-            _report(context, "S1003", method, f"{shown(method)} overrides nothing",
-                    "leave OVERRIDE out, or name what it overrides")
+        if "OVERRIDE" in method.modifiers and not pou.inherits:
+            _check_overriding(context, method, parents)
         if "ABSTRACT" in method.modifiers and pou.kind != "INTERFACE" and "ABSTRACT" not in pou.modifiers:
             _report(context, "S1007", method, f"{shown(method)} is ABSTRACT, and {pou.name} is not",
                     f"write {pou.kind} ABSTRACT {pou.name}")
@@ -132,6 +131,16 @@ def check_members(context: Context, pou: Pou) -> None:
                 inherited = pou.base.method(key) if pou.base is not None and key not in pou.methods else None
                 if inherited is not None:
                     _check_override(context, pou, inherited, wanted)
+
+
+def _check_overriding(context: Context, method: Pou, parents: Sequence[Pou]) -> None:
+    """Report a method with OVERRIDE, where `parents` are those of its name in its base and interfaces, that overrides none: a
+    PRIVATE one is seen in its own block only."""
+    if not parents:
+        _report(context, "S1003", method, f"{shown(method)} overrides nothing", "leave OVERRIDE out, or name what it overrides")
+    elif all("PRIVATE" in parent.modifiers for parent in parents):
+        _report(context, "S1003", method, f"{shown(method)} overrides nothing: that of {_home(parents[0])} is PRIVATE",
+                "leave OVERRIDE out: it is a method of its own", parents[0])
 
 
 def _report(context: Context, code: str, method: Pou, message: str, hint: str = "", other: Pou | None = None) -> None:
