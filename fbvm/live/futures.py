@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from fbvm.live.plcs import LivePlc
 from fbvm.live.workbench import Order, Workbench
@@ -44,8 +43,3 @@ def run_again(bench: Workbench, runs: Sequence[Running], orders: Sequence[Order]
         for run in left:
             if run.due_ns == due_ns:
                 run.scan(due_ns)
-
-
-def order_of(bench: Workbench, action: str, fields: dict[str, Any]) -> Order:
-    """An action that was done just now, with the number of scans that each PLC has done."""
-    return Order(action, fields, {name: live.plc.scans for name, live in bench.plcs.items()})

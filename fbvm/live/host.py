@@ -49,6 +49,7 @@ class LiveHost:
             forget_statement(live)
 
     def update(self, now_ns: int, is_late: Callable[[], bool]) -> None:
+        self.workbench.let_go()
         self.server.update(now_ns, is_late)
         if now_ns - self._ticked_ns >= UPDATE_NS:
             self._ticked_ns = now_ns

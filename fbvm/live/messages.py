@@ -63,7 +63,7 @@ ACTIONS: dict[str, Action] = {
     "check": _does(),
     "solution": _asks(),
     "capture": _asks(plc=str),
-    "write": _does(plc=str, name=str, value=str),
+    "write": Action({"plc": str, "name": str, "value": str}, {"held": bool}, True),
     "force": _does(plc=str, name=str, value=str),
     "release": Action({"plc": str}, {"name": str}, True),
     "group": _does(name=str, names=list),

@@ -9,7 +9,8 @@ from pathlib import PurePath
 from typing import Any
 
 from fbvm.base.areas import FLAG_AREAS
-from fbvm.live.futures import REPEATED, order_of
+from fbvm.base.types import BOOL
+from fbvm.live.futures import REPEATED
 from fbvm.live.lesson import LiveLesson
 from fbvm.live.look import STEP, Look, find_names
 from fbvm.live.messages import ACTIONS, VERSION, MessageError, dump, dump_in_steps, message_id, parse
@@ -41,6 +42,8 @@ class Session:
         self._bench = workbench
         self._seen = Look(next(iter(workbench.plcs.values())))
         self._updates = Updates(workbench, self._seen)
+        self._held: dict[tuple[str, str], int] = {}
+        """What the page holds TRUE: PLC and variable, and the number of the scan that sees it first."""
         self._replies: deque[Generator[None, None, str]] = deque()
         """Replies that take longer."""
         self._actions: dict[str, Callable[..., Any]] = {
@@ -75,7 +78,7 @@ class Session:
             if self._seen.past and action in ("write", "force", "release"):
                 raise MessageError(f"this is scan {self._seen.past[0]}, which is past: go back to now, or on from here, first")
             fields = {name: value for name, value in message.items() if value is not None}
-            order = order_of(self._bench, action, fields)
+            order = self._bench.order(action, fields)
             done = self._actions[action](**fields)
             if action in REPEATED:
                 self._bench.orders.append(order)
@@ -136,7 +139,10 @@ class Session:
         self._updates.begins_again = self._updates.is_ready = True
 
     def end(self) -> None:
-        """The page has gone."""
+        """The page has gone, and holds nothing any more."""
+        for (plc, name), scan in self._held.items():
+            self._bench.let_go_later(plc, name, scan)
+        self._held.clear()
         self._updates.is_ready = False
         self._seen.leave_past()
 
@@ -324,8 +330,16 @@ class Session:
         self._look_anew()
         return {"scan": scan}
 
-    def _write(self, plc: str, name: str, value: str) -> dict[str, Any]:
-        return {"value": self._bench.write(plc, name, value), "scan": self._bench.plc(plc).plc.scans}
+    def _write(self, plc: str, name: str, value: str, held: bool = False) -> dict[str, Any]:
+        """Writes a value; one that is `held` is FALSE again when the page has gone, unless it has written another value."""
+        live = self._bench.plc(plc)
+        if held and (kind := getattr(live.plc.find(name), "type", None)) is not BOOL:
+            raise MessageError(f"{name} is {kind or 'a range'}; only a BOOL is held")
+        done = {"value": self._bench.write(plc, name, value), "scan": live.plc.scans}
+        self._held.pop((plc, name), None)
+        if held:
+            self._held[plc, name] = live.plc.scans
+        return done
 
     def _keep_group(self, name: str, names: list[str]) -> None:
         self._bench.keep_group(name, names)

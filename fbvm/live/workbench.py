@@ -93,6 +93,8 @@ class Workbench:
         self.lesson: LiveLesson | None = None
         """What the page teaches; None for a page that only shows."""
         self.orders: list[Order] = []
+        self._to_let_go: list[tuple[str, str, int]] = []
+        """What pages that have gone held: PLC, variable, and the number of the scan that sees it first."""
         self.acts: list[Act] = []
         networks: dict[int, Any] = {id(unit.network): unit.network for live in plcs for unit in live.plc.units}
         self.networks = list(networks.values())
@@ -121,6 +123,23 @@ class Workbench:
         live.plc.write(found, given)
         self._note(live, "inside" if live.plc.halted else "write", f"{found.name} := {_text(found, given)}", found.name, given)
         return _text(found, live.plc.read(found))
+
+    def let_go_later(self, plc: str, name: str, scan: int) -> None:
+        """Lets `let_go` end what was held TRUE by a page that has gone, as soon as this scan has seen it."""
+        self._to_let_go.append((plc, name, scan))
+
+    def let_go(self) -> None:
+        """Writes FALSE to what nobody holds any more; called between scans.  Whoever has the PLCs in place of the pages changes
+        them alone."""
+        if not self._to_let_go or self.held_by:
+            return
+        seen = [row for row in self._to_let_go if self.plcs[row[0]].plc.scans > row[2]]
+        self._to_let_go = [row for row in self._to_let_go if row not in seen]
+        for plc, name, _ in seen:
+            fields = {"plc": plc, "name": name, "value": "FALSE"}
+            order = self.order("write", fields)
+            self.write(**fields)
+            self.orders.append(order)
 
     def force(self, plc: str, name: str, value: str) -> None:
         """Holds a value before and behind the program until it is released."""
@@ -249,6 +268,12 @@ class Workbench:
         if self.groups is None:
             raise MessageError("this run has no file beside which groups can be kept")
         self.groups.keep(name, names)
+
+    def order(self, action: str, fields: dict[str, Any]) -> Order:
+        """An action that is done now, with the number of scans that each PLC has done.  Who holds a value is left out: the end of
+        holding it is an action of its own."""
+        kept = {name: value for name, value in fields.items() if name != "held"}
+        return Order(action, kept, {name: live.plc.scans for name, live in self.plcs.items()})
 
     def do(self, action: str, fields: Mapping[str, Any]) -> None:
         """Does again what an order says."""

@@ -69,11 +69,11 @@ export class PicturePanel {
   }
 
   clicked(element, { plc, name, key, click, element: id }) {
-    const write = (value) => this.page.ask("write", { plc, name, value });
+    const write = (value, more = {}) => this.page.ask("write", { plc, name, value, ...more });
     element.setAttribute("role", "button");
     element.setAttribute("tabindex", "0");
     element.setAttribute("aria-label", `${id}: writes ${name}`);
-    const down = click === "press" ? () => write("TRUE") : () => write(click === "toggle" ? (this.values[key] === "TRUE" ? "FALSE" : "TRUE") : click);
+    const down = click === "press" ? () => write("TRUE", { held: true }) : () => write(click === "toggle" ? (this.values[key] === "TRUE" ? "FALSE" : "TRUE") : click);
     const up = click === "press" ? () => this.release(plc, pressed, () => write("FALSE")) : () => {};
     let pressed = null;
     const begin = (event) => {

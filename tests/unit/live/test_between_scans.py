@@ -53,7 +53,8 @@ def test_files_are_looked_at_every_third_tick_and_ticks_are_100_ms_apart(
     host = served
     told: list[str] = []
     look: Any = SimpleNamespace(look=lambda: told.append("look"))
-    host.workbench = SimpleNamespace(changes=look, pictures=None, groups=look, held_by="")  # type: ignore[assignment]
+    host.workbench = SimpleNamespace(changes=look, pictures=None, groups=look, held_by="",  # type: ignore[assignment]
+                                     let_go=lambda: None)
     monkeypatch.setattr(host, "_tick", lambda: told.append("tick"))
     monkeypatch.setattr(host.server, "update", lambda now_ns, is_late: None)
     for now_ns in (UPDATE_NS - 1, UPDATE_NS, UPDATE_NS + 1, 2 * UPDATE_NS - 1, 2 * UPDATE_NS, 3 * UPDATE_NS, 4 * UPDATE_NS):

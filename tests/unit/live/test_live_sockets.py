@@ -69,6 +69,34 @@ def test_a_browser_that_never_reads_gets_one_update_and_holds_nothing_up(host: L
         assert len(host.server.sessions) == 1
 
 
+def asked(host: LiveHost, sock: socket.socket, do: str, **fields: object) -> None:
+    sock.sendall(frame(json.dumps({"id": 2, "do": do, **fields}).encode()))
+    host.serve(WAIT_NS)
+
+
+def test_what_a_page_holds_is_let_go_when_the_page_goes(host: LiveHost) -> None:
+    """As soon as a scan has seen it, and not while a debugger has the PLC; what the page has let go itself is left alone."""
+    plc = host.workbench.plcs["pump"].plc
+    with opened(host) as sock:
+        asked(host, sock, "write", plc="pump", name="Main.Pump", value="TRUE", held=True)
+        plc.scan()
+    host.workbench.held_by = "a debugger"
+    host.serve(WAIT_NS)
+    host.update(0, lambda: False)
+    assert host.server.sessions == [] and plc.read("Main.Pump") is True
+    host.workbench.held_by = ""
+    host.update(0, lambda: False)
+    assert plc.read("Main.Pump") is False
+    with opened(host) as sock:
+        asked(host, sock, "write", plc="pump", name="Main.Pump", value="TRUE", held=True)
+        asked(host, sock, "write", plc="pump", name="Main.Pump", value="FALSE")
+        asked(host, sock, "write", plc="pump", name="Main.Pump", value="TRUE")
+    host.serve(WAIT_NS)
+    plc.scan()
+    host.update(0, lambda: False)
+    assert plc.read("Main.Pump") is True, "written, and not held"
+
+
 def test_callers_who_say_nothing_are_sent_away(host: LiveHost) -> None:
     with called(host) as sock:
         sock.settimeout(5)

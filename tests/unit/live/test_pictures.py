@@ -82,6 +82,30 @@ def test_a_drawing_and_its_table_are_read_again_when_they_change(tmp_path: Path)
     assert machine.page.update()["picture"] == {"pump/Main.Pump": "FALSE"}
 
 
+def test_a_button_is_held_for_one_scan_at_least_when_its_page_goes_at_once() -> None:
+    page = Page()
+    page.scan(3)
+    assert page.done("write", plc="pump", name="Main.Pump", value="TRUE", held=True)["scan"] == 3
+    page.session.end()
+    page.bench.let_go()
+    assert page.plc.read("Main.Pump") is True
+    page.scan()
+    page.bench.let_go()
+    assert page.plc.read("Main.Pump") is False
+    assert [act.text for act in page.bench.acts] == ["Main.Pump := TRUE", "Main.Pump := FALSE"]
+    assert [(order.fields, order.scans) for order in page.bench.orders] == [
+        ({"plc": "pump", "name": "Main.Pump", "value": value}, {"pump": scans}) for value, scans in (("TRUE", 3), ("FALSE", 4))
+    ]
+    page.session.end()
+    page.bench.let_go()
+    assert len(page.bench.acts) == 2
+
+
+def test_only_a_bool_is_held() -> None:
+    reply = Page().ask("write", plc="pump", name="Main.Level", value="5", held=True)
+    assert reply["error"] == "Main.Level is INT; only a BOOL is held"
+
+
 def test_a_table_with_a_mistake_leaves_the_picture_as_it_was(tmp_path: Path) -> None:
     machine = Machine(tmp_path, LEVEL)
     machine.save("fbvm.toml", HEAD + "[[picture.bind]]\n")

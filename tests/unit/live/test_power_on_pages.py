@@ -55,7 +55,8 @@ def test_power_is_noted_where_a_page_shows_rungs_and_nobody_else_has_the_plcs(
             self.power = False
 
     lives = {name: Live() for name in "abc"}
-    bench: Any = SimpleNamespace(plcs=lives, changes=None, pictures=None, groups=None, held_by=held)
+    bench: Any = SimpleNamespace(plcs=lives, changes=None, pictures=None, groups=None, held_by=held,
+                                 let_go=lambda: None)
     host = LiveHost(bench, token="t")
     host.close()
     pages = [SimpleNamespace(live=live, shows_inside=is_shown) for live, is_shown in zip(lives.values(), shows, strict=False)]
