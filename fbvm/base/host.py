@@ -230,27 +230,19 @@ def can_end_others() -> bool:
 # --- processes --------------------------------------------------------------------------------------------------------
 
 
-_HOST = ("/etc/machine-id", "/proc/sys/kernel/random/boot_id")
-"""Files of Linux with a number that no other host has: of the installation (machine-id(5)), of this start (random(4))."""
+_HOST = "/proc/sys/kernel/random/boot_id"
+"""A file of Linux with a number that no other start of any host has (random(4)); copies of a machine share their machine-id."""
 
 
 def process_space() -> str:
-    """A short name for the processes that know each other by their numbers: under Linux those of this host and container.  ""
+    """A short name for the processes that know each other by their numbers: under Linux those of this start of the host, in one container.  ""
     under other systems, where nothing tells hosts apart that may use the same folder."""
     try:
         container = os.readlink("/proc/self/ns/pid")
-        number = next(text for text in map(_text, _HOST) if text)
-    except (OSError, StopIteration):
-        return ""
-    return f"{zlib.crc32(f'{number} {container}'.encode()):08x}"
-
-
-def _text(path: str) -> str:
-    """The text of a small file; "" if there is none."""
-    try:
-        return Path(path).read_text(encoding="ascii").strip()
+        number = Path(_HOST).read_text(encoding="ascii").strip()
     except (OSError, ValueError):
         return ""
+    return f"{zlib.crc32(f'{number} {container}'.encode()):08x}"
 
 
 def has_ended(process: int) -> bool:

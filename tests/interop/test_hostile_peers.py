@@ -191,7 +191,7 @@ def test_many_lost_connections_leave_nothing_behind(name: str, monkeypatch: pyte
         gc.collect()
         gc.freeze()
         seen = []
-        for _ in range(4):
+        for _ in range(6):
             run(plc, for_ns=SECOND_NS, pace="event")
             gc.collect()
             seen.append((len(os.listdir("/proc/self/fd")), len(gc.get_objects())))

@@ -250,8 +250,10 @@ class SymbolTable:
     def recording(self, dependencies: Dependencies) -> Iterator[Dependencies]:
         """Record look-ups in `dependencies` for a while, and not as those of the body that is being checked."""
         before, self.dependencies = self.dependencies, dependencies
-        yield dependencies
-        self.dependencies = before
+        try:
+            yield dependencies
+        finally:
+            self.dependencies = before
 
     def owners(self, source: Source) -> tuple[str, ...]:
         """The libraries whose names `source` sees, nearest first, "" for the user's own names, which a library never sees."""

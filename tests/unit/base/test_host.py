@@ -177,17 +177,17 @@ def test_processes_that_have_ended(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_hosts_and_containers_have_processes_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    installed, started = tmp_path / "machine-id", tmp_path / "boot_id"
-    monkeypatch.setattr(host, "_HOST", (str(installed), str(started)))
+    started = tmp_path / "boot_id"
+    monkeypatch.setattr(host, "_HOST", str(started))
     containers = {"/proc/self/ns/pid": "pid:[1]"}
     monkeypatch.setattr(os, "readlink", containers.__getitem__)
     assert host.process_space() == ""
     seen = set()
-    for file, text in ((started, "b"), (installed, ""), (installed, "a"), (installed, "c")):
-        file.write_text(f"{text}\n", encoding="ascii")
+    for text in ("a", "b"):
+        started.write_text(f"{text}\n", encoding="ascii")
         seen.add(host.process_space())
     containers["/proc/self/ns/pid"] = "pid:[2]"
-    assert len({*seen, host.process_space()}) == 4 and all(len(space) == 8 for space in seen)
+    assert len({*seen, host.process_space()}) == 3 and all(len(space) == 8 for space in seen)
     monkeypatch.setattr(os, "readlink", _refusing(errno.ENOENT))
     assert host.process_space() == ""
 
