@@ -235,8 +235,8 @@ _HOST = "/proc/sys/kernel/random/boot_id"
 
 
 def process_space() -> str:
-    """A short name for the processes that know each other by their numbers: under Linux those of this start of the host, in one container.  ""
-    under other systems, where nothing tells hosts apart that may use the same folder."""
+    """A short name for the processes that know each other by their numbers: under Linux those of this start of the host, in one
+    container.  "" under other systems, where nothing tells hosts apart that may use the same folder."""
     try:
         container = os.readlink("/proc/self/ns/pid")
         number = Path(_HOST).read_text(encoding="ascii").strip()
