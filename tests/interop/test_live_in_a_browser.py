@@ -136,6 +136,14 @@ def test_a_name_in_a_rung_is_watched_by_a_click_and_a_force_is_seen_wherever_it_
     assert page.locator("#rungs text.held").count() == 0 and run.complaints == []
 
 
+def test_a_slow_click_at_a_name_in_a_rung_is_one(live: Any) -> None:
+    """The rungs are drawn anew ten times a second, but not while the button of the mouse is down."""
+    page = live(text=LADDER).window()
+    state(page, "run")
+    page.locator("#rungs text", has_text="Start").first.click(delay=1000)
+    page.locator("#watched tr[data-name='Main.Start']").wait_for(timeout=10_000)
+
+
 def test_a_cable_is_pulled_and_a_fault_switched_on(live: Any) -> None:
     page = (run := live()).window()
     state(page, "run")

@@ -1,6 +1,7 @@
-// What is drawn while a button is held waits until it is let go: a browser drops the click on a button that was replaced in between.
+// What is drawn while a button, or a name in a rung, is held waits until it is let go: a browser drops the click on what was
+// replaced in between.
 
-const PRESSED = "button, a, summary, select";
+const PRESSED = "button, a, summary, select, text[data-name]";
 let isPressed = false;
 let waiting = [];
 
